@@ -1,0 +1,115 @@
+"""Conformal energy minimisation (the paper's Algorithm 1)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy import sparse
+
+from cembench.clock import phase
+from cembench.errors import AlgorithmFailed
+from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh
+from cembench.geometry.planar import polygon_area
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+Complex = NDArray[np.complex128]
+
+
+@algorithm("cem", title="CEM", target="disk", source="The CEM paper, Algorithm 1")
+def cem(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 1e-5,
+    max_iterations: Annotated[int, Field(ge=0)] = 20,
+    inversion: bool = True,
+    delaunay: bool = False,
+) -> Parameterization:
+    """Which boundary makes the harmonic map to the disk conformal? Algorithm 1 of the paper.
+
+    Faithful to Algorithm 1: start (14), (18), (15), (16); iteration (30), (24), (25), (22), or (23)
+    for (30) with ``inversion=False``. Decided here, where the paper is silent: the start's triangle
+    is the one whose barycentre is nearest to the mean vertex; iteration ends after the first one
+    that lowers E_C by less than `tolerance`, or after `max_iterations`; a vertex at the origin,
+    which has no inverse, counts as zero in (30). With the vertices ordered interior first, boundary
+    last, and the last one pinned, a single Cholesky factor serves the start, and its leading block
+    all Dirichlet solves. `delaunay` takes the weights of the intrinsic Delaunay triangulation.
+    """
+    n_i = len(mesh.interior)
+    if n_i == 0:
+        raise AlgorithmFailed("the mesh has no interior vertex, so no harmonic map has any freedom")
+    L = laplacian(mesh, delaunay=delaunay)
+    with phase("assembly"):
+        order = np.concatenate([mesh.interior, mesh.boundary])
+        L = sparse.csc_array(sparse.csr_array(L)[order][:, order])
+        pinned = L[:-1, :-1]
+        L_bi, L_bb = sparse.csr_array(L)[n_i:, :n_i], L[n_i:, n_i:]
+        L_ib = sparse.csr_array(L_bi.T)
+    whole = Cholesky(pinned, leading=n_i)
+    ring = Cholesky(L_bb)
+
+    def dirichlet(f_b: Complex) -> Complex:
+        return whole.solve_leading(-(L_ib @ f_b))  # Eq. 22
+
+    def energy(f_i: Complex, f_b: Complex) -> float:
+        # f^* L f needs only the boundary rows, since f is harmonic inside.
+        return 0.5 * float(np.vdot(f_b, L_bb @ f_b + L_bi @ f_i).real) - polygon_area(f_b)
+
+    f_b = _on_circle(_start(mesh, whole, order))
+    f_i = dirichlet(f_b)
+    history = [energy(f_i, f_b)]
+    for _ in range(max_iterations):
+        f_b = _on_circle(ring.solve(-(L_bi @ (_inverted(f_i) if inversion else f_i))))
+        f_i = dirichlet(f_b)
+        history.append(energy(f_i, f_b))
+        if history[-2] - history[-1] < tolerance:
+            break
+    uv = np.empty(mesh.n, dtype=np.complex128)
+    uv[order] = np.concatenate([f_i, f_b])
+    return Parameterization(uv, len(history) - 1, tuple(history))
+
+
+def _start(mesh: DiskMesh, whole: Cholesky, order: NDArray[np.int64]) -> Complex:
+    """Boundary values of the map with a pole at the middle triangle (Eqs. 13, 14, 18)."""
+    V, F = mesh.V, mesh.F
+    with phase("start"):
+        middle = V.mean(axis=0)
+        corners = F[np.argmin(((V[F].mean(axis=1) - middle) ** 2).sum(axis=1))]
+        p_a, p_b, p_c = V[corners]
+        base = p_b - p_a
+        alpha = np.dot(p_c - p_a, base) / np.dot(base, base)
+        height = np.linalg.norm(p_c - (p_a + alpha * base))
+        length = np.linalg.norm(base)
+        rhs = np.zeros(mesh.n, dtype=np.complex128)
+        rhs[corners] = [
+            -1 / length + 1j * (1 - alpha) / height,
+            1 / length + 1j * alpha / height,
+            -1j / height,
+        ]
+        f = np.append(whole.solve(rhs[order][:-1]), 0.0)
+    f_b = f[len(mesh.interior) :]
+    # The image is the outside of a curve, so the boundary runs clockwise round it.
+    return np.conj(f_b) if polygon_area(f_b) < 0 else f_b
+
+
+def _on_circle(f_b: Complex) -> Complex:
+    """Centralise and normalise (Eqs. 24, 25)."""
+    f_b = f_b - f_b.mean()
+    modulus = np.abs(f_b)
+    if not modulus.min() > 0:
+        raise AlgorithmFailed(
+            f"boundary vertex number {int(np.argmin(modulus))} of the loop came to lie at the "
+            "centre of the boundary, so its place on the circle is undefined (Eq. 25)"
+        )
+    return f_b / modulus
+
+
+def _inverted(f: Complex) -> Complex:
+    """F / |f|^2 (Eq. 30); zero stays zero."""
+    squared = (f * np.conj(f)).real
+    return np.divide(f, squared, out=np.zeros_like(f), where=squared > 0)

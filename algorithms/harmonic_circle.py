@@ -1,0 +1,26 @@
+"""Harmonic map with the boundary laid on the circle by arc length."""
+
+from __future__ import annotations
+
+from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+
+@algorithm(
+    "harmonic-circle",
+    title="Harmonic",
+    target="disk",
+    source="Eq. (10) with a prescribed boundary; Floater & Hormann 2005, Sec. 3",
+)
+def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
+    """What does one Dirichlet solve give when the boundary keeps its arc length?
+
+    The cheapest map to the disk and the yardstick for all others: nothing adapts the boundary, so
+    it is conformal only where the arc lengths happen to be right. `delaunay` takes the weights of
+    the intrinsic Delaunay triangulation.
+    """
+    L = laplacian(mesh, delaunay=delaunay)
+    return Parameterization(harmonic_extension(L, mesh.boundary, arc_length_circle(mesh)))

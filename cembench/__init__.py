@@ -1,0 +1,25 @@
+"""cembench: benchmarking and reproducibility suite for conformal surface parameterization."""
+
+from importlib.metadata import version
+
+from cembench.errors import AlgorithmFailed, CembenchError, MeshError, ParameterError, RegistryError
+from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm, surface
+
+__version__ = version("cembench")
+
+__all__ = [
+    "AlgorithmFailed",
+    "CembenchError",
+    "DiskMesh",
+    "HoledMesh",
+    "MeshError",
+    "ParameterError",
+    "Parameterization",
+    "RegistryError",
+    "TriangleMesh",
+    "__version__",
+    "algorithm",
+    "surface",
+]

@@ -1,0 +1,75 @@
+"""Where does the time go? Phases of a measured call, exclusive of the phases nested in them.
+
+A kernel marks what it does with ``with phase("factorisation"):``. Outside a measurement that costs
+a dictionary look-up and nothing is kept; inside :func:`measure` the seconds of all phases, with the
+remainder under ``"other"``, add up to the total.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from time import perf_counter
+from typing import TypeVar
+
+T = TypeVar("T")
+
+#: Name under which time is booked that no phase claims.
+OTHER = "other"
+
+
+@dataclass
+class _Ledger:
+    seconds: dict[str, float] = field(default_factory=dict)
+    stack: list[str] = field(default_factory=lambda: [OTHER])
+    since: float = field(default_factory=perf_counter)
+
+    def book(self) -> None:
+        """Credit the time since the last change to the phase on top of the stack."""
+        now = perf_counter()
+        name = self.stack[-1]
+        self.seconds[name] = self.seconds.get(name, 0.0) + now - self.since
+        self.since = now
+
+
+_ledger: ContextVar[_Ledger | None] = ContextVar("cembench_ledger", default=None)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Wall-clock seconds of one call: the total, and by phase (they add up to the total)."""
+
+    total: float
+    phases: dict[str, float]
+
+
+@contextmanager
+def phase(name: str) -> Iterator[None]:
+    """Book the enclosed time under `name`, less what nested phases claim for themselves."""
+    ledger = _ledger.get()
+    if ledger is None:
+        yield
+        return
+    ledger.book()
+    ledger.stack.append(name)
+    try:
+        yield
+    finally:
+        ledger.book()
+        ledger.stack.pop()
+
+
+def measure(call: Callable[[], T]) -> tuple[T, Timing]:
+    """Call once: what does it return, and how long does each of its phases take?"""
+    ledger = _Ledger()
+    token = _ledger.set(ledger)
+    try:
+        ledger.since = perf_counter()
+        result = call()
+        ledger.book()
+    finally:
+        _ledger.reset(token)
+    phases = dict(sorted(ledger.seconds.items(), key=lambda item: -item[1]))
+    return result, Timing(total=sum(phases.values()), phases=phases)

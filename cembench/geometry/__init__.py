@@ -1,0 +1,1 @@
+"""Meshes, their files, and the linear algebra that all algorithms share."""

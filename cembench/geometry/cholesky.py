@@ -1,0 +1,160 @@
+"""The one sparse Cholesky class that all algorithms use, so that none wins by a better solver.
+
+Which library factors, and whether a factor is kept, is decided by whoever measures, through
+:func:`linear_algebra`, and cannot be seen by the algorithm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any, Literal, Protocol, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.clock import phase
+from cembench.errors import ParameterError
+
+Solves = Literal["reuse", "backslash"]
+Backend = Literal["cvxopt", "superlu", "pardiso"]
+
+
+@dataclass(frozen=True)
+class LinearAlgebra:
+    """How linear systems are solved.
+
+    solves : "reuse" keeps a factor while its matrix stands; "backslash" factors anew at every
+        solve, as the paper's MATLAB did.
+    backend : the library that factors.
+    """
+
+    solves: Solves = "reuse"
+    backend: Backend = "cvxopt"
+
+
+_DEFAULT = LinearAlgebra()
+_current: ContextVar[LinearAlgebra] = ContextVar("cembench_linear_algebra", default=_DEFAULT)
+
+
+@contextmanager
+def linear_algebra(solves: str = "reuse", backend: str = "cvxopt") -> Iterator[LinearAlgebra]:
+    """Let everything enclosed solve its systems this way.
+
+    Raises
+    ------
+    ParameterError
+        An unknown policy or backend, or one whose library is not installed.
+
+    """
+    if solves not in get_args(Solves):
+        raise ParameterError(f"solves={solves!r} is unknown; allowed: {_names(Solves)}.")
+    if backend not in get_args(Backend):
+        raise ParameterError(f"backend={backend!r} is unknown; allowed: {_names(Backend)}.")
+    if backend not in available_backends():
+        raise ParameterError(
+            f"backend={backend!r} is not installed; install it with "
+            f"`pip install 'cembench[{backend}]'`, or use one of: "
+            f"{', '.join(available_backends())}."
+        )
+    choice = LinearAlgebra(solves, backend)  # type: ignore[arg-type]  # checked above
+    token = _current.set(choice)
+    try:
+        yield choice
+    finally:
+        _current.reset(token)
+
+
+def available_backends() -> list[str]:
+    """Which backends can be used on this machine?"""
+    module = {"cvxopt": "cvxopt", "superlu": "scipy", "pardiso": "pypardiso"}
+    return [name for name in get_args(Backend) if find_spec(module[name])]
+
+
+def _names(kind: Any) -> str:
+    return ", ".join(repr(name) for name in get_args(kind))
+
+
+class _Factor(Protocol):
+    def update(self, A: sparse.csc_array) -> None: ...
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
+
+
+class Cholesky:
+    """Solves systems with a sparse symmetric positive definite matrix.
+
+    Parameters
+    ----------
+    A : sparse (n, n)
+        Symmetric positive definite, both triangles stored.
+    leading : int, optional
+        Also solve with the block ``A[:leading, :leading]``; under "reuse" from the same factor.
+
+    Raises
+    ------
+    NotPositiveDefinite
+        At construction or, under "backslash", at the first solve.
+
+    """
+
+    def __init__(self, A: sparse.sparray, *, leading: int | None = None) -> None:
+        self._A = sparse.csc_array(A)
+        self._leading = leading
+        self._how = _current.get()
+        self._kept: _Factor | None = None
+        if self._how.solves == "reuse":
+            self._kept = _factor(self._how.backend, self._A, leading)
+
+    def update(self, A: sparse.sparray) -> None:
+        """Turn to another matrix with the same pattern; under "reuse" its analysis is kept."""
+        self._A = sparse.csc_array(A)
+        if self._kept is not None:
+            self._kept.update(self._A)
+
+    def solve(self, b: NDArray[Any]) -> NDArray[Any]:
+        """A x = b; b (n,) or (n, k), real or complex; x alike."""
+        factor = self._kept or _factor(self._how.backend, self._A, None)
+        with phase("solves"):
+            return _by_real_columns(factor.solve, b)
+
+    def solve_leading(self, b: NDArray[Any]) -> NDArray[Any]:
+        """A[:leading, :leading] x = b; b (leading,) or (leading, k), real or complex; x alike."""
+        if self._leading is None:
+            raise ValueError("solve_leading needs the order of the leading block at construction")
+        if self._kept is not None:
+            with phase("solves"):
+                return _by_real_columns(self._kept.solve_leading, b)
+        block = sparse.csc_array(self._A[: self._leading, : self._leading])
+        factor = _factor(self._how.backend, block, None)
+        with phase("solves"):
+            return _by_real_columns(factor.solve, b)
+
+
+def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
+    # Imported on demand: an extra may be missing, and starting up should load no solver.
+    if backend == "cvxopt":
+        from cembench.geometry.cholmod import CholmodFactor
+
+        return CholmodFactor(A, leading)
+    if backend == "superlu":
+        from cembench.geometry.superlu import SuperLUFactor
+
+        return SuperLUFactor(A, leading)
+    from cembench.geometry.pardiso import PardisoFactor
+
+    return PardisoFactor(A, leading)
+
+
+def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:
+    """Let a solver for real columns (n, k) take vectors and complex numbers too."""
+    columns = b.reshape(len(b), -1)
+    k = columns.shape[1]
+    if np.iscomplexobj(b):
+        x = solve(np.concatenate([columns.real, columns.imag], axis=1))
+        return (x[:, :k] + 1j * x[:, k:]).reshape(b.shape)
+    return np.asarray(solve(columns.astype(np.float64, copy=False))).reshape(b.shape)

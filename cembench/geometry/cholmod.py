@@ -1,0 +1,101 @@
+"""Sparse Cholesky by cvxopt's CHOLMOD: the default, the fastest that installs as a wheel.
+
+cvxopt keeps its options in one dictionary for the process, so they are set before each use:
+``supernodal = 2`` (which also makes an indefinite matrix an error) and ``nmethods = 1`` (without it
+a permutation handed over may be ignored).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from cvxopt import amd, cholmod, matrix, spmatrix
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.clock import phase
+from cembench.errors import NotPositiveDefinite
+
+# Codes of `cholmod.solve`: the whole system, and its four steps.
+_ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
+
+
+class CholmodFactor:
+    """A factor of the symmetric positive definite matrix A, only whose lower triangle is read.
+
+    `leading` is the order of the leading block to keep first: its own factor is then the leading
+    block of this one, which is what :meth:`solve_leading` uses.
+    """
+
+    def __init__(self, A: sparse.csc_array, leading: int | None) -> None:
+        self._leading = leading
+        with phase("ordering"):
+            self._lower = _lower_triangle(A)
+            self._permutation = _fill_reducing_order(A, self._lower, leading)
+        self._analyse()
+        self._factor()
+
+    def _analyse(self) -> None:
+        with phase("symbolic"):
+            _set_options()
+            self._symbolic = cholmod.symbolic(self._lower, self._permutation)
+
+    def _factor(self) -> None:
+        with phase("factorisation"):
+            _set_options()
+            try:
+                cholmod.numeric(self._lower, self._symbolic)
+            except ArithmeticError as error:
+                raise NotPositiveDefinite(
+                    f"the matrix of order {self._lower.size[0]} is not positive definite "
+                    f"(Cholesky pivot {error})"
+                ) from None
+
+    def update(self, A: sparse.csc_array) -> None:
+        """Factor another matrix of the same pattern, keeping ordering and symbolic analysis."""
+        with phase("factorisation"):
+            self._lower = _lower_triangle(A)
+        if self._leading is not None:
+            # Partial solves are wrong on a factor that was computed over an older one.
+            self._analyse()
+        self._factor()
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A x = B for real columns B (n, k)."""
+        x = matrix(np.asfortranarray(B))
+        cholmod.solve(self._symbolic, x, sys=_ALL)
+        return np.array(x)
+
+    def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A_ii x = B for the leading block, out of the one factor; B (leading, k)."""
+        assert self._leading is not None
+        padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
+        padded[: self._leading] = B
+        x = matrix(padded)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE)
+        cholmod.solve(self._symbolic, x, sys=_FORWARD)
+        x[self._leading :, :] = 0.0
+        cholmod.solve(self._symbolic, x, sys=_BACKWARD)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
+        return np.array(x)[: self._leading]
+
+
+def _set_options() -> None:
+    cholmod.options["supernodal"] = 2
+    cholmod.options["nmethods"] = 1
+    cholmod.options["print"] = 0
+
+
+def _lower_triangle(A: sparse.csc_array) -> spmatrix:
+    lower = sparse.tril(A, format="coo")
+    return spmatrix(
+        lower.data, lower.row.astype(np.int64), lower.col.astype(np.int64), lower.shape, "d"
+    )
+
+
+def _fill_reducing_order(A: sparse.csc_array, lower: spmatrix, leading: int | None) -> matrix:
+    """Approximate minimum degree; of the leading block alone where there is one."""
+    if leading is None:
+        return amd.order(lower)
+    first = amd.order(_lower_triangle(A[:leading, :leading])) if leading else matrix(0, (0, 1))
+    last = np.arange(leading, A.shape[0])
+    return matrix(np.concatenate([np.array(first).ravel(), last]), (A.shape[0], 1), "i")

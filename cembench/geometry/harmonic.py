@@ -1,0 +1,40 @@
+"""Harmonic maps with a prescribed boundary (Eq. 10)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.mesh import DiskMesh
+
+
+def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
+    """Where on the unit circle does each boundary vertex go, in proportion to edge length?
+
+    Shape (k,), in the order of ``mesh.boundary``, counter-clockwise, the first vertex at 1.
+    """
+    loop = mesh.V[mesh.boundary]
+    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    travelled = np.concatenate([[0.0], np.cumsum(lengths)])
+    return np.exp(2j * np.pi * travelled[:-1] / travelled[-1])
+
+
+def harmonic_extension(
+    L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[np.complex128]
+) -> NDArray[np.complex128]:
+    """Which map is harmonic for L and takes these values at the fixed vertices (Eq. 10)?
+
+    L (n, n) positive semi-definite, `fixed` (k,) indices, `values` (k,); the result is (n,).
+    """
+    n = L.shape[0]
+    f = np.zeros(n, dtype=np.complex128)
+    f[fixed] = values
+    free = np.ones(n, dtype=bool)
+    free[fixed] = False
+    i = np.flatnonzero(free)
+    if len(i):
+        rows = sparse.csr_array(L)[i]
+        f[i] = Cholesky(rows[:, i]).solve(-(rows[:, fixed] @ f[fixed]))
+    return f

@@ -1,0 +1,102 @@
+"""How good is a map? Figures computed from the mesh and the map alone, never by the algorithm.
+
+Angles are in degrees. Energies and areas are in the units of the map squared: for a unit disk they
+are comparable between surfaces, for a free boundary only after scaling the image.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.geometry.beltrami import beltrami_coefficients, dilatations_of
+from cembench.geometry.laplacian import half_cotangents
+from cembench.geometry.mesh import TriangleMesh
+from cembench.geometry.planar import fitted_circle, polygon_area, signed_areas
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def dirichlet_energy(mesh: TriangleMesh, uv: Complex) -> float:
+    """E_D (Eq. 5): half the sum over edges of cotangent weight times squared image length."""
+    F = mesh.F
+    weights = half_cotangents(mesh.V, F)
+    squared = np.stack(
+        [np.abs(uv[F[:, (c + 1) % 3]] - uv[F[:, (c + 2) % 3]]) ** 2 for c in range(3)]
+    )
+    return 0.5 * float((weights.T * squared).sum())
+
+
+def image_area(mesh: TriangleMesh, uv: Complex) -> float:
+    """A (Eq. 8): what the boundary polygons enclose, holes subtracted; not pi for a disk."""
+    return sum(polygon_area(uv[loop]) for loop in mesh.loops)
+
+
+def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
+    """What are the triangles' angles? Degrees, shape (m, 3), unsigned.
+
+    `points` is (n, 3) in space or complex (n,) in the plane. A triangle whose image is a point
+    has angles of zero.
+    """
+    if np.iscomplexobj(points):
+        points = np.stack([points.real, points.imag], axis=1)
+    p = [points[F[:, c]] for c in range(3)]
+    angles = np.empty(F.shape)
+    for c in range(3):
+        u, v = p[(c + 1) % 3] - p[c], p[(c + 2) % 3] - p[c]
+        if u.shape[1] == 2:
+            sine = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        else:
+            sine = np.linalg.norm(np.cross(u, v), axis=1)
+        angles[:, c] = np.arctan2(sine, np.einsum("td,td->t", u, v))
+    return np.rad2deg(angles)
+
+
+def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:
+    """By how many degrees does each corner's angle change (Table 4)? Absolute, shape (m, 3)."""
+    return np.abs(corner_angles(mesh.V, mesh.F) - corner_angles(uv, mesh.F))
+
+
+def flipped_triangles(mesh: TriangleMesh, uv: Complex) -> int:
+    """How many triangles are folded over or collapsed: image area not positive?"""
+    return int(np.count_nonzero(~(signed_areas(uv, mesh.F) > 0)))
+
+
+def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:
+    """How far from a similarity is each triangle: largest over smallest stretch, 1 when conformal?
+
+    Shape (m,); infinite for a triangle that collapsed to a segment or a point.
+    """
+    return dilatations_of(beltrami_coefficients(uv, mesh.F, mesh.V))
+
+
+def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
+    """How far from circles are the boundary images: the largest ``| |z - c| - r | / r``?
+
+    Centre and radius are fitted to each loop; infinite where a loop determines no circle.
+    """
+    worst = 0.0
+    for loop in mesh.loops:
+        centre, radius = fitted_circle(uv[loop])
+        off = float(np.abs(np.abs(uv[loop] - centre) - radius).max() / radius)
+        worst = max(worst, off if np.isfinite(off) else np.inf)
+    return worst
+
+
+def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
+    """Every figure that a record holds, under the record's keys."""
+    energy, area = dirichlet_energy(mesh, uv), image_area(mesh, uv)
+    errors = angle_errors(mesh, uv)
+    stretch = dilatations(mesh, uv)
+    return {
+        "dirichlet_energy": energy,
+        "image_area": area,
+        "conformal_energy": energy - area,
+        "angle_error_mean_deg": float(errors.mean()),
+        "angle_error_sd_deg": float(errors.std()),
+        "flipped_triangles": flipped_triangles(mesh, uv),
+        "dilatation_mean": float(stretch.mean()),
+        "dilatation_max": float(stretch.max()),
+        "boundary_circularity": boundary_circularity(mesh, uv),
+    }

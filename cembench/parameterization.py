@@ -1,0 +1,33 @@
+"""What an algorithm returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Parameterization:
+    """A piecewise linear map from a surface to the complex plane.
+
+    Parameters
+    ----------
+    uv : complex128 (n,)
+        Image of each vertex. Triangles that are counter-clockwise on the surface are
+        counter-clockwise in the plane.
+    iterations : int
+        Iterations that were run; 0 for a direct method.
+    energy_history : tuple of float
+        E_C (Eq. 7) of the start and after each iteration; empty for a direct method.
+    extras : dict
+        Whatever else the algorithm has to tell; values that JSON can hold.
+
+    """
+
+    uv: NDArray[np.complex128]
+    iterations: int = 0
+    energy_history: tuple[float, ...] = ()
+    extras: dict[str, Any] = field(default_factory=dict)

@@ -1,0 +1,355 @@
+"""Which algorithms and surfaces are there, and what do they promise?
+
+A decorator only marks a function with its :class:`Algorithm` or :class:`Surface`; nothing happens
+at import. A :class:`Registry` is then collected from entry points (``cembench.algorithms``,
+``cembench.surfaces``: the built-in ones are found no differently from anybody's) and from plug-ins
+named by the user, a file or ``module:name``.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import inspect
+import sys
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal, TypeVar, get_args
+
+from pydantic import TypeAdapter, ValidationError
+
+from cembench.errors import ParameterError, RegistryError
+from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
+
+#: What an algorithm maps to; tables never mix these without saying so.
+Target = Literal["disk", "free boundary", "circular holes"]
+
+_MARK = "__cembench__"
+C = TypeVar("C", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A keyword argument of a registered function: name, type with its range, default."""
+
+    name: str
+    annotation: Any
+    default: Any
+
+    def parse(self, value: Any, owner: str) -> Any:
+        """Read a value, also from text as ``-p NAME=VALUE`` gives it.
+
+        Raises
+        ------
+        ParameterError
+            A value of the wrong type or outside the declared range.
+
+        """
+        try:
+            return TypeAdapter(self.annotation).validate_python(value)
+        except ValidationError as error:
+            reason = error.errors()[0]["msg"]
+            raise ParameterError(
+                f"{owner}: {self.name}={value!r} is not allowed: {reason} "
+                f"(default {self.default!r})."
+            ) from None
+
+
+@dataclass(frozen=True)
+class _Registered:
+    name: str
+    title: str
+    function: Callable[..., Any]
+    parameters: tuple[Parameter, ...]
+    origin: str
+    notes: str
+
+    def arguments(self, given: Mapping[str, Any]) -> dict[str, Any]:
+        """All keyword arguments of a call: the given ones checked, the others at their defaults.
+
+        Raises
+        ------
+        ParameterError
+            An unknown name, or a value that :meth:`Parameter.parse` refuses.
+
+        """
+        known = {p.name: p for p in self.parameters}
+        for name in given:
+            if name not in known:
+                allowed = ", ".join(known) or "none"
+                raise ParameterError(
+                    f"{self.name} has no parameter {name!r}; its parameters are: {allowed}."
+                )
+        return {
+            name: p.parse(given[name], self.name) if name in given else p.default
+            for name, p in known.items()
+        }
+
+
+@dataclass(frozen=True)
+class Algorithm(_Registered):
+    """An algorithm and what it promises: see :func:`algorithm`."""
+
+    target: Target = "disk"
+    mesh_type: type[TriangleMesh] = DiskMesh
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Surface(_Registered):
+    """A surface family: see :func:`surface`."""
+
+    source: str = ""
+
+
+def algorithm(
+    name: str, *, title: str, target: Target, source: str = "", notes: str = ""
+) -> Callable[[C], C]:
+    """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
+
+    Parameters
+    ----------
+    name : str
+        What the command line calls it.
+    title : str
+        What a table's heading calls it.
+    target : "disk", "free boundary" or "circular holes"
+        The class of its image.
+    source : str
+        Where it was published.
+    notes : str
+        What it is faithful to, and what it had to decide; default: the docstring's second part.
+
+    The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
+    Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
+    range.
+
+    Raises
+    ------
+    RegistryError
+        A declaration that cannot be right: unknown target, missing types or defaults.
+
+    """
+    if target not in get_args(Target):
+        raise RegistryError(
+            f"algorithm {name!r}: target {target!r} is unknown; "
+            f"allowed: {', '.join(map(repr, get_args(Target)))}."
+        )
+
+    def mark(function: C) -> C:
+        hints, parameters = _signature(name, function)
+        first = next(iter(inspect.signature(function).parameters), None)
+        mesh_type = hints.get(first or "", None)
+        if mesh_type not in (TriangleMesh, DiskMesh, HoledMesh):
+            raise RegistryError(
+                f"algorithm {name!r}: its first argument must be annotated as DiskMesh, HoledMesh "
+                f"or TriangleMesh, the surfaces it takes; got {mesh_type!r}."
+            )
+        spec = Algorithm(
+            name=name,
+            title=title,
+            function=function,
+            parameters=parameters,
+            origin=_origin(function),
+            notes=notes or _notes(function),
+            target=target,
+            mesh_type=mesh_type,
+            source=source,
+        )
+        setattr(function, _MARK, spec)
+        return function
+
+    return mark
+
+
+def surface(name: str, *, title: str, source: str = "", notes: str = "") -> Callable[[C], C]:
+    """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
+
+    `faces` is the number of triangles asked for; it has a default.
+
+    Raises
+    ------
+    RegistryError
+        Missing types or defaults.
+
+    """
+
+    def mark(function: C) -> C:
+        _, parameters = _signature(name, function, positional="faces")
+        spec = Surface(
+            name, title, function, parameters, _origin(function), notes or _notes(function), source
+        )
+        setattr(function, _MARK, spec)
+        return function
+
+    return mark
+
+
+def _signature(
+    name: str, function: Callable[..., Any], positional: str | None = None
+) -> tuple[dict[str, Any], tuple[Parameter, ...]]:
+    hints = typing.get_type_hints(function, include_extras=True)
+    parameters = []
+    for p in inspect.signature(function).parameters.values():
+        if p.kind is not p.KEYWORD_ONLY and p.name != positional:
+            continue
+        if p.name not in hints or p.default is p.empty:
+            raise RegistryError(
+                f"{name!r}: parameter {p.name!r} needs a type annotation and a default value."
+            )
+        parameters.append(Parameter(p.name, hints[p.name], p.default))
+    return hints, tuple(parameters)
+
+
+def _origin(function: Callable[..., Any]) -> str:
+    return f"{function.__module__}:{function.__qualname__}"
+
+
+def _notes(function: Callable[..., Any]) -> str:
+    """Everything in the docstring after its first line."""
+    return inspect.cleandoc(function.__doc__ or "").partition("\n")[2].strip()
+
+
+@dataclass(frozen=True)
+class Registry:
+    """The algorithms and surfaces that can be named."""
+
+    algorithms: Mapping[str, Algorithm] = field(default_factory=dict)
+    surfaces: Mapping[str, Surface] = field(default_factory=dict)
+
+    def algorithm(self, name: str) -> Algorithm:
+        """The algorithm of this name; :class:`RegistryError` lists the known ones."""
+        return _look_up("algorithm", self.algorithms, name)
+
+    def surface(self, name: str) -> Surface:
+        """The surface of this name; :class:`RegistryError` lists the known ones."""
+        return _look_up("surface", self.surfaces, name)
+
+
+R = TypeVar("R", bound=_Registered)
+
+
+def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
+    if name not in known:
+        raise RegistryError(
+            f"unknown {kind} {name!r}; known: {', '.join(sorted(known)) or 'none'}."
+        )
+    return known[name]
+
+
+def load_registry(plugins: Iterable[str] = ()) -> Registry:
+    """Collect the installed algorithms and surfaces, and those of the user's plug-ins.
+
+    Parameters
+    ----------
+    plugins : iterable of str
+        Each the path of a Python file, or ``module:name``.
+
+    Raises
+    ------
+    RegistryError
+        A name declared twice, a plug-in that cannot be imported or that declares nothing.
+
+    """
+    installed = _installed()
+    algorithms = dict(installed.algorithms)
+    surfaces = dict(installed.surfaces)
+    for plugin in plugins:
+        for spec in _declared_by(plugin):
+            _add(algorithms if isinstance(spec, Algorithm) else surfaces, spec)
+    return Registry(algorithms, surfaces)
+
+
+@lru_cache(maxsize=1)
+def _installed() -> Registry:
+    algorithms: dict[str, Algorithm] = {}
+    surfaces: dict[str, Surface] = {}
+    for group, known, kind in (
+        ("cembench.algorithms", algorithms, Algorithm),
+        ("cembench.surfaces", surfaces, Surface),
+    ):
+        for entry in sorted(entry_points(group=group), key=lambda entry: entry.name):
+            spec = getattr(_load_entry(entry), _MARK, None)
+            if not isinstance(spec, kind) or spec.name != entry.name:
+                raise RegistryError(
+                    f"entry point {entry.name} = {entry.value!r} of group {group!r} is no "
+                    f"{kind.__name__.lower()} of that name; decorate it with "
+                    f"@{kind.__name__.lower()}({entry.name!r}, ...)."
+                )
+            _add(known, spec)
+    return Registry(algorithms, surfaces)
+
+
+def _load_entry(entry: Any) -> Any:
+    try:
+        return entry.load()
+    except Exception as error:
+        raise RegistryError(
+            f"entry point {entry.name} = {entry.value!r} cannot be loaded: "
+            f"{type(error).__name__}: {error}. Repair or uninstall the package that declares it."
+        ) from error
+
+
+def _add(known: dict[str, Any], spec: _Registered) -> None:
+    if spec.name in known:
+        raise RegistryError(
+            f"the name {spec.name!r} is declared twice: by {known[spec.name].origin} and by "
+            f"{spec.origin}. Rename one of them."
+        )
+    known[spec.name] = spec
+
+
+def _declared_by(plugin: str) -> list[_Registered]:
+    """What a file declares, or a single ``module:name``."""
+    location, _, name = plugin.partition(":")
+    path = Path(plugin)
+    if path.suffix == ".py":
+        module = _import_file(path)
+        specs = [vars(module)[key] for key in vars(module)]
+    elif name and not Path(location).suffix:
+        module = _import_module(location, plugin)
+        if not hasattr(module, name):
+            raise RegistryError(f"plug-in {plugin!r}: module {location!r} has no {name!r}.")
+        specs = [getattr(module, name)]
+    else:
+        raise RegistryError(f"plug-in {plugin!r} is neither a Python file (*.py) nor module:name.")
+    # Only what is declared there, not what it imports from elsewhere.
+    found = [getattr(value, _MARK) for value in specs if hasattr(value, _MARK)]
+    found = [spec for spec in found if name or spec.function.__module__ == module.__name__]
+    if not found:
+        raise RegistryError(
+            f"plug-in {plugin!r} declares nothing; decorate a function with @algorithm(...) or "
+            "@surface(...) from cembench."
+        )
+    return found
+
+
+def _import_file(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise RegistryError(f"plug-in {str(path)!r}: there is no such file.")
+    name = f"cembench_plugin_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module  # so that its functions can look up their own annotations
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise RegistryError(
+            f"plug-in {str(path)!r} cannot be imported: {type(error).__name__}: {error}"
+        ) from error
+    return module
+
+
+def _import_module(module: str, plugin: str) -> ModuleType:
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise RegistryError(f"plug-in {plugin!r} cannot be imported: {error}") from error

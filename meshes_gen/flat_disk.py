@@ -1,0 +1,27 @@
+"""The flat unit disk, optionally stretched: every conformal map of it is known."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from cembench.geometry.mesh import DiskMesh
+from cembench.registry import surface
+from meshes_gen.disk_grid import disk_grid
+
+
+@surface("flat-disk", title="Flat disk", source="closed form")
+def flat_disk(
+    faces: Annotated[int, Field(ge=24)] = 5_000,
+    *,
+    stretch: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
+) -> DiskMesh:
+    """The unit disk in the plane z = 0, stretched along x into an ellipse.
+
+    With ``stretch=1`` the conformal maps to the disk are the Moebius maps of the disk itself.
+    """
+    z, F = disk_grid(faces)
+    V = np.stack([stretch * z.real, z.imag, np.zeros(len(z))], axis=1)
+    return DiskMesh.from_arrays(V, F, name="flat-disk")

@@ -1,0 +1,37 @@
+"""A spherical cap: stereographic projection maps it conformally onto a round disk."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.geometry.mesh import DiskMesh
+from cembench.registry import surface
+from meshes_gen.disk_grid import disk_grid
+
+
+@surface("spherical-cap", title="Spherical cap", source="closed form")
+def spherical_cap(
+    faces: Annotated[int, Field(ge=24)] = 20_000,
+    *,
+    angle: Annotated[float, Field(gt=0, lt=180)] = 90.0,
+) -> DiskMesh:
+    """The part of the unit sphere within `angle` degrees of the north pole; 90 is a hemisphere.
+
+    Its exact conformal map to the unit disk is :func:`exact_map`, up to a Moebius map of the disk.
+    """
+    z, F = disk_grid(faces)
+    polar = np.abs(z) * np.deg2rad(angle)
+    direction = np.divide(z, np.abs(z), out=np.ones_like(z), where=z != 0)
+    V = np.stack(
+        [np.sin(polar) * direction.real, np.sin(polar) * direction.imag, np.cos(polar)], axis=1
+    )
+    return DiskMesh.from_arrays(V, F, name="spherical-cap")
+
+
+def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:
+    """The cap's conformal map to the unit disk: stereographic projection from the south pole."""
+    return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(angle) / 2)
