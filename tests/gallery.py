@@ -1,0 +1,79 @@
+"""Small surfaces, good and bad, that many tests use."""
+
+import numpy as np
+
+
+def obj_text(V, F):
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(V, float).tolist()]
+    lines += ["f " + " ".join(str(k + 1) for k in face) for face in np.asarray(F).tolist()]
+    return "\n".join(lines) + "\n"
+
+
+def grid(rows=4, columns=5, *, wrap_rows=False, wrap_columns=False, twist=False):
+    """A rectangle of 2 rows columns triangles; wrapped it is a tube or a torus, twisted a Moebius
+    strip."""
+    r, c = np.meshgrid(np.arange(rows), np.arange(columns), indexing="ij")
+    last_row = rows if wrap_rows else rows + 1
+    last_column = columns if wrap_columns else columns + 1
+
+    def at(i, j):
+        turned = (j == columns) & twist
+        i = np.where(turned, rows - i, i)
+        return (i % last_row) * last_column + j % last_column
+
+    a, b = at(r, c).ravel(), at(r, c + 1).ravel()
+    d, e = at(r + 1, c).ravel(), at(r + 1, c + 1).ravel()
+    F = np.concatenate([np.stack([a, b, e], 1), np.stack([a, e, d], 1)])
+    i, j = np.divmod(np.arange(last_row * last_column), last_column)
+    return i, j, F
+
+
+def flat_rectangle(rows=4, columns=5):
+    i, j, F = grid(rows, columns)
+    return np.stack([j, i, 0 * i], 1).astype(float), F
+
+
+def tube():
+    i, j, F = grid(4, 8, wrap_columns=True)
+    angle = 2 * np.pi * j / 8
+    return np.stack([np.cos(angle), np.sin(angle), i], 1).astype(float), F
+
+
+def torus():
+    i, j, F = grid(8, 12, wrap_rows=True, wrap_columns=True)
+    u, v = 2 * np.pi * i / 8, 2 * np.pi * j / 12
+    rho = 3 + np.cos(u)
+    return np.stack([rho * np.cos(v), rho * np.sin(v), np.sin(u)], 1), F
+
+
+def punctured_torus():
+    V, F = torus()
+    return V, F[1:]
+
+
+def moebius_strip():
+    i, j, F = grid(2, 15, wrap_columns=True, twist=True)
+    v = 2 * np.pi * j / 15
+    rho = 3 + (i - 1) * np.cos(v / 2)
+    return np.stack([rho * np.cos(v), rho * np.sin(v), (i - 1) * np.sin(v / 2)], 1), F
+
+
+def tetrahedron():
+    V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
+    return V, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+
+
+def bow_tie():
+    """Two triangles that touch in one vertex."""
+    V = np.array([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], float)
+    return V, np.array([[0, 2, 1], [0, 3, 4]])
+
+
+def three_triangles_on_an_edge():
+    V = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, -1, 0]], float)
+    return V, np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
+
+
+def two_pieces():
+    V, F = flat_rectangle()
+    return np.concatenate([V, V + 100]), np.concatenate([F, F + len(V)])
