@@ -1,0 +1,1 @@
+"""From a plan of cells to records: each cell is measured in a process of its own."""

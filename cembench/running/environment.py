@@ -1,0 +1,88 @@
+"""On what machine, with what libraries and limits, was something measured?"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+#: Variables that set the number of threads; they must be set before a numerical library loads.
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "IGL_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+_LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pypardiso", "pydantic", "meshio", "trimesh")
+
+
+def with_threads(count: int) -> dict[str, str]:
+    """The environment of a process whose numerical libraries use this many threads."""
+    return os.environ | dict.fromkeys(THREAD_VARIABLES, str(count))
+
+
+def describe_environment() -> dict[str, Any]:
+    """Everything that a figure may depend on; values that JSON can hold, "id" hashing the rest."""
+    import psutil
+    from threadpoolctl import threadpool_info
+
+    about: dict[str, Any] = {
+        "cembench": version("cembench"),
+        "git": _git_state(),
+        "python": platform.python_version(),
+        "platform": platform.platform(),
+        "cpu": _cpu_model(),
+        "cores": psutil.cpu_count(logical=False),
+        "hardware_threads": psutil.cpu_count(),
+        "memory_bytes": psutil.virtual_memory().total,
+        "libraries": {name: _version(name) for name in _LIBRARIES},
+        "blas": sorted(
+            f"{pool['internal_api']} {pool.get('version') or '?'} "
+            f"({pool.get('architecture', 'unknown')})"
+            for pool in threadpool_info()
+            if pool["user_api"] == "blas"
+        ),
+    }
+    content = json.dumps(about, sort_keys=True).encode()
+    return about | {"id": hashlib.sha256(content).hexdigest()[:12]}
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def _cpu_model() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        for line in info.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _git_state() -> dict[str, Any] | None:
+    """Commit and dirtiness of the checkout that cembench runs from; None for an installed one."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists():
+        return None
+    try:
+        commit = _git(root, "rev-parse", "HEAD")
+        return {"commit": commit, "dirty": bool(_git(root, "status", "--porcelain"))}
+    except (OSError, subprocess.CalledProcessError):
+        return None
+
+
+def _git(root: Path, *arguments: str) -> str:
+    run = subprocess.run(
+        ["git", "-C", str(root), *arguments], capture_output=True, text=True, check=True
+    )
+    return run.stdout.strip()

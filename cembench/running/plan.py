@@ -1,0 +1,152 @@
+"""Which cells are to be measured?"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cembench.errors import MeshError, ParameterError
+from cembench.geometry.files import read_mesh
+from cembench.geometry.laplacian import non_delaunay_share
+from cembench.geometry.mesh import TriangleMesh
+from cembench.records import Cell, MeshFacts
+from cembench.registry import Algorithm, Registry
+
+
+@dataclass(frozen=True)
+class Task:
+    """A cell with all that its measurement needs."""
+
+    cell: Cell
+    algorithm: Algorithm
+    mesh: TriangleMesh
+    facts: MeshFacts
+    plugins: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class How:
+    """What a plan's cells have in common."""
+
+    solves: str = "reuse"
+    backend: str = "cvxopt"
+    threads: int = 1
+    repeats: int = 3
+
+
+def plan_cells(
+    algorithms: Sequence[Algorithm],
+    meshes: Sequence[TriangleMesh],
+    parameters: Mapping[str, Any],
+    how: How,
+    plugins: Sequence[str] = (),
+) -> list[Task]:
+    """Every algorithm on every surface that it takes, surfaces outermost.
+
+    In `parameters`, the key ``name`` goes to every algorithm that has such a parameter and
+    ``algorithm.name`` to that one alone.
+
+    Raises
+    ------
+    ParameterError
+        A parameter that none of the algorithms has, or a value that one refuses.
+    MeshError
+        Two surfaces of one name, or one that no algorithm takes.
+
+    """
+    names = [mesh.name for mesh in meshes]
+    for name in names:
+        if names.count(name) > 1:
+            raise MeshError(f"two surfaces are called {name!r}; rename one of the files.")
+    arguments = distribute_parameters(algorithms, parameters)
+    tasks = []
+    for mesh in meshes:
+        takers = [a for a in algorithms if isinstance(mesh, a.mesh_type)]
+        if not takers:
+            chosen = ", ".join(f"{a.name} ({a.mesh_type.__name__})" for a in algorithms)
+            raise MeshError(
+                f"{mesh.name} is a {type(mesh).__name__}, which none of the chosen algorithms "
+                f"takes: {chosen}."
+            )
+        facts = mesh_facts(mesh)
+        for taker in takers:
+            cell = Cell(
+                algorithm=taker.name,
+                parameters=arguments[taker.name],
+                code_hash=_code_hash(taker),
+                mesh=mesh.name,
+                mesh_hash=mesh.hash,
+                solves=how.solves,
+                backend=how.backend,
+                threads=how.threads,
+                repeats=how.repeats,
+            )
+            tasks.append(Task(cell, taker, mesh, facts, tuple(plugins)))
+    return tasks
+
+
+def distribute_parameters(
+    algorithms: Sequence[Algorithm], given: Mapping[str, Any]
+) -> dict[str, dict[str, Any]]:
+    """Which keyword arguments does each algorithm get, by its name? See :func:`plan_cells`."""
+    chosen: dict[str, dict[str, Any]] = {a.name: {} for a in algorithms}
+    for key, value in given.items():
+        only, _, name = key.rpartition(".")
+        takers = [
+            a
+            for a in algorithms
+            if (not only or a.name == only) and name in {p.name for p in a.parameters}
+        ]
+        if not takers:
+            known = "; ".join(
+                f"{a.name}: {', '.join(p.name for p in a.parameters) or 'none'}" for a in algorithms
+            )
+            raise ParameterError(f"no chosen algorithm has a parameter {key!r}; known: {known}.")
+        for a in takers:
+            chosen[a.name][name] = value
+    return {a.name: a.arguments(chosen[a.name]) for a in algorithms}
+
+
+def mesh_facts(mesh: TriangleMesh) -> MeshFacts:
+    """What does a table say of this surface?"""
+    return MeshFacts(
+        vertices=mesh.n,
+        faces=mesh.m,
+        boundary_vertices=sum(len(loop) for loop in mesh.loops),
+        non_delaunay_share=non_delaunay_share(mesh),
+        notices=mesh.notices,
+    )
+
+
+def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
+    """Read a file as the kind of surface that the algorithms take; the first kind's error counts.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or is of no kind that any of the algorithms takes.
+
+    """
+    kinds = list(dict.fromkeys(a.mesh_type for a in algorithms))
+    for kind in kinds[1:]:
+        try:
+            return read_mesh(path, kind)
+        except MeshError:
+            continue
+    return read_mesh(path, kinds[0])
+
+
+def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:
+    """Generate a registered surface, at its own size unless `faces` says otherwise."""
+    family = registry.surface(name)
+    given = {} if faces is None else {"faces": faces}
+    mesh: TriangleMesh = family.function(**family.arguments(given))
+    return mesh
+
+
+def _code_hash(algorithm: Algorithm) -> str:
+    source = Path(algorithm.function.__code__.co_filename)
+    return hashlib.sha256(source.read_bytes()).hexdigest()
