@@ -14,7 +14,7 @@ from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import polygon_area
+from cembench.geometry.planar import backward_arcs, polygon_area
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -36,9 +36,12 @@ def cem(
     for (30) with ``inversion=False``. Decided here, where the paper is silent: the start's triangle
     is the one whose barycentre is nearest to the mean vertex; iteration ends after the first one
     that lowers E_C by less than `tolerance`, or after `max_iterations`; a vertex at the origin,
-    which has no inverse, counts as zero in (30). With the vertices ordered interior first, boundary
-    last, and the last one pinned, a single Cholesky factor serves the start, and its leading block
-    all Dirichlet solves. `delaunay` takes the weights of the intrinsic Delaunay triangulation.
+    which has no inverse, counts as zero in (30); where (30) would make boundary vertices change
+    places, which folds the map, that step is (23), and iteration ends where (23) would do so too
+    (``extras["order_kept"]`` counts these steps; 0 on most surfaces). With the vertices ordered
+    interior first, boundary last, and the last one pinned, a single Cholesky factor serves the
+    start, and its leading block all Dirichlet solves. `delaunay` takes the weights of the intrinsic
+    Delaunay triangulation.
     """
     n_i = len(mesh.interior)
     if n_i == 0:
@@ -56,22 +59,34 @@ def cem(
     def dirichlet(f_b: Complex) -> Complex:
         return whole.solve_leading(-(L_ib @ f_b))  # Eq. 22
 
+    def boundary_step(f_i: Complex) -> Complex:
+        with phase("boundary step"):
+            return _on_circle(ring.solve(-(L_bi @ f_i)))  # Eqs. 23, 24, 25
+
     def energy(f_i: Complex, f_b: Complex) -> float:
         # f^* L f needs only the boundary rows, since f is harmonic inside.
-        return 0.5 * float(np.vdot(f_b, L_bb @ f_b + L_bi @ f_i).real) - polygon_area(f_b)
+        with phase("energy"):
+            return 0.5 * float(np.vdot(f_b, L_bb @ f_b + L_bi @ f_i).real) - polygon_area(f_b)
 
     f_b = _on_circle(_start(mesh, whole, order))
     f_i = dirichlet(f_b)
     history = [energy(f_i, f_b)]
+    order_kept = 0
     for _ in range(max_iterations):
-        f_b = _on_circle(ring.solve(-(L_bi @ (_inverted(f_i) if inversion else f_i))))
+        following = boundary_step(_inverted(f_i) if inversion else f_i)
+        if backward_arcs(following) > backward_arcs(f_b):
+            order_kept += 1
+            following = boundary_step(f_i)
+            if backward_arcs(following) > backward_arcs(f_b):
+                break
+        f_b = following
         f_i = dirichlet(f_b)
         history.append(energy(f_i, f_b))
         if history[-2] - history[-1] < tolerance:
             break
     uv = np.empty(mesh.n, dtype=np.complex128)
     uv[order] = np.concatenate([f_i, f_b])
-    return Parameterization(uv, len(history) - 1, tuple(history))
+    return Parameterization(uv, len(history) - 1, tuple(history), {"order_kept": order_kept})
 
 
 def _start(mesh: DiskMesh, whole: Cholesky, order: NDArray[np.int64]) -> Complex:

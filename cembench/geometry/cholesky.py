@@ -6,7 +6,7 @@ Which library factors, and whether a factor is kept, is decided by whoever measu
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -62,6 +62,7 @@ def linear_algebra(solves: str = "reuse", backend: str = "cvxopt") -> Iterator[L
             f"{', '.join(available_backends())}."
         )
     choice = LinearAlgebra(solves, backend)  # type: ignore[arg-type]  # checked above
+    _factor_class(choice.backend)  # loads the library now, not inside what is timed
     token = _current.set(choice)
     try:
         yield choice
@@ -136,18 +137,22 @@ class Cholesky:
 
 
 def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
+    return _factor_class(backend)(A, leading)
+
+
+def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], _Factor]:
     # Imported on demand: an extra may be missing, and starting up should load no solver.
     if backend == "cvxopt":
         from cembench.geometry.cholmod import CholmodFactor
 
-        return CholmodFactor(A, leading)
+        return CholmodFactor
     if backend == "superlu":
         from cembench.geometry.superlu import SuperLUFactor
 
-        return SuperLUFactor(A, leading)
+        return SuperLUFactor
     from cembench.geometry.pardiso import PardisoFactor
 
-    return PardisoFactor(A, leading)
+    return PardisoFactor
 
 
 def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:

@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 import pypardiso
 from numpy.typing import NDArray
+from pypardiso.pardiso_wrapper import PyPardisoError
 from scipy import sparse
 
 from cembench.clock import phase
@@ -54,7 +55,7 @@ class _Factor:
             self._solver = pypardiso.PyPardisoSolver(mtype=_SPD)
             try:
                 self._solver.factorize(self._upper)
-            except pypardiso.PyPardisoError as error:
+            except PyPardisoError as error:
                 raise NotPositiveDefinite(
                     f"the matrix of order {A.shape[0]} is not positive definite ({error})"
                 ) from None

@@ -20,6 +20,11 @@ def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
     return 0.5 * np.imag(np.conj(b - a) * (c - a))
 
 
+def backward_arcs(f_b: Complex) -> int:
+    """How many arcs between consecutive points of a loop do not run counter-clockwise about 0?"""
+    return int(np.count_nonzero(~(np.imag(np.conj(f_b) * np.roll(f_b, -1)) > 0)))
+
+
 def fitted_circle(z: Complex) -> tuple[complex, float]:
     """Which circle lies closest to these points? Centre and radius, algebraic least squares (Kasa).
 

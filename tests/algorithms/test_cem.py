@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+import scipy.sparse.linalg as spla
+
+from algorithms.cem import _inverted, cem
+from cembench import AlgorithmFailed, DiskMesh
+from cembench.geometry.cholesky import available_backends, linear_algebra
+from cembench.geometry.files import read_mesh
+from cembench.geometry.laplacian import laplacian
+from cembench.metrics import all_metrics
+from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from tests import gallery
+from tests.real_meshes import real_mesh
+
+
+def algorithm_1(mesh, iterations, inversion=True):
+    """The paper's lines one by one, each system solved on its own: slow and obvious."""
+    L = laplacian(mesh).tocsr()
+    i, b = mesh.interior, mesh.boundary
+    V = mesh.V
+    middle = np.argmin(np.linalg.norm(V[mesh.F].mean(axis=1) - V.mean(axis=0), axis=1))
+    a_, b_, c_ = mesh.F[middle]
+    p_a, p_b, p_c = V[[a_, b_, c_]]
+    alpha = np.dot(p_c - p_a, p_b - p_a) / np.linalg.norm(p_b - p_a) ** 2
+    height = np.linalg.norm(p_c - (p_a + alpha * (p_b - p_a)))
+    rhs = np.zeros(mesh.n, complex)
+    rhs[a_] = -1 / np.linalg.norm(p_b - p_a) + 1j * (1 - alpha) / height
+    rhs[b_] = 1 / np.linalg.norm(p_b - p_a) + 1j * alpha / height
+    rhs[c_] = -1j / height
+    f = np.zeros(mesh.n, complex)
+    f[1:] = spla.spsolve(L[1:, 1:].tocsc().astype(complex), rhs[1:])  # another vertex pinned
+    f = f.conj()
+
+    def on_circle(z):
+        z = z - z.mean()
+        return z / abs(z)
+
+    f[b] = on_circle(f[b])
+    L_ii, L_bb = L[i][:, i].tocsc().astype(complex), L[b][:, b].tocsc().astype(complex)
+    f[i] = spla.spsolve(L_ii, -(L[i][:, b] @ f[b]))
+    for _ in range(iterations):
+        g = f[i] / abs(f[i]) ** 2 if inversion else f[i]
+        f[b] = on_circle(spla.spsolve(L_bb, -(L[b][:, i] @ g)))
+        f[i] = spla.spsolve(L_ii, -(L[i][:, b] @ f[b]))
+    return f
+
+
+@pytest.mark.parametrize("inversion", [True, False])
+@pytest.mark.parametrize("iterations", [0, 1, 6])
+@pytest.mark.parametrize("solves", ["reuse", "backslash"])
+def test_one_factorisation_gives_what_the_paper_s_lines_give(inversion, iterations, solves):
+    mesh = hemi_ellipsoid(1500)
+    with linear_algebra(solves):
+        found = cem(mesh, tolerance=0, max_iterations=iterations, inversion=inversion)
+    assert found.iterations <= iterations
+    expected = algorithm_1(mesh, found.iterations, inversion)
+    assert abs(found.uv - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize("backend", available_backends())
+def test_every_backend_gives_the_same_map(backend):
+    mesh = hemi_ellipsoid(1500)
+    with linear_algebra(backend=backend):
+        assert abs(cem(mesh).uv - cem(hemi_ellipsoid(1500)).uv).max() < 1e-10
+
+
+def test_the_history_is_the_energy_of_each_iterate():
+    mesh = hemi_ellipsoid(1500, x=3.0)
+    found = cem(mesh, tolerance=0, max_iterations=8)
+    assert len(found.energy_history) == found.iterations + 1
+    for k in range(found.iterations + 1):
+        uv = cem(mesh, tolerance=0, max_iterations=k).uv
+        energy = all_metrics(mesh, uv)["conformal_energy"]
+        assert found.energy_history[k] == pytest.approx(energy, rel=1e-8)
+
+
+def test_it_stops_after_the_first_iteration_that_gains_less_than_the_tolerance():
+    found = cem(hemi_ellipsoid(1500, x=3.0), tolerance=1e-4)
+    gains = -np.diff(found.energy_history)
+    assert (gains[:-1] >= 1e-4).all()
+    assert gains[-1] < 1e-4
+    assert found.iterations < 20
+
+
+def test_the_mirror_image_has_the_mirror_s_energy_and_keeps_its_own_orientation():
+    mesh = hemi_ellipsoid(600, x=2.0)
+    mirror = DiskMesh.from_arrays(mesh.V * [-1, 1, 1], mesh.F[:, ::-1])
+    one, other = all_metrics(mesh, cem(mesh).uv), all_metrics(mirror, cem(mirror).uv)
+    assert other["flipped_triangles"] == 0
+    assert other["conformal_energy"] == pytest.approx(one["conformal_energy"], rel=1e-3)
+
+
+def test_zero_has_no_inverse_and_raises_no_warning():
+    found = _inverted(np.array([0, 2, 1j, 1e-300]))
+    np.testing.assert_array_equal(found[:3], [0, 0.5, 1j])
+    assert found[3] == 0  # its square underflows: as good as zero
+
+
+def test_a_mesh_without_interior_is_a_failure_with_its_cause():
+    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 5))
+    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
+        cem(strip)
+
+
+def test_intrinsic_delaunay_weights_are_an_option():
+    mesh = hemi_ellipsoid(3000, z=6.0)
+    assert abs(cem(mesh, delaunay=True).uv - cem(mesh).uv).max() > 1e-6
+    assert all_metrics(mesh, cem(mesh, delaunay=True).uv)["flipped_triangles"] == 0
+
+
+def test_boundary_vertices_do_not_change_places_on_a_crowded_boundary():
+    mesh = read_mesh(real_mesh("turtle.obj"))
+    found = cem(mesh)
+    assert found.extras["order_kept"] > 0
+    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+    assert (np.diff(found.energy_history) < 0).all()
