@@ -1,0 +1,100 @@
+"""Is everything there that cembench needs, and what does an extra bring?"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import dataclass
+from importlib.metadata import version
+
+from cembench.errors import CembenchError
+from cembench.geometry.cholesky import available_backends
+from cembench.registry import load_registry
+from cembench.running.environment import describe_environment
+
+_REQUIRED = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "cvxopt": "cvxopt",
+    "libigl": "igl",
+    "meshio": "meshio",
+    "trimesh": "trimesh",
+    "matplotlib": "matplotlib",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report; `remedy` says what to do where it is not ok."""
+
+    name: str
+    ok: bool
+    detail: str
+    required: bool = True
+    remedy: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at the interpreter, the libraries, the back ends, the plug-ins and the machine."""
+    return [
+        _python(),
+        *(_library(package, module) for package, module in _REQUIRED.items()),
+        _backends(),
+        _plugins(),
+        _renderer(),
+        _machine(),
+    ]
+
+
+def _python() -> Finding:
+    ok = sys.version_info >= (3, 11)
+    return Finding("python", ok, sys.version.split()[0], remedy="Install Python 3.11 or newer.")
+
+
+def _library(package: str, module: str) -> Finding:
+    try:
+        importlib.import_module(module)
+        return Finding(package, True, version(package))
+    except ImportError as error:
+        return Finding(package, False, str(error), remedy=f"Run `pip install {package}`.")
+
+
+def _backends() -> Finding:
+    there = available_backends()
+    return Finding(
+        "cholesky",
+        "cvxopt" in there,
+        f"{', '.join(there)} (default cvxopt; its CHOLMOD is under the GPL at run time)",
+        remedy="Run `pip install cvxopt`; without it use --backend superlu, several times slower.",
+    )
+
+
+def _plugins() -> Finding:
+    try:
+        found = load_registry()
+    except CembenchError as error:
+        return Finding("plug-ins", False, str(error), remedy="See the message.")
+    detail = f"{len(found.algorithms)} algorithms, {len(found.surfaces)} surfaces"
+    return Finding("plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench.")
+
+
+def _renderer() -> Finding:
+    from cembench.reporting.preview import renderer_status
+
+    ok, message = renderer_status()
+    return Finding(
+        "pictures",
+        ok,
+        message,
+        required=False,
+        remedy="Previews are drawn by matplotlib instead, less finely.",
+    )
+
+
+def _machine() -> Finding:
+    about = describe_environment()
+    detail = (
+        f"{about['cpu']}, {about['hardware_threads']} hardware threads, "
+        f"{about['memory_bytes'] / 2**30:.0f} GiB; {'; '.join(about['blas']) or 'BLAS unknown'}"
+    )
+    return Finding("machine", True, detail, required=False)
