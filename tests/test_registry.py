@@ -1,0 +1,114 @@
+import textwrap
+
+import pytest
+
+from cembench import DiskMesh, ParameterError, Parameterization, RegistryError, algorithm, surface
+from cembench.registry import load_registry
+
+GOOD = """
+    from typing import Annotated
+    from pydantic import Field
+    from cembench import DiskMesh, Parameterization, algorithm, surface
+
+    @algorithm("mine", title="Mine", target="disk")
+    def mine(mesh: DiskMesh, *, steps: Annotated[int, Field(ge=0)] = 3) -> Parameterization:
+        '''Is it better?
+
+        It says so.
+        '''
+        raise NotImplementedError
+
+    @surface("plate", title="Plate")
+    def plate(faces: int = 100, *, seed: int = 0) -> DiskMesh:
+        raise NotImplementedError
+"""
+
+
+@pytest.fixture
+def plugin(tmp_path):
+    def write(text, name="plugin.py"):
+        path = tmp_path / name
+        path.write_text(textwrap.dedent(text))
+        return str(path)
+
+    return write
+
+
+def test_the_built_in_ones_come_by_entry_points():
+    registry = load_registry()
+    assert {"cem", "harmonic-circle", "lscm"} <= set(registry.algorithms)
+    assert registry.algorithm("lscm").target == "free boundary"
+    assert registry.algorithm("cem").mesh_type is DiskMesh
+    assert registry.algorithm("cem").notes.startswith("Faithful to Algorithm 1")
+    assert registry.algorithm("cem").origin == "algorithms.cem:cem"
+
+
+def test_a_file_adds_its_algorithms_and_surfaces(plugin):
+    registry = load_registry([plugin(GOOD)])
+    mine = registry.algorithm("mine")
+    assert mine.arguments({}) == {"steps": 3}
+    assert mine.arguments({"steps": "7"}) == {"steps": 7}
+    assert mine.notes == "It says so."
+    assert registry.surface("plate").arguments({})["faces"] == 100
+    assert "mine" not in load_registry().algorithms
+
+
+def test_a_module_adds_what_is_named():
+    with pytest.raises(RegistryError, match=r"declared twice: by algorithms.cem:cem and by"):
+        load_registry(["algorithms.cem:cem"])
+
+
+def test_a_name_is_declared_once(plugin):
+    with pytest.raises(RegistryError, match=r"'cem' is declared twice.*Rename one"):
+        load_registry([plugin(GOOD.replace('"mine"', '"cem"'))])
+    with pytest.raises(RegistryError, match="'mine' is declared twice"):
+        load_registry([plugin(GOOD), plugin(GOOD, "other.py")])
+
+
+def test_an_unknown_name_lists_the_known_ones():
+    with pytest.raises(RegistryError, match=r"unknown algorithm 'x'; known: .*cem"):
+        load_registry().algorithm("x")
+    with pytest.raises(RegistryError, match=r"unknown surface 'x'; known: .*flat-disk"):
+        load_registry().surface("x")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("import cembench_is_not_here", "cannot be imported: ModuleNotFoundError"),
+        ("1 +", "cannot be imported: SyntaxError"),
+        ("from cembench import algorithm", "declares nothing; decorate a function"),
+        ("from algorithms.cem import cem", "declares nothing"),
+        (GOOD.replace('"disk"', '"plane"'), "target 'plane' is unknown; allowed: 'disk'"),
+        (GOOD.replace("mesh: DiskMesh, ", "mesh, "), "must be annotated as DiskMesh"),
+        (GOOD.replace("] = 3", "]"), "parameter 'steps' needs a type annotation and a default"),
+    ],
+)
+def test_a_wrong_plugin_says_what_is_wrong(plugin, text, message):
+    with pytest.raises(RegistryError, match=message):
+        load_registry([plugin(text)])
+
+
+def test_parameters_are_checked(plugin):
+    mine = load_registry([plugin(GOOD)]).algorithm("mine")
+    with pytest.raises(ParameterError, match=r"mine has no parameter 'stops'.*are: steps"):
+        mine.arguments({"stops": 1})
+    with pytest.raises(ParameterError, match=r"mine: steps=-1 is not allowed.*\(default 3\)"):
+        mine.arguments({"steps": -1})
+    with pytest.raises(ParameterError, match=r"steps='many' is not allowed"):
+        mine.arguments({"steps": "many"})
+
+
+def test_decorators_leave_the_function_alone():
+    @algorithm("local", title="Local", target="disk")
+    def local(mesh: DiskMesh) -> Parameterization:
+        """Is it called?"""
+        return "called"  # type: ignore[return-value]
+
+    @surface("here", title="Here")
+    def here(faces: int = 10) -> DiskMesh:
+        """Is it called?"""
+        return faces  # type: ignore[return-value]
+
+    assert local(None) == "called"
+    assert here(3) == 3
