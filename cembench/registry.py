@@ -311,7 +311,7 @@ def _declared_by(plugin: str) -> list[_Registered]:
     if path.suffix == ".py":
         module = _import_file(path)
         specs = [vars(module)[key] for key in vars(module)]
-    elif name and not Path(location).suffix:
+    elif name:
         module = _import_module(location, plugin)
         if not hasattr(module, name):
             raise RegistryError(f"plug-in {plugin!r}: module {location!r} has no {name!r}.")
