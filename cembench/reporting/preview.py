@@ -39,7 +39,8 @@ SIZE, LEAST = (1600, 940), (240, 150)
 TIMEOUT = 90.0
 #: What a user can do where pyvista dies or draws nothing.
 SYSTEM_LIBRARIES = (
-    "it needs EGL or OSMesa from the system; on Debian or Ubuntu: apt-get install libegl1"
+    "it needs EGL (or OSMesa) from the system; on Debian or Ubuntu: "
+    "apt-get install libegl1 libgl1-mesa-dri"
 )
 
 
@@ -168,12 +169,15 @@ def _draw(scene: Scene, side: int, renderer: Renderer) -> tuple[tuple[Picture, P
 
 def _by_pyvista(scene: Scene, side: int) -> tuple[Picture, Picture]:
     """Both panels, from a process that may die without harm to this one."""
-    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
-        source, target = Path(folder, "scene.npz"), Path(folder, "pictures.npz")
-        scene.save(source)
-        _run(_command(source, target, side))
-        with np.load(target) as pictures:
-            surface, image = pictures["surface"], pictures["image"]
+    try:
+        with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
+            source, target = Path(folder, "scene.npz"), Path(folder, "pictures.npz")
+            scene.save(source)
+            _run(_command(source, target, side), folder)
+            with np.load(target) as pictures:
+                surface, image = pictures["surface"], pictures["image"]
+    except OSError as error:
+        raise _PyvistaFailed(f"no picture came back from pyvista ({error})") from None
     if (surface == 255).all() or (image == 255).all():
         raise _PyvistaFailed(f"pyvista drew an empty picture; {SYSTEM_LIBRARIES}")
     return surface, image
@@ -184,11 +188,12 @@ def _command(source: Path, target: Path, side: int) -> list[str]:
     return [sys.executable, "-m", module, str(source), str(target), str(side)]
 
 
-def _run(command: list[str]) -> None:
-    """Run to the end; raise :class:`_PyvistaFailed` with the reason if it does not get there."""
+def _run(command: list[str], folder: str) -> None:
+    """Run to the end in a folder; :class:`_PyvistaFailed` tells why it did not get there."""
     try:
         done = subprocess.run(
             command,
+            cwd=folder,  # a core file would be left there
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
