@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -22,14 +24,15 @@ def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
 
 
 def harmonic_extension(
-    L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
+    L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[Any]
+) -> NDArray[Any]:
     """Which map is harmonic for L and takes these values at the fixed vertices (Eq. 10)?
 
-    L (n, n) positive semi-definite, `fixed` (k,) indices, `values` (k,); the result is (n,).
+    L (n, n) positive semi-definite, `fixed` (k,) indices, `values` (k,), real or complex; the
+    result is (n,), of the same type.
     """
     n = L.shape[0]
-    f = np.zeros(n, dtype=np.complex128)
+    f = np.zeros(n, dtype=values.dtype)
     f[fixed] = values
     free = np.ones(n, dtype=bool)
     free[fixed] = False
