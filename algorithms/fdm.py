@@ -173,7 +173,8 @@ def _off_centre(z: Complex) -> Complex:
 
 
 def _reflected(z: Complex) -> Complex:
-    return 1 / np.conj(_off_centre(z))
+    mirrored: Complex = 1 / _off_centre(z).conj()
+    return mirrored
 
 
 def _largest(x: NDArray[np.float64], k: int) -> NDArray[np.int64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,13 @@ class DoubledSurface:
     F: NDArray[np.int64]
     mirror: NDArray[np.int64]
     size: int
+
+    def on_both(self, values: NDArray[Any]) -> NDArray[Any]:
+        """What is known at the surface's vertices (n, ...), at those of both copies (size, ...)."""
+        both = np.empty((self.size, *values.shape[1:]), dtype=values.dtype)
+        both[self.mirror] = values
+        both[: len(values)] = values
+        return both
 
 
 def doubled(mesh: DiskMesh) -> DoubledSurface:
