@@ -10,7 +10,7 @@ from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.harmonic import harmonic_extension
 from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import signed_areas
+from cembench.geometry.planar import backward_arcs, signed_areas
 from cembench.geometry.topology import vertex_graph
 
 Complex = NDArray[np.complex128]
@@ -73,13 +73,13 @@ def _folded(mesh: DiskMesh, z: Complex) -> NDArray[np.int64]:
 
 
 def _check_order(circle: Complex) -> None:
-    steps = np.angle(np.roll(circle, -1) / circle)
-    backward = int(np.count_nonzero(~(steps > 0)))
-    if backward or not np.isclose(steps.sum(), 2 * np.pi):
+    backward = backward_arcs(circle)
+    turns = np.angle(np.roll(circle, -1) / circle).sum() / (2 * np.pi)
+    if backward or round(turns) != 1:
         raise AlgorithmFailed(
-            f"the boundary does not go round the circle once and counter-clockwise: {backward} of "
-            f"{len(circle)} steps go backward or nowhere, in all {np.rad2deg(steps.sum()):.0f} "
-            "degrees; no map of the interior can undo such a fold"
+            "the boundary does not go round the circle once and counter-clockwise: "
+            f"{backward} of its {len(circle)} arcs go backward or nowhere, and it makes "
+            f"{turns:.0f} turn(s); no map of the interior can undo such a fold"
         )
 
 
