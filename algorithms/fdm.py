@@ -62,9 +62,9 @@ def fdm(
     Decided here: the middle of that edge is found across the cut of the argument; a start that
     folds gives way to uniform weights; triangles that have collapsed in the plane take the
     surface's cotangents, the limit of what their coefficients give; a vertex at the centre is
-    reflected to a modulus of 1e8; where the last solve folds because cotangent weights are
-    negative, they are raised around the folds and it is solved again (`fold_repairs` counts these
-    solves).
+    reflected to a modulus of 1e8. Where the last map folds, boundary vertices that changed places
+    are put in order, negative cotangent weights around the folds are raised, and it is solved again
+    (`fold_repairs` counts these solves).
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so there is nothing to correct")

@@ -51,8 +51,9 @@ def ldm(mesh: DiskMesh) -> Parameterization:
     so that the numbering plays no role (any choice gives the published digits on Chinese Lion); the
     disk's width is that of its boundary; a vertex at the very south pole is moved by 1e-8;
     triangles that have collapsed in the plane take the surface's cotangents, the limit of what
-    their coefficients give; where the last solve folds because cotangent weights are negative,
-    they are raised around the folds and it is solved again (`fold_repairs` counts these solves).
+    their coefficients give. Where the last map folds, boundary vertices that changed places are
+    put in order, negative cotangent weights around the folds are raised, and it is solved again
+    (`fold_repairs` counts these solves).
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")

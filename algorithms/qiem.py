@@ -61,8 +61,8 @@ def qiem(
     raises the energy of uneven maps. The circle between the copies is turned to a parallel, its
     half projected from the far pole and scaled to the unit disk, the boundary laid on the circle
     and the interior solved for once more, which settles the crowded regions that the flow is slow
-    to reach. Folds that remain because cotangent weights are negative are repaired as in FDM
-    (`fold_repairs`). The energies recorded are half of the sphere's, less 2 pi.
+    to reach. Folds that remain are repaired as in FDM (`fold_repairs`). The energies recorded are
+    half of the sphere's, less 2 pi.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
