@@ -100,6 +100,7 @@ def _laid_on_disk(mesh: DiskMesh, w: Complex) -> Complex:
     S = to_sphere(w)
     S[:, 2] -= S[b, 2].mean()
     z = to_plane(S, "south" if S[:, 2].mean() >= 0 else "north")
+    z[~np.isfinite(z)] = 0.0  # a vertex at the pole itself; the last solve will place it
     z *= 2 / np.ptp(z.real[b])
     z -= complex(z.real[b].min(), z.imag[b].min()) + (1 + 1j)
     if polygon_area(z[b]) < 0:

@@ -74,8 +74,7 @@ def qiem(
     outer = most_regular_triangle(V, double.F)
     z = balanced(harmonic_around_triangle(L_double, V, double.F[outer]), double.F, outer)
     S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
-    z = _projected(mesh, S[: mesh.n])
-    z = harmonic_extension(L, mesh.boundary, z[mesh.boundary])
+    z = harmonic_extension(L, mesh.boundary, _boundary_on_circle(mesh, S))
     z, repairs = without_folds(mesh, L, z)
     return Parameterization(
         z,
@@ -150,27 +149,31 @@ class _Step:
 
 
 def _centred(S: Real | None, mass: Real) -> Real | None:
+    """On the sphere, the centre of mass at its middle; None where that cannot be."""
     if S is None:
         return None
     norms = np.linalg.norm(S, axis=1, keepdims=True)
-    return moebius_centred(S / norms, mass) if norms.min() > 0 else None
+    if not norms.min() > 0:
+        return None
+    try:
+        return moebius_centred(S / norms, mass)
+    except AlgorithmFailed:
+        return None
 
 
-def _projected(mesh: DiskMesh, S: Real) -> Complex:
-    """Turn the boundary's circle to a parallel, project the half inside it, scale to the disk."""
-    b = mesh.boundary
-    middle = S[b].mean(axis=0)
-    turn = np.linalg.svd(S[b] - middle)[2]
-    S = S @ turn.T
-    # The half lies in the south of the plane of its boundary.
-    south = S[mesh.interior, 2].mean() < S[b, 2].mean()
-    z = to_plane(S, "north" if south else "south")
-    centre, radius = fitted_circle(z[b])
-    z = (z - centre) / radius
-    if polygon_area(z[b]) < 0:
+def _boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
+    """Turn the boundary's circle to a parallel, project it from the pole beyond it, scale."""
+    loop = S[mesh.boundary]
+    turn = np.linalg.svd(loop - loop.mean(axis=0))[2].T
+    loop = loop @ turn
+    # The half that is mapped to the disk lies on the other side of the parallel.
+    in_south = (S[mesh.interior] @ turn[:, 2]).mean() < loop[:, 2].mean()
+    z = to_plane(loop, "north" if in_south else "south")
+    centre, _ = fitted_circle(z)
+    z = z - centre
+    if polygon_area(z) < 0:
         z = np.conj(z)
-    modulus = np.abs(z[b])
-    if not modulus.min() > 0:
-        raise AlgorithmFailed("a boundary vertex came to lie at the centre of the disk")
-    z[b] /= modulus
-    return z
+    modulus = np.abs(z)
+    if not (np.isfinite(modulus).all() and modulus.min() > 0):
+        raise AlgorithmFailed("the boundary's image on the sphere is no curve that has an inside")
+    return z / modulus
