@@ -95,7 +95,8 @@ def _laid_on_disk(mesh: DiskMesh, w: Complex) -> Complex:
     b = np.roll(b, -first)
     loop = to_sphere(w[b], "south")
     far = int(np.argmax(np.linalg.norm(loop - loop[0], axis=1)))
-    chosen = [0, far, (far + 1) // 2]
+    between = (far + 1) // 2 if far > 1 else (far + len(b)) // 2
+    chosen = [0, far, between]
     w = three_point_map(w[b][chosen], _congruent(loop[chosen]))(w)
     S = to_sphere(w)
     S[:, 2] -= S[b, 2].mean()
