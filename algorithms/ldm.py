@@ -48,12 +48,13 @@ def ldm(mesh: DiskMesh) -> Parameterization:
     is left. A handful of linear solves, no iteration.
 
     Decided here: the first of the three boundary vertices is the one farthest from the mean vertex,
-    so that the numbering plays no role (any choice gives the published digits on Chinese Lion); the
-    disk's width is that of its boundary; a vertex at the very south pole is moved by 1e-8;
-    triangles that have collapsed in the plane take the surface's cotangents, the limit of what
-    their coefficients give. Where the last map folds, boundary vertices that changed places are
-    put in order, negative cotangent weights around the folds are raised, and it is solved again
-    (`fold_repairs` counts these solves).
+    so that the numbering plays no role, where the program takes the first of its list (on Chinese
+    Lion 242 of the 245 choices give the published digits, this one among them); the disk's width
+    is that of its boundary; a vertex at the very south pole is moved by 1e-8; triangles that have
+    collapsed in the plane take the surface's cotangents, the limit of what their coefficients
+    give. Where the last map folds, boundary vertices that changed places are put in order, negative
+    cotangent weights around the folds are raised, and it is solved again (`fold_repairs` counts
+    these solves).
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
