@@ -115,3 +115,24 @@ def test_the_choice_ends_with_its_block(matrix):
         inside = Cholesky(A)
     assert inside._how.backend == "superlu"
     assert Cholesky(A)._how.backend == "cvxopt"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("solves", BOTH)
+def test_after_an_indefinite_matrix_the_next_is_solved_again(matrix, backend, solves):
+    A, _ = matrix
+    identity = sparse.eye_array(A.shape[0], format="csc")
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    with linear_algebra(solves, backend):
+        factor = Cholesky(A)
+        for k in range(3):
+            with pytest.raises(NotPositiveDefinite):  # "backslash" factors at the solve
+                solved_after_update(factor, A - identity, b)
+            definite = A + k * identity
+            x = solved_after_update(factor, definite, b)
+            assert abs(definite @ x - b).max() < 1e-9 * abs(x).max()
+
+
+def solved_after_update(factor, A, b):
+    factor.update(A)
+    return factor.solve(b)
