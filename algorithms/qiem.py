@@ -36,7 +36,7 @@ FIRST, GROWTH, CUT, SHARE, LEAST = 0.1, 1.5, 0.5, 0.9, 1e-6
     "qiem",
     title="QIEM",
     target="disk",
-    source="Huang, Gu, Huang, Lin, Lin & Yau, SIAM J. Sci. Comput. 36 (2014)",
+    source="Huang, Gu, Huang, Lin, Lin & Yau, Geom. Imag. Comput. 1 (2014), 223-258",
 )
 def qiem(
     mesh: DiskMesh,

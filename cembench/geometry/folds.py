@@ -25,14 +25,11 @@ MOST_BACKWARD = 0.1
 
 
 def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Complex, int]:
-    """Which map has the boundary of the harmonic map z, but no folded triangle?
+    """Which map to the disk is nearly the harmonic map z, but has no folded triangle?
 
     Two causes are mended. Where a few boundary vertices changed places on the circle, they take the
-    nearest angles in order. Besides, a harmonic map to a convex polygon can fold only where an edge
-    has a weight that is not positive (Tutte 1963, Floater 2003): around folded triangles such
-    weights are raised to `LEAST_WEIGHT` of the mean one and the map is solved for again; the
-    neighbourhood doubles until nothing is folded, and in the end takes in the whole mesh, where the
-    theorem applies. A map without folds comes back untouched.
+    nearest angles in order; then the interior is as in :func:`interior_without_folds`. A map
+    without folds comes back untouched.
 
     Returns
     -------
@@ -47,13 +44,29 @@ def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Comp
         The boundary is too far out of order to be repaired, or folds remain.
 
     """
+    if not len(_folded(mesh, z)):
+        return z, 0
+    rounds = 0
+    if backward_arcs(z[mesh.boundary]):
+        z = harmonic_extension(L, mesh.boundary, in_order(z[mesh.boundary]))
+        rounds = 1
+    z, more = interior_without_folds(mesh, L, z)
+    return z, rounds + more
+
+
+def interior_without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Complex, int]:
+    """Which map has the boundary of the harmonic map z, but no folded triangle?
+
+    A harmonic map to a convex polygon can fold only where an edge has a weight that is not positive
+    (Tutte 1963, Floater 2003): around folded triangles such weights are raised to `LEAST_WEIGHT` of
+    the mean one and the map is solved for again; the neighbourhood doubles until nothing is folded,
+    and in the end takes in the whole mesh, where the theorem applies. Returns and raises what
+    :func:`without_folds` does.
+    """
     folded = _folded(mesh, z)
     if not len(folded):
         return z, 0
     rounds, rings = 0, 1
-    if backward_arcs(z[mesh.boundary]):
-        z = harmonic_extension(L, mesh.boundary, in_order(z[mesh.boundary]))
-        folded, rounds = _folded(mesh, z), 1
     with phase("folds"):
         graph = vertex_graph(mesh.F, mesh.n)
         near = np.zeros(mesh.n, dtype=bool)
@@ -78,7 +91,8 @@ def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Comp
 
 
 def _folded(mesh: DiskMesh, z: Complex) -> NDArray[np.int64]:
-    return np.flatnonzero(~(signed_areas(z, mesh.F) > 0))
+    with phase("folds"):
+        return np.flatnonzero(~(signed_areas(z, mesh.F) > 0))
 
 
 def in_order(circle: Complex) -> Complex:

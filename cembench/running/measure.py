@@ -26,9 +26,6 @@ from cembench.registry import Algorithm
 
 #: How far from the unit circle a boundary vertex of a disk may lie.
 CIRCLE_TOLERANCE = 1e-9
-#: Up to this share of folded triangles a map is "ok", with the number in its metrics; a mesh can
-#: force some. A map with more is "invalid".
-FOLDED_SHARE = 0.005
 
 
 def measure_cell(
@@ -66,7 +63,8 @@ def measure_cell(
                 finally:
                     gc.enable()
     except AlgorithmFailed as error:
-        return Outcome(status="failed", cause=str(error)), None
+        cause = "; ".join([str(error), *_broken_premises(mesh)])
+        return Outcome(status="failed", cause=cause), None
     except MemoryError as error:
         return Outcome(status="out_of_memory", cause=str(error) or "MemoryError"), None
     except Exception as error:
@@ -112,6 +110,11 @@ def _unusable(found: Any, mesh: TriangleMesh) -> str | None:
     return None
 
 
+def _broken_premises(mesh: TriangleMesh) -> list[str]:
+    broken = [notice for notice in mesh.notices if notice.startswith("Definition 1")]
+    return [f"the mesh breaks a premise of the paper: {'; '.join(broken)}"] if broken else []
+
+
 def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
     """Which promises does this map break? Empty for a valid one."""
     problems = []
@@ -122,8 +125,7 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128])
     flipped = flipped_triangles(mesh, uv)
     if image_area(mesh, uv) <= 0 or flipped == mesh.m:
         problems.append("the map reverses the surface's orientation")
-    elif flipped > FOLDED_SHARE * mesh.m:
-        problems.append(f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.1%})")
-        if any("Definition 1" in notice for notice in mesh.notices):
-            problems.append("the mesh breaks a premise: " + "; ".join(mesh.notices))
+    elif flipped:
+        problems.append(f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})")
+        problems += _broken_premises(mesh)
     return problems
