@@ -18,7 +18,7 @@ from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.moebius import three_point_map
 from cembench.geometry.planar import polygon_area
-from cembench.geometry.spherical import balanced, harmonic_around_triangle, most_regular_triangle
+from cembench.geometry.spherical import balanced_planar_map
 from cembench.geometry.stereographic import to_plane, to_sphere
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
@@ -63,8 +63,7 @@ def ldm(mesh: DiskMesh) -> Parameterization:
     with phase("assembly"):
         L_double = doubled_laplacian(L, double)
         V = double.on_both(mesh.V)
-    outer = most_regular_triangle(V, double.F)
-    z = balanced(harmonic_around_triangle(L_double, V, double.F[outer]), double.F, outer)
+    z = balanced_planar_map(L_double, V, double.F)
     w = _corrected_at_north(double, V, z)
     z = _laid_on_disk(mesh, w[: mesh.n])
     b = mesh.boundary

@@ -19,7 +19,7 @@ from cembench.geometry.harmonic import harmonic_extension
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.planar import fitted_circle, polygon_area
-from cembench.geometry.spherical import balanced, harmonic_around_triangle, most_regular_triangle
+from cembench.geometry.spherical import balanced_planar_map
 from cembench.geometry.stereographic import to_plane, to_sphere
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
@@ -71,8 +71,7 @@ def qiem(
     with phase("assembly"):
         L_double = doubled_laplacian(L, double)
         V = double.on_both(mesh.V)
-    outer = most_regular_triangle(V, double.F)
-    z = balanced(harmonic_around_triangle(L_double, V, double.F[outer]), double.F, outer)
+    z = balanced_planar_map(L_double, V, double.F)
     S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
     z = harmonic_extension(L, mesh.boundary, _boundary_on_circle(mesh, S))
     z, repairs = without_folds(mesh, L, z)

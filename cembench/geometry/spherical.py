@@ -15,6 +15,18 @@ from cembench.geometry.harmonic import harmonic_extension
 Complex = NDArray[np.complex128]
 
 
+def balanced_planar_map(
+    L: sparse.csc_array, V: NDArray[np.float64], F: NDArray[np.int64]
+) -> Complex:
+    """Which planar map is the start of a spherical one? Shape (n,).
+
+    L, V and F are those of a closed surface. One pole lies in its most regular triangle, and the
+    two poles look alike.
+    """
+    outer = most_regular_triangle(V, F)
+    return balanced(harmonic_around_triangle(L, V, F[outer]), F, outer)
+
+
 def most_regular_triangle(V: NDArray[np.float64], F: NDArray[np.int64]) -> int:
     """Which triangle has sides nearest to a third of its perimeter each? The first of equals."""
     sides = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2)
