@@ -68,7 +68,7 @@ def measure_one(mesh: str | None, size: int) -> dict[str, object]:
     from cembench.geometry.files import read_mesh
     from cembench.geometry.laplacian import laplacian
     from cembench.geometry.mesh import DiskMesh
-    from cembench.running.worker import peak_memory_bytes
+    from cembench.running.memory import peak_memory_bytes
     from meshes_gen.spherical_cap import spherical_cap
 
     if mesh is None:

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn
-from rich.progress import TimeElapsedColumn as Elapsed
 
+from cembench import run_verbs
+from cembench.console import Json, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
+from cembench.paper.profiles import Profile
+from cembench.records import DEFAULT_ROUNDS
 
 if TYPE_CHECKING:
     from cembench.geometry.mesh import TriangleMesh
     from cembench.records import Record
     from cembench.registry import Algorithm, Registry
+    from cembench.reporting.progress import PlainProgress
+    from cembench.running.local import Options
     from cembench.running.plan import Task
     from cembench.store import Store
 
@@ -33,10 +36,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
 )
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
-
-Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
 Plugins = Annotated[
     list[str],
     typer.Option("--plugin", help="FILE.py or module:name with more algorithms. Repeatable."),
@@ -46,7 +45,12 @@ Parameters = Annotated[
     typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter. Repeatable."),
 ]
 Threads = Annotated[int, typer.Option(min=1, help="Threads of the numerical libraries.")]
-Timeout = Annotated[float, typer.Option(min=0.1, help="Seconds that a cell may take.")]
+Timeout = Annotated[float, typer.Option(min=0.1, help="Seconds that a call may take.")]
+Memory = Annotated[
+    str | None,
+    typer.Option(metavar="SIZE", help="Of a process, as 4GiB; default: 90 % of what is free."),
+]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
 
 
 class Solves(StrEnum):
@@ -93,7 +97,7 @@ def list_(
 
     registry = load_registry(plugin)
     if as_json:
-        _print_json(_registry_as_json(registry, kind))
+        print_json(_registry_as_json(registry, kind))
         return
     if kind in (None, Kind.algorithms):
         out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
@@ -124,6 +128,7 @@ def map_(
     backend: BackendOption = Backend.cvxopt,
     threads: Threads = 1,
     timeout: Timeout = 600.0,
+    memory: Memory = None,
     as_json: Json = False,
 ) -> None:
     """Map one surface, check the map, and write it.
@@ -134,9 +139,10 @@ def map_(
     from cembench.registry import load_registry
     from cembench.reporting.frame import row
     from cembench.reporting.terminal import figures_table
-    from cembench.running.local import run_tasks
+    from cembench.running.local import Options, map_once
     from cembench.running.plan import How, plan_cells, read_mesh_for
 
+    options = Options(timeout=timeout, memory_bytes=_memory_bytes(memory))
     chosen = load_registry(plugin).algorithm(algorithm)
     if output is not None:
         check_writable_format(output, with_uv=True)
@@ -145,7 +151,7 @@ def map_(
     how = How(solves.value, _installed(backend), threads, repeats=1)
     tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin)
     with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
-        ((_, record, uv, _),) = run_tasks(tasks, timeout=timeout)
+        record, uv = map_once(tasks[0], options)
     ok = record.outcome.status == "ok"
     written: dict[str, str] = {}
     if ok and uv is not None:
@@ -158,7 +164,7 @@ def map_(
                 written["preview"] = str(picture)
                 _draw(surface, uv, picture, record)
     if as_json:
-        _print_json(row(record) | written)
+        print_json(row(record) | written)
     else:
         _print_notices([surface])
         out.print(figures_table(record))
@@ -167,17 +173,25 @@ def map_(
         if ok and not written:
             out.print("Nothing was written; add -o FILE.obj to keep the map.", style="dim")
     if not ok:
-        _complain(f"{record.outcome.status}: {record.outcome.cause}")
+        complain(f"{record.outcome.status}: {record.outcome.cause}")
         raise typer.Exit(1)
 
 
 @app.command(
-    epilog="Examples:  cembench run --mesh a.obj --mesh b.ply -a cem,lscm  ·  "
+    epilog="Examples:  cembench run --profile quick --dry-run  ·  "
+    "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
     "cembench run --surfaces spherical-cap -o results/cap --json",
 )
 def run(
     *,
+    profile: Annotated[
+        Profile | None,
+        typer.Option(help="The paper's models: the 8 smallest, up to 210 k faces, all 20."),
+    ] = None,
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
+    mesh_dir: Annotated[
+        list[Path], typer.Option("--mesh-dir", help="All mesh files of a folder. Repeatable.")
+    ] = [],  # noqa: B006
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
     ] = [],  # noqa: B006
@@ -187,43 +201,70 @@ def run(
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006
     plugin: Plugins = [],  # noqa: B006
-    repeats: Annotated[int, typer.Option(min=1, help="Timed calls a cell.")] = 3,
+    repeats: Annotated[
+        int, typer.Option(min=1, help="Rounds; fewer than 6 give no interval.")
+    ] = DEFAULT_ROUNDS,
+    seed: Annotated[int, typer.Option(help="Of the random order within a round.")] = 0,
     timeout: Timeout = 600.0,
-    solves: SolvesOption = Solves.reuse,
+    memory: Memory = None,
+    solves: Annotated[
+        list[str], typer.Option("--solves", help="reuse, backslash, or both with a comma.")
+    ] = ["reuse"],  # noqa: B006
     backend: BackendOption = Backend.cvxopt,
     threads: Threads = 1,
+    reference: Annotated[
+        str, typer.Option(help="The algorithm whose speedup over the others is told.")
+    ] = "cem",
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
     ] = Path("results/run"),
-    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")] = False,
+    fresh: Fresh = False,
+    rerun_failed: Annotated[
+        bool, typer.Option("--rerun-failed", help="Measure again what did not end ok.")
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the cells and what they will cost.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
-    """Measure algorithms on surfaces, each pair in a process of its own.
+    """Measure algorithms on surfaces, each pair in processes of its own.
 
-    Records and maps are kept in the run's folder; what it already holds is not measured again.
+    Every finished process is on disk at once; what the folder already holds is not measured again.
     -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
+    docs/measuring.md tells what is timed, and what an interval means.
     """
+    from cembench.paper.profiles import surfaces_of
     from cembench.registry import load_registry
-    from cembench.running.plan import How, generate_surface, plan_cells, read_mesh_for
+    from cembench.running.local import Options
+    from cembench.running.plan import How, generate_surface, mesh_files, plan_cells, read_mesh_for
     from cembench.store import Store
 
+    policies = _policies(solves)
+    options = Options(timeout, _memory_bytes(memory), fresh, rerun_failed, seed)
     registry = load_registry(plugin)
-    names = _split(algorithms) or list(registry.algorithms)
+    names = split(algorithms) or list(registry.algorithms)
     chosen = [registry.algorithm(name) for name in names]
-    if not mesh and not surfaces:
+    files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
+    generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
+    if not files and not generated:
         raise ParameterError(
-            "nothing to run on: name at least one --mesh FILE or --surfaces NAME "
+            "nothing to run on: name a --profile, or at least one --mesh FILE or --surfaces NAME "
             "(see `cembench list surfaces`)."
         )
     with err.status("reading surfaces", spinner="line"):
-        found = [read_mesh_for(path, chosen) for path in mesh]
-        found += [generate_surface(registry, name, faces) for name in _split(surfaces)]
-    how = How(solves.value, _installed(backend), threads, repeats)
-    tasks = plan_cells(chosen, found, _assignments(parameter), how, plugin)
+        found = [read_mesh_for(path, chosen) for path in files]
+        found += [generate_surface(registry, name, faces) for name in dict.fromkeys(generated)]
+    tasks = []
+    for policy in policies:
+        how = How(policy, _installed(backend), threads, repeats)
+        tasks += plan_cells(chosen, found, _assignments(parameter), how, plugin)
+    if dry_run:
+        _present_plan(tasks, Store(output), options, as_json=as_json)
+        return
     if not as_json:
         _print_notices(found)
-    records = _measure(tasks, Store(output), timeout=timeout, fresh=fresh)
-    _present(records, as_json=as_json, where=output)
+    records = _measure(tasks, Store(output), options)
+    _present(records, as_json=as_json, where=output, reference=reference)
 
 
 @app.command(epilog="Example:  cembench reproduce -o results/reproduce")
@@ -232,7 +273,7 @@ def reproduce(
     output: Annotated[Path, typer.Option("-o", "--output", help="Where the results go.")] = Path(
         "results/reproduce"
     ),
-    fresh: Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")] = False,
+    fresh: Fresh = False,
     as_json: Json = False,
 ) -> None:
     """Measure every algorithm on every generated surface, draw each map, and say where it all lies.
@@ -240,14 +281,16 @@ def reproduce(
     Takes about a minute. What the folder already holds is not measured again.
     """
     from cembench.registry import load_registry
+    from cembench.running.local import Options
     from cembench.running.plan import How, generate_surface, plan_cells
     from cembench.store import Store
 
+    options = Options(memory_bytes=_memory_bytes(None), fresh=fresh)
     registry = load_registry()
     surfaces = [generate_surface(registry, name) for name in registry.surfaces]
     tasks = plan_cells(list(registry.algorithms.values()), surfaces, {}, How())
     store = Store(output)
-    records = _measure(tasks, store, timeout=600.0, fresh=fresh)
+    records = _measure(tasks, store, options)
     pictures = output / "pictures"
     pictures.mkdir(parents=True, exist_ok=True)
     with err.status("drawing", spinner="line"):
@@ -267,7 +310,7 @@ def doctor(*, as_json: Json = False) -> None:
     with err.status("looking", spinner="line"):
         findings = examine()
     if as_json:
-        _print_json([asdict(finding) for finding in findings])
+        print_json([asdict(finding) for finding in findings])
     else:
         for finding in findings:
             mark = (
@@ -282,48 +325,90 @@ def doctor(*, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
-def _measure(tasks: Sequence[Task], store: Store, *, timeout: float, fresh: bool) -> list[Record]:
-    """Run the tasks with a live bar on a terminal, and with a line a cell elsewhere."""
+for verb, example in run_verbs.VERBS:
+    app.command(epilog=example)(verb)
+
+
+def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
+    """Run the tasks with a live table on a terminal, and with a line a cell elsewhere."""
     from cembench.running.local import run_tasks
 
-    records = []
-    columns = (
-        SpinnerColumn("line"),
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=20),
-        MofNCompleteColumn(),
-        Elapsed(),
-    )
-    with Progress(*columns, console=err, transient=True, disable=not err.is_terminal) as bar:
-        line = bar.add_task("starting", total=len(tasks))
-
-        def announce(task: Task) -> None:
-            bar.update(line, description=f"{task.cell.mesh} / {task.cell.algorithm}")
-
-        results = run_tasks(tasks, store, timeout=timeout, fresh=fresh, before=announce)
-        for k, (task, record, _, resumed) in enumerate(results, start=1):
-            records.append(record)
-            bar.advance(line)
-            if not err.is_terminal:
-                how = "kept" if resumed else record.outcome.status
-                err.print(
-                    f"[{k}/{len(tasks)}] {task.cell.mesh} / {task.cell.algorithm}: {how}",
-                    markup=False,
-                )
-    return records
+    with _progress(len(tasks)) as progress:
+        return run_tasks(tasks, store, options, progress)
 
 
-def _present(records: list[Record], *, as_json: bool, where: Path) -> None:
-    from cembench.reporting.frame import row
-    from cembench.reporting.terminal import results_table
+@contextmanager
+def _progress(cells: int) -> Iterator[PlainProgress]:
+    from cembench.reporting.progress import LiveProgress, PlainProgress
+
+    with (LiveProgress if err.is_terminal else PlainProgress)(err, cells) as progress:
+        yield progress
+
+
+def _present(records: list[Record], *, as_json: bool, where: Path, reference: str = "cem") -> None:
+    from cembench.reporting.frame import rows
+    from cembench.reporting.terminal import results_table, speedups_table
 
     if as_json:
-        _print_json([row(record) for record in records])
+        print_json(rows(records, reference))
     else:
         out.print(results_table(records))
+        speedups = speedups_table(records, reference)
+        if speedups is not None:
+            out.print(speedups)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True, markup=False)
     if any(record.outcome.status != "ok" for record in records):
         raise typer.Exit(1)
+
+
+def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_json: bool) -> None:
+    """Say which cells would be measured, and what that will cost."""
+    from cembench.estimate import estimate
+    from cembench.reporting.progress import duration
+    from cembench.reporting.terminal import plan_table
+
+    records = store.records() if (store.folder / "records").is_dir() else []
+    held = {r.cell.label: r.outcome.status for r in records if not options.measures_again(r)}
+    lines = [
+        (
+            task.cell,
+            task.facts.faces,
+            None if task.cell.label in held else estimate(task.cell, task.facts.faces, records),
+        )
+        for task in tasks
+    ]
+    costs = [cost for _, _, cost in lines if cost is not None]
+    seconds = sum(cost.seconds for cost in costs)
+    largest = max((cost.memory_bytes for cost in costs), default=0)
+    if as_json:
+        cells = [
+            {
+                "key": cell.key,
+                "mesh": cell.mesh,
+                "algorithm": cell.algorithm,
+                "solves": cell.solves,
+                "faces": faces,
+                "held": held.get(cell.label),
+                "estimate": None if cost is None else asdict(cost),
+            }
+            for cell, faces, cost in lines
+        ]
+        print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest})
+        return
+    shown = [
+        (cell, faces, cost.basis if cost else f"there: {held[cell.label]}", cost)
+        for cell, faces, cost in lines
+    ]
+    out.print(plan_table(shown))
+    rough = (
+        " (rough: little of this was measured here before)"
+        if any(cost.basis == "rough" for cost in costs)
+        else ""
+    )
+    out.print(
+        f"\n{len(costs)} of {len(tasks)} cells to measure: about {duration(seconds)}, "
+        f"{largest / 2**30:.1f} GiB at most{rough}"
+    )
 
 
 def _draw(mesh: TriangleMesh, uv: Any, picture: Path, record: Record) -> None:
@@ -347,18 +432,6 @@ def _print_notices(meshes: Sequence[TriangleMesh]) -> None:
             err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
 
 
-def _complain(message: str) -> None:
-    err.print(f"error: {message}", style="bold red", markup=False, soft_wrap=True)
-
-
-def _print_json(data: Any) -> None:
-    sys.stdout.write(json.dumps(data, indent=2) + "\n")
-
-
-def _split(names: Sequence[str]) -> list[str]:
-    return [part.strip() for name in names for part in name.split(",") if part.strip()]
-
-
 def _assignments(given: Sequence[str]) -> dict[str, str]:
     pairs = {}
     for assignment in given:
@@ -367,6 +440,31 @@ def _assignments(given: Sequence[str]) -> dict[str, str]:
             raise ParameterError(f"-p {assignment!r} is not of the form NAME=VALUE.")
         pairs[name.strip()] = value.strip()
     return pairs
+
+
+def _policies(given: list[str]) -> list[str]:
+    names = list(dict.fromkeys(split(given)))
+    for name in names:
+        if name not in [policy.value for policy in Solves]:
+            raise ParameterError(
+                f"--solves {name!r} is unknown; allowed: reuse, backslash, or both with a comma."
+            )
+    return names or [Solves.reuse.value]
+
+
+def _memory_bytes(given: str | None) -> int:
+    import psutil
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
+    if given is None:
+        return int(0.9 * psutil.virtual_memory().available)
+    try:
+        size: int = TypeAdapter(ByteSize).validate_python(given)
+    except ValidationError:
+        raise ParameterError(
+            f"--memory {given!r} is no size; write a number with a unit, as 4GiB or 500MB."
+        ) from None
+    return size
 
 
 def _installed(backend: Backend) -> str:
@@ -403,7 +501,7 @@ def main() -> None:
     try:
         app()
     except CembenchError as error:
-        _complain(str(error))
+        complain(str(error))
         sys.exit(2)
 
 

@@ -7,12 +7,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 #: Changes when a record's meaning does; a record of another version is not resumed from.
 SCHEMA_VERSION = 1
+
+#: The fewest rounds whose smallest and largest figure enclose the median in 95 % of all cases: the
+#: chance that all lie on one side of it is 2 / 2^6.
+DEFAULT_ROUNDS = 6
 
 Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
 
@@ -31,7 +36,8 @@ class Cell(BaseModel):
     solves: str = "reuse"
     backend: str = "cvxopt"
     threads: int = 1
-    repeats: int = 3
+    #: Rounds, each a fresh process; see docs/measuring.md.
+    repeats: int = DEFAULT_ROUNDS
 
     @property
     def key(self) -> str:
@@ -55,8 +61,27 @@ class MeshFacts(BaseModel):
     notices: tuple[str, ...] = ()
 
 
+class Round(BaseModel):
+    """The timed calls of one process: a round has one such process for every cell."""
+
+    #: Which invocation measured it; only rounds of one sitting were measured side by side.
+    sitting: str = ""
+    started_at: str = ""
+    #: Wall-clock seconds of each timed call after the warm-up, in order.
+    calls: tuple[float, ...]
+    #: Seconds by phase of the call that is the round's figure; they add up to it.
+    phases: dict[str, float] = Field(default_factory=dict)
+    #: SHA-256 of the map's bytes.
+    uv_hash: str | None = None
+
+    @property
+    def seconds(self) -> float:
+        """The round's figure: the median of its calls."""
+        return lower_median(self.calls)
+
+
 class Outcome(BaseModel):
-    """What one cell's process has to tell, or what is told of it when it cannot."""
+    """What one cell's processes have to tell, or what is told of one that cannot."""
 
     model_config = ConfigDict(ser_json_inf_nan="null")
 
@@ -64,22 +89,41 @@ class Outcome(BaseModel):
     #: Why the status is not "ok"; None otherwise.
     cause: str | None = None
     traceback: str | None = None
-    #: Wall-clock seconds of each timed call, in order.
-    seconds: tuple[float, ...] = ()
-    #: Seconds by phase of the call with the median total; they add up to it.
-    phases: dict[str, float] = Field(default_factory=dict)
+    #: In order; empty where no call was timed.
+    rounds: tuple[Round, ...] = ()
     #: Figures computed by the harness (cembench.metrics); null where infinite.
     metrics: dict[str, float | int | None] = Field(default_factory=dict)
     iterations: int | None = None
     energy_history: tuple[float, ...] = ()
     extras: dict[str, Any] = Field(default_factory=dict)
-    #: Largest resident set of the cell's process, mesh and libraries included.
+    uv_hash: str | None = None
+    #: Largest resident set up to the end of one call, mesh and libraries included.
     peak_memory_bytes: int | None = None
+    #: The same, less the resident set before the call.
+    memory_increase_bytes: int | None = None
+    #: What the user should know of the measurement.
+    notes: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> tuple[float, ...]:
+        """The figure of each round, in order."""
+        return tuple(r.seconds for r in self.rounds)
 
     @property
     def median_seconds(self) -> float | None:
-        """The middle one of the timed calls: the lower of two."""
-        return sorted(self.seconds)[(len(self.seconds) - 1) // 2] if self.seconds else None
+        """The cell's figure: the median over its rounds."""
+        return lower_median(self.seconds) if self.rounds else None
+
+    @property
+    def phases(self) -> dict[str, float]:
+        """Seconds by phase; they add up to :attr:`median_seconds`."""
+        figure = self.median_seconds
+        return next((r.phases for r in self.rounds if r.seconds == figure), {})
+
+
+def lower_median(values: Sequence[float]) -> float:
+    """The middle value, the lower of two: one that was measured, so that its phases are known."""
+    return sorted(values)[(len(values) - 1) // 2]
 
 
 class Record(BaseModel):

@@ -105,6 +105,7 @@ class Surface(_Registered):
     """A surface family: see :func:`surface`."""
 
     source: str = ""
+    paper_row: str = ""
 
 
 def algorithm(
@@ -167,10 +168,13 @@ def algorithm(
     return mark
 
 
-def surface(name: str, *, title: str, source: str = "", notes: str = "") -> Callable[[C], C]:
+def surface(
+    name: str, *, title: str, source: str = "", notes: str = "", paper_row: str = ""
+) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
-    `faces` is the number of triangles asked for; it has a default.
+    `faces` is the number of triangles asked for; it has a default. `paper_row` is the model of the
+    paper's Table 1 that the surface stands for, if any: the profiles are made of those.
 
     Raises
     ------
@@ -182,7 +186,14 @@ def surface(name: str, *, title: str, source: str = "", notes: str = "") -> Call
     def mark(function: C) -> C:
         _, parameters = _signature(name, function, positional="faces")
         spec = Surface(
-            name, title, function, parameters, _origin(function), notes or _notes(function), source
+            name=name,
+            title=title,
+            function=function,
+            parameters=parameters,
+            origin=_origin(function),
+            notes=notes or _notes(function),
+            source=source,
+            paper_row=paper_row,
         )
         setattr(function, _MARK, spec)
         return function

@@ -5,25 +5,34 @@
     RUN/records/<mesh>--<algorithm>--<key>.json
     RUN/maps/<mesh>--<algorithm>--<key>.npz       uv, complex128 (n,)
     RUN/environments/<id>.json
+    RUN/plan.json                                 the cells that were last asked for
+    RUN/samples/<mesh>--<algorithm>--<key>/<id>/  what is known of a cell that is not finished:
+        check.json  uv.npz  round-0.json ...      one file for each process that has ended
+    RUN/lock                                      held by the run that measures
 
-Every file is written to a draft, flushed to disk and renamed: it is whole or not there.
+Every file is written to a draft, flushed to disk and renamed: it is whole or not there. A cell's
+samples become its record when the last is there; the record is written before they are deleted,
+so that whatever moment a run is killed at, each finished process is known exactly once.
 """
 
 from __future__ import annotations
 
 import json
-import os
-import tempfile
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
+from filelock import FileLock, Timeout
 from numpy.typing import NDArray
-from pydantic import ValidationError
+from pydantic import TypeAdapter
 
+from cembench.atomic import DRAFT, read_model, unwritable, write, write_model
 from cembench.errors import RecordError
 from cembench.records import SCHEMA_VERSION, Cell, Record
+from cembench.samples import Samples, read_map
 
 
 class Store:
@@ -35,7 +44,7 @@ class Store:
     def find(self, cell: Cell) -> Record | None:
         """What was recorded of this cell, if anything?"""
         path = self._record_path(cell)
-        return _read(path) if path.exists() else None
+        return _read_record(path) if path.exists() else None
 
     def records(self) -> list[Record]:
         """All records, by name of their files.
@@ -51,7 +60,11 @@ class Store:
                 f"{self.folder} holds no run: there is no folder {self.folder / 'records'}. "
                 "Make one with `cembench run`."
             )
-        return [_read(path) for path in sorted((self.folder / "records").glob("*.json"))]
+        return self.finished()
+
+    def finished(self) -> list[Record]:
+        """As :meth:`records`, but none where no cell is finished yet."""
+        return [_read_record(path) for path in sorted((self.folder / "records").glob("*.json"))]
 
     def save(
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
@@ -59,19 +72,87 @@ class Store:
         """Write the environment, the map and last the record, so that a record finds its map."""
         about = self.folder / "environments" / f"{record.environment}.json"
         if not about.exists():
-            _write(about, lambda file: file.write(json.dumps(environment, indent=2).encode()))
+            write(about, lambda file: file.write(json.dumps(environment, indent=2).encode()))
         if uv is not None:
-            _write(self._map_path(record.cell), lambda file: np.savez_compressed(file, uv=uv))
-        text = record.model_dump_json(indent=2)
-        _write(self._record_path(record.cell), lambda file: file.write(text.encode()))
+            write(self._map_path(record.cell), lambda file: np.savez_compressed(file, uv=uv))
+        else:
+            self._map_path(record.cell).unlink(missing_ok=True)
+        write_model(self._record_path(record.cell), record)
+        self.forget_samples(record.cell)
 
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
         """The recorded map (n,), or None where there is none."""
-        path = self._map_path(cell)
-        if not path.exists():
-            return None
-        with np.load(path) as archive:
-            return np.asarray(archive["uv"])
+        return read_map(self._map_path(cell))
+
+    def samples(self, cell: Cell, environment: str) -> Samples:
+        """What was measured so far of a cell in this environment, and goes on to be."""
+        return Samples(self.folder / "samples" / cell.label / environment)
+
+    def rounds_done(self, cell: Cell) -> int | None:
+        """How many rounds of an unfinished cell are kept? None where it was not begun."""
+        folders = list((self.folder / "samples" / cell.label).glob("*"))
+        return max((len(Samples(f).rounds()) for f in folders), default=None)
+
+    def forget_samples(self, cell: Cell) -> None:
+        """Delete what is kept of an unfinished cell."""
+        shutil.rmtree(self.folder / "samples" / cell.label, ignore_errors=True)
+
+    def save_plan(self, cells: Sequence[Cell]) -> None:
+        """Keep which cells were asked for, in order."""
+        text = _CELLS.dump_json(list(cells), indent=1)
+        write(self.folder / "plan.json", lambda file: file.write(text))
+
+    def plan(self) -> list[Cell]:
+        """The cells that were last asked for; none where no plan was kept."""
+        path = self.folder / "plan.json"
+        return _CELLS.validate_json(path.read_bytes()) if path.exists() else []
+
+    def environments(self) -> dict[str, dict[str, Any]]:
+        """What is known of the machines, by id."""
+        paths = sorted((self.folder / "environments").glob("*.json"))
+        return {path.stem: json.loads(path.read_bytes()) for path in paths}
+
+    @contextmanager
+    def locked(self, waiting: Callable[[], None] = lambda: None) -> Iterator[Path]:
+        """Be the only one who measures into this folder; gives a folder for temporary files.
+
+        Two runs at a time would slow each other and be wrong about both. So the second waits, after
+        calling `waiting`, and then finds done what the first did. The system frees the lock of a
+        run that is killed; what that left half-written is cleared away here.
+        """
+        lock = self._lock()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                waiting()
+                lock.acquire()
+        except OSError as error:
+            raise unwritable(self.folder / "lock", error) from error
+        scratch = self.folder / "scratch"
+        try:
+            shutil.rmtree(scratch, ignore_errors=True)
+            for draft in self.folder.rglob(f"{DRAFT}*"):
+                draft.unlink(missing_ok=True)
+            scratch.mkdir()
+            yield scratch
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+            lock.release()
+
+    def is_locked(self) -> bool:
+        """Is somebody measuring into this folder now?"""
+        if not (self.folder / "lock").exists():
+            return False
+        try:
+            with self._lock().acquire(timeout=0):
+                return False
+        except Timeout:
+            return True
+
+    def _lock(self) -> FileLock:
+        return FileLock(self.folder / "lock")
 
     def _record_path(self, cell: Cell) -> Path:
         return self.folder / "records" / f"{cell.label}.json"
@@ -79,35 +160,37 @@ class Store:
     def _map_path(self, cell: Cell) -> Path:
         return self.folder / "maps" / f"{cell.label}.npz"
 
+    def _samples(self, cell: Cell) -> Path:
+        return self.folder / "samples" / cell.label
 
-def _read(path: Path) -> Record:
-    try:
-        record = Record.model_validate_json(path.read_bytes())
-    except ValidationError as error:
-        raise RecordError(
-            f"{path} is not a record: {error.errors()[0]['msg']}. Delete it and run again."
-        ) from error
+
+def merge(runs: Iterable[Store], into: Store) -> int:
+    """Bring the records of several runs together; how many are there then?
+
+    Of a cell that several runs hold, one that ended ok counts before one that did not, and then
+    the later one.
+    """
+    best: dict[str, tuple[tuple[bool, str], Store, Record]] = {}
+    for run in [*runs, *([into] if (into.folder / "records").is_dir() else [])]:
+        for record in run.records():
+            rank = (record.outcome.status == "ok", record.started_at)
+            key = record.cell.key
+            if key not in best or best[key][0] < rank:
+                best[key] = (rank, run, record)
+    for _, run, record in best.values():
+        environment = run.environments().get(record.environment, {"id": record.environment})
+        into.save(record, run.uv(record.cell), environment)
+    return len(best)
+
+
+_CELLS = TypeAdapter(list[Cell])
+
+
+def _read_record(path: Path) -> Record:
+    record = read_model(path, Record)
     if record.schema_version != SCHEMA_VERSION:
         raise RecordError(
             f"{path} is of schema version {record.schema_version}; this cembench reads "
             f"{SCHEMA_VERSION}. Run again into another folder."
         )
     return record
-
-
-def _write(path: Path, fill: Callable[[BinaryIO], object]) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, draft = tempfile.mkstemp(dir=path.parent, prefix=".draft-")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                fill(file)
-                file.flush()
-                os.fsync(file.fileno())
-            Path(draft).replace(path)
-        finally:
-            Path(draft).unlink(missing_ok=True)
-    except OSError as error:
-        raise RecordError(
-            f"{path} cannot be written: {error.strerror or error}. Choose another folder with -o."
-        ) from error

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cembench.errors import RecordError
-from cembench.records import Cell, MeshFacts, Outcome, Record
-from cembench.store import Store
+from cembench.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.store import Store, merge
 
 
 @pytest.fixture
@@ -13,7 +13,8 @@ def record():
     cell = Cell(algorithm="cem", code_hash="c0de", mesh="lion", mesh_hash="abc")
     facts = MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0)
     metrics = {"dilatation_max": float("inf"), "flipped_triangles": 0}
-    outcome = Outcome(status="ok", seconds=(0.1, 0.3, 0.2), metrics=metrics)
+    rounds = tuple(Round(calls=(s,)) for s in (0.1, 0.3, 0.2))
+    outcome = Outcome(status="ok", rounds=rounds, metrics=metrics)
     return Record(
         cell=cell,
         title="CEM",
@@ -80,3 +81,72 @@ def test_nothing_is_half_written(record, tmp_path, monkeypatch):
     with pytest.raises(RecordError, match="cannot be written: No space left"):
         store.save(record, np.zeros(3, complex), {"id": "e"})
     assert not [path for path in (tmp_path / "run").rglob("*") if path.is_file()]
+
+
+def test_samples_are_kept_by_environment_until_the_record_is_there(record, tmp_path):
+    store = Store(tmp_path)
+    samples = store.samples(record.cell, "e")
+    assert (samples.check(), samples.uv(), samples.rounds()) == (None, None, {})
+    assert store.rounds_done(record.cell) is None
+    checked = record.outcome.model_copy(update={"metrics": {"flipped_triangles": 0}})
+    samples.save_check(checked, np.ones(3, complex))
+    for number in (1, 0):
+        samples.save_round(number, record.outcome.rounds[number])
+    assert samples.check() == checked
+    assert samples.rounds() == {0: record.outcome.rounds[0], 1: record.outcome.rounds[1]}
+    assert not store.samples(record.cell, "another machine").rounds()
+    assert store.rounds_done(record.cell) == 2
+    store.save(record, samples.uv(), {"id": "e"})
+    assert store.rounds_done(record.cell) is None
+
+
+def test_a_damaged_sample_is_said(record, tmp_path):
+    samples = Store(tmp_path).samples(record.cell, "e")
+    samples.save_round(0, record.outcome.rounds[0])
+    (samples.folder / "round-0.json").write_text("{}")
+    with pytest.raises(RecordError, match=r"round-0\.json is not a round: Field required"):
+        samples.rounds()
+
+
+def test_a_lock_is_held_by_one_and_what_a_killed_run_left_is_cleared(tmp_path):
+    store = Store(tmp_path / "run")
+    assert not store.is_locked()
+    (tmp_path / "run/scratch").mkdir(parents=True)
+    (tmp_path / "run/scratch/V.npy").touch()
+    (tmp_path / "run/.draft-x").touch()
+    with store.locked() as scratch:
+        assert not list(scratch.iterdir())
+        assert store.is_locked()
+    assert not store.is_locked()
+    assert [path.name for path in (tmp_path / "run").iterdir()] in ([], ["lock"])
+
+
+def test_a_folder_that_cannot_be_locked_is_said(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordError, match="cannot be written"), Store(tmp_path / "file").locked():
+        pass
+
+
+def test_merging_takes_the_ok_and_then_the_later_one(record, tmp_path):
+    def saved(name, **changes):
+        changed = {"started_at": name, **changes}
+        store = Store(tmp_path / name)
+        store.save(record.model_copy(update=changed), np.ones(3, complex), {"id": "e", "cpu": name})
+        return store
+
+    failed = Outcome(status="failed", cause="it did")
+    runs = [saved("2001"), saved("2003"), saved("2002"), saved("2004", outcome=failed)]
+    runs.append(saved("2000", cell=record.cell.model_copy(update={"threads": 2})))
+    into = Store(tmp_path / "all")
+    assert merge(runs, into) == 2
+    assert sorted(r.started_at for r in into.records()) == ["2000", "2003"]
+    assert into.uv(record.cell) is not None
+    assert merge([runs[0]], into) == 2
+    assert sorted(r.started_at for r in into.records()) == ["2000", "2003"]
+
+
+def test_the_plan_is_kept(record, tmp_path):
+    store = Store(tmp_path)
+    assert store.plan() == []
+    store.save_plan([record.cell])
+    assert store.plan() == [record.cell]

@@ -44,6 +44,11 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
         raise MeshError(f"{path}: {error}") from None
 
 
+def is_mesh_file(path: Path) -> bool:
+    """Is this a file whose name says that it can be read as a mesh?"""
+    return path.is_file() and path.suffix.lower() in _READERS
+
+
 def read_arrays(path: Path) -> Arrays:
     """What vertices (n, 3), triangles (m, 3) and notices does this file give, unchecked?
 

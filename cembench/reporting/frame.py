@@ -2,14 +2,50 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
+from cembench.comparison import (
+    circumstances,
+    compare,
+    is_unstable,
+    references,
+    seconds_interval,
+)
 from cembench.records import Record
+
+#: Whose times the others' are compared with, as in the paper's Table 2.
+REFERENCE = "cem"
+
+
+def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str, Any]]:
+    """All records of a run as flat rows, each compared with the reference on its surface."""
+    known = references(records, reference)
+    return [row(r) | _compared(r, known.get(circumstances(r.cell))) for r in records]
+
+
+def _compared(record: Record, reference: Record | None) -> dict[str, Any]:
+    """Speedup of the reference over this record's algorithm (Eq. 33), and the verdict on this."""
+    found = None
+    if reference is not None and reference.cell.algorithm != record.cell.algorithm:
+        found = compare(record, reference)
+    interval = found.speedup_interval if found else None
+    return {
+        "reference": reference.cell.algorithm if found and reference else None,
+        "speedup": found.speedup if found else None,
+        "speedup_low": interval.low if interval else None,
+        "speedup_high": interval.high if interval else None,
+        "verdict": found.verdict if found else None,
+    }
 
 
 def row(record: Record) -> dict[str, Any]:
-    """One record as one flat row; the metrics stand under their own names."""
+    """One record as one flat row; the metrics stand under their own names.
+
+    `seconds_raw` holds the figure of each round, `seconds_calls` every timed call by round.
+    """
     cell, outcome = record.cell, record.outcome
+    interval = seconds_interval(record)
     return {
         "mesh": cell.mesh,
         "algorithm": cell.algorithm,
@@ -22,8 +58,15 @@ def row(record: Record) -> dict[str, Any]:
         "iterations": outcome.iterations,
         "seconds": outcome.median_seconds,
         "seconds_raw": list(outcome.seconds),
+        "seconds_low": interval.low if interval else None,
+        "seconds_high": interval.high if interval else None,
+        "seconds_min": min((min(r.calls) for r in outcome.rounds), default=None),
+        "seconds_calls": [list(r.calls) for r in outcome.rounds],
+        "unstable": is_unstable(record),
         "phases": outcome.phases,
         "peak_memory_bytes": outcome.peak_memory_bytes,
+        "memory_increase_bytes": outcome.memory_increase_bytes,
+        "notes": list(outcome.notes),
         "energy_history": list(outcome.energy_history),
         "extras": outcome.extras,
         "vertices": record.mesh.vertices,
@@ -35,6 +78,8 @@ def row(record: Record) -> dict[str, Any]:
         "backend": cell.backend,
         "threads": cell.threads,
         "mesh_hash": cell.mesh_hash,
+        "repeats": cell.repeats,
         "environment": record.environment,
+        "started_at": record.started_at,
         "key": cell.key,
     }

@@ -10,26 +10,56 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from cembench.records import Record
+from cembench.comparison import (
+    UNSTABLE_WIDTH,
+    Change,
+    Comparison,
+    circumstances,
+    compare,
+    is_unstable,
+    references,
+    seconds_interval,
+)
+from cembench.estimate import Estimate
+from cembench.records import Cell, Record
 from cembench.registry import Algorithm, Surface
 
 _STYLES = {"ok": "green", "skipped": "yellow"}
 
 
-def results_table(records: Iterable[Record]) -> RenderableType:
-    """One line a cell, surfaces apart; the causes of what did not end ok stand below.
+def status_style(status: str) -> str:
+    """The colour of a status."""
+    return _STYLES.get(status, "bold red")
 
-    Mean and SD are of the angles' errors in degrees; seconds are the median of the timed calls.
+
+def results_table(records: Iterable[Record]) -> RenderableType:
+    """One line a cell, surfaces apart, policies of solving in tables of their own.
+
+    Mean and SD are of the angles' errors in degrees; seconds are the median of the rounds, and
+    beside them stands half the width of its 95 % interval in percent, with a ! where that is wide.
+    The causes of what did not end ok stand below.
     """
+    ordered = list(records)
+    policies = list(dict.fromkeys(record.cell.solves for record in ordered))
+    parts: list[RenderableType] = []
+    for policy in policies:
+        chosen = [record for record in ordered if record.cell.solves == policy]
+        if len(policies) > 1:
+            parts.append(Text(f"\nsolves: {policy}", style="bold"))
+        parts.append(_cells_table(chosen))
+    return Group(*parts, *_remarks(ordered))
+
+
+def _cells_table(records: Sequence[Record]) -> Table:
     table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=16)
+    longest = max((len(record.cell.algorithm) + 2 for record in records), default=9)
+    room = max(8, min(16, 80 - 53 - longest))
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=room)
     table.add_column("algorithm", no_wrap=True)
-    for heading in ("E_C", "mean", "SD", "folds", "iter", "seconds"):
+    for heading in ("E_C", "mean", "SD", "folds", "iter", "seconds", "±%"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
-    below: list[Text] = []
-    ordered = list(records)
-    for mesh, group in groupby(ordered, key=lambda record: record.cell.mesh):
+    for mesh, group in groupby(records, key=lambda record: record.cell.mesh):
         for k, record in enumerate(group):
             outcome = record.outcome
             table.add_row(
@@ -41,15 +71,109 @@ def results_table(records: Iterable[Record]) -> RenderableType:
                 _figure(record, "flipped_triangles", "d"),
                 "-" if outcome.iterations is None else str(outcome.iterations),
                 "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
-                Text(outcome.status, style=_STYLES.get(outcome.status, "bold red")),
+                _spread(record),
+                Text(outcome.status, style=status_style(outcome.status)),
             )
-            if outcome.cause:
-                below.append(Text(f"{mesh} / {record.cell.algorithm}: {outcome.cause}"))
         table.add_section()
-    if any(record.target != "disk" for record in ordered):
-        kinds = sorted({f"{r.cell.algorithm}: {r.target}" for r in ordered if r.target != "disk"})
-        below.insert(0, Text(f"* not a map to the disk ({'; '.join(kinds)})", style="dim"))
-    return Group(table, *below)
+    return table
+
+
+def _spread(record: Record) -> Text:
+    interval, figure = seconds_interval(record), record.outcome.median_seconds
+    if interval is None or not figure:
+        return Text("-")
+    half = f"{50 * (interval.high - interval.low) / figure:.0f}"
+    return Text(half + "!", style="yellow") if is_unstable(record) else Text(half)
+
+
+def _remarks(records: Sequence[Record]) -> list[Text]:
+    remarks = []
+    if any(record.target != "disk" for record in records):
+        kinds = sorted({f"{r.cell.algorithm}: {r.target}" for r in records if r.target != "disk"})
+        remarks.append(Text(f"* not a map to the disk ({'; '.join(kinds)})", style="dim"))
+    if any(is_unstable(record) for record in records):
+        words = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
+        remarks.append(Text(words, style="yellow"))
+    for record in records:
+        name = f"{record.cell.mesh} / {record.cell.algorithm}"
+        remarks += [Text(f"{name}: {note}") for note in record.outcome.notes]
+        if record.outcome.cause:
+            remarks.append(Text(f"{name}: {record.outcome.cause}"))
+    return remarks
+
+
+def speedups_table(records: Sequence[Record], reference: str) -> RenderableType | None:
+    """How much faster is the reference than the others (Eq. 33), and how sure is that?
+
+    None where there is nothing to compare.
+    """
+    known = references(records, reference)
+    several = len({record.cell.solves for record in records}) > 1
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=16)
+    table.add_column("algorithm", no_wrap=True)
+    for heading in ("speedup", "95 % interval"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column(f"than {reference}")
+    for record in records:
+        base = known.get(circumstances(record.cell))
+        if base is None or base.cell.algorithm == record.cell.algorithm:
+            continue
+        found = compare(record, base)
+        if found is not None:
+            name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
+            table.add_row(record.cell.mesh, name, *_comparison_cells(found))
+    if not table.row_count:
+        return None
+    title = f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)"
+    return Group(Text(title, style="bold"), table)
+
+
+def _comparison_cells(found: Comparison) -> tuple[str, str, str]:
+    i = found.speedup_interval
+    sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
+    return f"{found.speedup:.2f}", sure, found.verdict
+
+
+def changes_table(changes: Sequence[Change]) -> RenderableType:
+    """What became faster or slower from one run to another: the ratio of the seconds."""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=16)
+    table.add_column("algorithm", no_wrap=True)
+    for heading in ("before", "after", "ratio", "interval"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict")
+    for change in changes:
+        found, i = change.comparison, change.comparison.interval
+        table.add_row(
+            change.after.cell.mesh,
+            change.after.cell.algorithm,
+            f"{change.before.outcome.median_seconds:.3f}",
+            f"{change.after.outcome.median_seconds:.3f}",
+            f"{found.ratio:.2f}",
+            "unknown" if i is None else f"{i.low:.2f}-{i.high:.2f}",
+            found.verdict,
+        )
+    return table
+
+
+def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> RenderableType:
+    """What would be run: cell, triangles, what is there already, and what the rest will cost."""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=18)
+    for heading in ("algorithm", "solves"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("faces", "a call", "in all", "memory"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("from", no_wrap=True)
+    for cell, faces, state, cost in lines:
+        figures = ("-", "-", "-")
+        if cost is not None:
+            gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
+            figures = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
+        named = (cell.mesh, cell.algorithm, cell.solves, f"{faces:,}")
+        table.add_row(*named, *figures, state)
+    return table
 
 
 def _figure(record: Record, name: str, form: str) -> str:
@@ -89,6 +213,19 @@ def figures_table(record: Record) -> Table:
     if outcome.seconds:
         phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
         table.add_row("seconds", f"{outcome.median_seconds:.3f} ({phases})")
+    interval = seconds_interval(record)
+    if interval is not None:
+        sure = f"{interval.low:.4f} to {interval.high:.4f} s over {len(outcome.rounds)} rounds"
+        table.add_row("95 % interval", sure + (", unstable" if is_unstable(record) else ""))
+        table.add_row("fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s")
+    if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
+        table.add_row(
+            "memory",
+            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, "
+            f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
+        )
+    for note in outcome.notes:
+        table.add_row("note", note)
     return table
 
 

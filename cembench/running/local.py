@@ -1,120 +1,334 @@
-"""Run cells on this machine, each in a process of its own, one after the other."""
+"""Run cells on this machine: each process alone, in rounds, so that drift hits all alike.
+
+First every cell is checked: one call in a process of its own, whose map is verified and whose
+memory is measured. What ends ok is then timed in rounds. A round starts a fresh process for every
+cell, in a random order, so a machine that slows down slows them all, and what differs from process
+to process (addresses, hash seeds) is averaged over.
+"""
 
 from __future__ import annotations
 
-import json
-import os
+import random
 import signal
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+import uuid
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
+from time import monotonic
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.records import Outcome, Record
+from cembench.records import Outcome, Record, Round
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.plan import Task
+from cembench.running.process import Ending, Limits, run_limited
+from cembench.running.worker import Answer, Job
+from cembench.samples import Samples
 from cembench.store import Store
 
-#: Wall-clock seconds that a cell may take unless the user says otherwise.
+#: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
 
-Result = tuple[Record, NDArray[np.complex128] | None]
+
+@dataclass(frozen=True)
+class Options:
+    """How a run goes about its cells."""
+
+    #: A process that times has twice as long, as it makes two calls or more.
+    timeout: float = DEFAULT_TIMEOUT
+    #: Resident bytes of a process and all that it starts; None: no limit.
+    memory_bytes: int | None = None
+    #: Measure again what the store holds.
+    fresh: bool = False
+    #: Measure again what the store holds and did not end ok.
+    rerun_failed: bool = False
+    #: Of the random order within each round.
+    seed: int = 0
+
+    def measures_again(self, kept: Record) -> bool:
+        """Is a cell measured although there is this record of it?"""
+        return self.fresh or (self.rerun_failed and kept.outcome.status != "ok")
+
+
+class Watcher:
+    """Is told how a run goes on; a subclass shows it."""
+
+    def waits(self) -> None:
+        """Another run measures into the folder; this one goes on when that has ended."""
+
+    def begins(self, processes: int) -> None:
+        """So many processes are to be run."""
+
+    def starts(self, task: Task, step: str) -> None:
+        """A process starts."""
+
+    def ends(self, task: Task, step: str, seconds: float) -> None:
+        """It has ended, after so many seconds in all."""
+
+    def finished(self, task: Task, record: Record, *, kept: bool) -> None:
+        """A cell's record is there, from before if `kept`; no more processes are run for it."""
 
 
 def run_tasks(
-    tasks: Iterable[Task],
-    store: Store | None = None,
-    *,
-    timeout: float = DEFAULT_TIMEOUT,
-    fresh: bool = False,
-    before: Callable[[Task], None] = lambda task: None,
-) -> Iterator[tuple[Task, Record, NDArray[np.complex128] | None, bool]]:
-    """Measure the tasks one by one; yields each with its record, map, and whether it is resumed.
+    tasks: Sequence[Task],
+    store: Store,
+    options: Options | None = None,
+    watcher: Watcher | None = None,
+) -> list[Record]:
+    """Measure what the store does not hold yet; the records, in the tasks' order.
 
-    With a store, a cell that it already holds is not measured again unless `fresh`, and each new
-    record is on disk before the next cell starts. `before` is called as a task is taken up.
+    Each process's result is on disk before the next one starts. A second run into the same store
+    waits for the first.
     """
-    environment = describe_environment()
-    for task in tasks:
-        before(task)
-        kept = None if fresh or store is None else store.find(task.cell)
-        if kept is not None and store is not None:
-            yield task, kept, store.uv(task.cell), True
-            continue
-        record, uv = run_task(task, environment, timeout=timeout)
-        if store is not None:
-            store.save(record, uv, environment)
-        yield task, record, uv, False
+    options, watcher = options or Options(), watcher or Watcher()
+    with store.locked(watcher.waits) as scratch:
+        store.save_plan([task.cell for task in tasks])
+        run = _Run(store, _Launcher(scratch, options), options, watcher, describe_environment())
+        run.measure(tasks)
+    return [run.records[task.cell.label] for task in tasks]
 
 
-def run_task(task: Task, environment: dict[str, Any], *, timeout: float) -> Result:
-    """Measure one task in a process of its own; whatever happens to that, there is a record."""
-    started = datetime.now(UTC).isoformat(timespec="seconds")
-    with tempfile.TemporaryDirectory(prefix="cembench-cell-") as name:
-        folder = Path(name)
-        np.savez(folder / "mesh.npz", V=task.mesh.V, F=task.mesh.F)
-        job = {
-            "cell": task.cell.model_dump(),
-            "plugins": task.plugins,
-            "mesh_type": type(task.mesh).__name__,
-            "notices": task.mesh.notices,
-        }
-        (folder / "job.json").write_text(json.dumps(job))
-        outcome = _outcome_of_process(folder, task.cell.threads, timeout)
-        uv = None
-        if (folder / "uv.npz").exists() and outcome.metrics:
-            with np.load(folder / "uv.npz") as archive:
-                uv = np.asarray(archive["uv"])
-    record = Record(
+def map_once(
+    task: Task, options: Options | None = None
+) -> tuple[Record, NDArray[np.complex128] | None]:
+    """Call once in a process of its own, without warm-up, and keep nothing on disk.
+
+    The map is given if it has the right shape and is finite.
+    """
+    started = _now()
+    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
+        outcome, uv = _Launcher(Path(folder), options or Options()).check(task)
+    return _record(task, outcome, describe_environment()["id"], started), uv
+
+
+def in_random_order(tasks: Sequence[Task], seed: int, number: int) -> list[Task]:
+    """The order of a round: another one each round, the same for the same seed."""
+    return random.Random(f"{seed} {number}").sample(list(tasks), len(tasks))
+
+
+@dataclass
+class _Run:
+    """One sitting: what it has to do is worked out from what the store holds."""
+
+    store: Store
+    launcher: _Launcher
+    options: Options
+    watcher: Watcher
+    environment: dict[str, Any]
+    sitting: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
+    records: dict[str, Record] = field(default_factory=dict)
+
+    def measure(self, tasks: Sequence[Task]) -> None:
+        pending = [task for task in tasks if not self._is_kept(task)]
+        self.watcher.begins(sum(self._processes_left(task) for task in pending))
+        for task in pending:
+            self._check(task)
+        for number in range(max((task.cell.repeats for task in pending), default=0)):
+            open_ = [task for task in pending if self._lacks(task, number)]
+            for task in in_random_order(open_, self.options.seed, number):
+                self._time(task, number)
+
+    def _is_kept(self, task: Task) -> bool:
+        """Is there a record that stands? Samples of what is measured anew are forgotten."""
+        kept = self.store.find(task.cell)
+        if kept is not None or self.options.fresh:
+            self.store.forget_samples(task.cell)
+        if kept is None or self.options.measures_again(kept):
+            return False
+        self._finish(task, kept, kept=True)
+        return True
+
+    def _processes_left(self, task: Task) -> int:
+        samples = self._samples(task)
+        done = len(samples.rounds())
+        return (samples.check() is None) + task.cell.repeats - done
+
+    def _check(self, task: Task) -> None:
+        samples = self._samples(task)
+        outcome = samples.check()
+        if outcome is None:
+            with _Step(self.watcher, task, "check"):
+                outcome, uv = self.launcher.check(task)
+            samples.save_check(outcome, uv)
+        if outcome.status != "ok":
+            self._save(task, outcome.model_copy(update={"rounds": ()}))
+        else:
+            self._save_if_complete(task)
+
+    def _lacks(self, task: Task, number: int) -> bool:
+        return (
+            task.cell.label not in self.records
+            and number < task.cell.repeats
+            and number not in self._samples(task).rounds()
+        )
+
+    def _time(self, task: Task, number: int) -> None:
+        step = f"round {number + 1} of {task.cell.repeats}"
+        started = _now()
+        with _Step(self.watcher, task, step):
+            found = self.launcher.time(task)
+        if isinstance(found, Outcome):
+            cause = f"in {step}: {found.cause}"
+            self._save(task, found.model_copy(update={"cause": cause}))
+            return
+        origin = {"sitting": self.sitting, "started_at": started}
+        self._samples(task).save_round(number, found.model_copy(update=origin))
+        self._save_if_complete(task)
+
+    def _save_if_complete(self, task: Task) -> None:
+        samples = self._samples(task)
+        checked, rounds = samples.check(), tuple(samples.rounds().values())
+        if checked is not None and len(rounds) >= task.cell.repeats:
+            notes = (*checked.notes, *_notes(checked, rounds))
+            self._save(task, checked.model_copy(update={"rounds": rounds, "notes": notes}))
+
+    def _save(self, task: Task, outcome: Outcome) -> None:
+        started = outcome.rounds[0].started_at if outcome.rounds else _now()
+        record = _record(task, outcome, self.environment["id"], started)
+        self.store.save(record, self._samples(task).uv(), self.environment)
+        self._finish(task, record, kept=False)
+
+    def _finish(self, task: Task, record: Record, *, kept: bool) -> None:
+        self.records[task.cell.label] = record
+        self.watcher.finished(task, record, kept=kept)
+
+    def _samples(self, task: Task) -> Samples:
+        return self.store.samples(task.cell, self.environment["id"])
+
+
+@dataclass
+class _Step:
+    """Tells the watcher of a process's start and end."""
+
+    watcher: Watcher
+    task: Task
+    name: str
+    since: float = field(default_factory=monotonic)
+
+    def __enter__(self) -> None:
+        self.watcher.starts(self.task, self.name)
+
+    def __exit__(self, *_: object) -> None:
+        self.watcher.ends(self.task, self.name, monotonic() - self.since)
+
+
+def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[str, ...]:
+    differing = [k + 1 for k, r in enumerate(rounds) if r.uv_hash != checked.uv_hash]
+    if not differing:
+        return ()
+    named = ", ".join(map(str, differing))
+    return (f"not deterministic: other bits than in the check came out in rounds {named}",)
+
+
+def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Record:
+    return Record(
         cell=task.cell,
         title=task.algorithm.title,
         target=task.algorithm.target,
         mesh=task.facts,
         outcome=outcome,
-        environment=environment["id"],
+        environment=environment,
         started_at=started,
     )
-    return record, uv
 
 
-def _outcome_of_process(folder: Path, threads: int, timeout: float) -> Outcome:
-    log = folder / "log.txt"
-    with log.open("wb") as output:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "cembench.running.worker", str(folder)],
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            env=with_threads(threads),
-            start_new_session=True,  # so that its children can be ended with it
+@dataclass(frozen=True)
+class _Launcher:
+    """Starts the processes; `scratch` is where they and it exchange files."""
+
+    scratch: Path
+    options: Options
+
+    def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
+        """What one call comes to, and its map if that has the right shape and is finite."""
+        answer = self._run(task, "check", self.options.timeout)
+        if answer.outcome is None:
+            raise AssertionError("a check answers with an outcome")
+        uv_file = self.scratch / "uv.npy"
+        return answer.outcome, np.load(uv_file) if uv_file.exists() else None
+
+    def time(self, task: Task) -> Round | Outcome:
+        """The timed calls of one process, or how it ended without."""
+        answer = self._run(task, "time", 2 * self.options.timeout)
+        found = answer.round or answer.outcome
+        if found is None:
+            raise AssertionError("an answer holds one or the other")
+        return found
+
+    def _run(self, task: Task, what: Literal["check", "time"], seconds: float) -> Answer:
+        job_file, answer_file, uv_file, log = (
+            self.scratch / name for name in ("job.json", "answer.json", "uv.npy", "log.txt")
         )
-        try:
-            code = process.wait(timeout)
-        except subprocess.TimeoutExpired:
-            return Outcome(status="timeout", cause=f"not finished after {timeout:g} s")
-        finally:
-            _end_group(process)
-    if code == 0 and (folder / "outcome.json").exists():
-        return Outcome.model_validate_json((folder / "outcome.json").read_bytes())
-    said = log.read_bytes()[-4000:].decode(errors="replace").strip()
-    if code < 0:
-        cause = f"the process was ended by signal {signal.Signals(-code).name}"
+        for stale in (answer_file, uv_file, log):
+            stale.unlink(missing_ok=True)
+        job = Job(
+            task=what,
+            cell=task.cell,
+            plugins=task.plugins,
+            mesh_type=type(task.mesh).__name__,
+            notices=task.mesh.notices,
+            mesh_files=self._mesh_files(task),
+            answer_file=answer_file,
+            uv_file=uv_file,
+            memory_bytes=self.options.memory_bytes,
+        )
+        job_file.write_text(job.model_dump_json())
+        ending = run_limited(
+            [sys.executable, "-m", "cembench.running.worker", str(job_file)],
+            with_threads(task.cell.threads),
+            Limits(seconds, self.options.memory_bytes),
+            log,
+        )
+        if ending.limit is None and ending.code == 0 and answer_file.exists():
+            answer = Answer.model_validate_json(answer_file.read_bytes())
+            return _with_note(answer, ending.left)
+        uv_file.unlink(missing_ok=True)
+        return Answer(outcome=_outcome_of(ending, seconds, self.options.memory_bytes))
+
+    def _mesh_files(self, task: Task) -> tuple[Path, Path]:
+        """V and F on disk, written once for all cells of a surface."""
+        stem = task.cell.mesh_hash[:32]
+        files = self.scratch / f"{stem}-V.npy", self.scratch / f"{stem}-F.npy"
+        for file, array in zip(files, (task.mesh.V, task.mesh.F), strict=True):
+            if not file.exists():
+                np.save(file, array)
+        return files
+
+
+def _with_note(answer: Answer, left: int) -> Answer:
+    """Say of a checked call that it left processes behind."""
+    if answer.outcome is None or not left:
+        return answer
+    notes = (*answer.outcome.notes, f"left {left} processes behind, which were ended")
+    return Answer(outcome=answer.outcome.model_copy(update={"notes": notes}))
+
+
+def _outcome_of(ending: Ending, seconds: float, memory_bytes: int | None) -> Outcome:
+    """As what is a process recorded that left no answer?"""
+    said = ending.said or None
+    seen = ending.seen_bytes or None
+    if ending.limit == "time":
+        cause = f"not finished after {seconds:g} s"
+        return Outcome(status="timeout", cause=cause, traceback=said, peak_memory_bytes=seen)
+    if ending.limit == "memory":
+        cause = f"{_mib(ending.seen_bytes)} resident, the limit is {_mib(memory_bytes or 0)}"
+        return Outcome(status="out_of_memory", cause=cause, traceback=said, peak_memory_bytes=seen)
+    if ending.code < 0:
+        cause = f"the process was ended by signal {signal.Signals(-ending.code).name}"
     else:
-        cause = f"the process ended with code {code}" + (
-            f": {said.splitlines()[-1]}" if said else ""
-        )
-    return Outcome(status="failed", cause=cause, traceback=said or None)
+        last = f": {ending.said.splitlines()[-1]}" if ending.said else ""
+        cause = f"the process ended with code {ending.code}{last}"
+    return Outcome(status="failed", cause=cause, traceback=said, peak_memory_bytes=seen)
 
 
-def _end_group(process: subprocess.Popen[bytes]) -> None:
-    """End the process with all that it started, also when it has ended itself."""
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+def _mib(size: int) -> str:
+    return f"{size / 2**20:,.0f} MiB"
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")

@@ -8,8 +8,10 @@ ordering, factorisation and iterations, and nothing else. An algorithm's word is
 from __future__ import annotations
 
 import gc
+import hashlib
 import math
 import traceback
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,63 +23,37 @@ from cembench.geometry.cholesky import linear_algebra
 from cembench.geometry.mesh import TriangleMesh
 from cembench.metrics import all_metrics, flipped_triangles, image_area
 from cembench.parameterization import Parameterization
-from cembench.records import Outcome
+from cembench.records import Cell, Outcome, Round
 from cembench.registry import Algorithm
+from cembench.running.memory import Memory, memory_of_call
 
 #: How far from the unit circle a boundary vertex of a disk may lie.
 CIRCLE_TOLERANCE = 1e-9
+#: A process times further calls until they have taken so many seconds together, or are so many.
+ENOUGH_SECONDS = 0.2
+ENOUGH_CALLS = 5
+
+Call = Callable[[], tuple[Any, Timing]]
 
 
-def measure_cell(
-    algorithm: Algorithm,
-    arguments: dict[str, Any],
-    mesh: TriangleMesh,
-    *,
-    solves: str = "reuse",
-    backend: str = "cvxopt",
-    repeats: int = 1,
-    warm_up: bool = False,
+def check_cell(
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
 ) -> tuple[Outcome, NDArray[np.complex128] | None]:
-    """How long does it take, what comes out, and is that a valid map?
+    """What comes out of one call, is that a valid map, and how much memory does it take?
 
     Never raises for what the algorithm does: :class:`~cembench.errors.AlgorithmFailed` or any other
-    exception is a status with its cause. The second value is the map, also that of an invalid one
-    if it has the right shape and is finite.
+    exception is a status with its cause. The one round of the outcome is this call, without
+    warm-up. The second value is the map, also that of an invalid one if it has the right shape and
+    is finite.
     """
     before = mesh.hash
-
-    def call() -> Any:
-        fresh = mesh.fresh()
-        return measure(lambda: algorithm.function(fresh, **arguments))
-
-    results: list[tuple[Any, Timing]] = []
+    call = _call(algorithm, mesh, cell)
     try:
-        with linear_algebra(solves, backend):
-            if warm_up:
-                call()
-            for _ in range(repeats):
-                gc.collect()
-                gc.disable()
-                try:
-                    results.append(call())
-                finally:
-                    gc.enable()
-    except AlgorithmFailed as error:
-        cause = "; ".join([str(error), *_broken_premises(mesh)])
-        return Outcome(status="failed", cause=cause), None
-    except MemoryError as error:
-        return Outcome(status="out_of_memory", cause=str(error) or "MemoryError"), None
+        with linear_algebra(cell.solves, cell.backend):
+            (found, timing), memory = memory_of_call(lambda: _without_collector(call))
     except Exception as error:
-        cause = f"{type(error).__name__}: {error}"
-        return Outcome(status="failed", cause=cause, traceback=traceback.format_exc()), None
-
-    found = results[-1][0]
-    timings = sorted((timing for _, timing in results), key=lambda timing: timing.total)
-    outcome = Outcome(
-        status="invalid",
-        seconds=tuple(timing.total for _, timing in results),
-        phases=timings[(len(timings) - 1) // 2].phases,
-    )
+        return outcome_of_error(error, mesh), None
+    outcome = _with_memory(Outcome(status="invalid", rounds=(_round([timing]),)), memory)
     unusable = _unusable(found, mesh)
     if unusable:
         return outcome.model_copy(update={"cause": unusable}), None
@@ -92,8 +68,71 @@ def measure_cell(
         "iterations": found.iterations,
         "energy_history": tuple(found.energy_history),
         "extras": found.extras,
+        "uv_hash": _hash(found.uv),
     }
     return outcome.model_copy(update=described), found.uv
+
+
+def time_cell(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Round:
+    """How long does a call take, after one to warm up? Several calls where they are short.
+
+    Raises whatever the algorithm raises.
+    """
+    call = _call(algorithm, mesh, cell)
+    timings: list[Timing] = []
+    with linear_algebra(cell.solves, cell.backend):
+        call()
+        while len(timings) < ENOUGH_CALLS and sum(t.total for t in timings) < ENOUGH_SECONDS:
+            found, timing = _without_collector(call)
+            timings.append(timing)
+    return _round(timings, _hash(getattr(found, "uv", None)))
+
+
+def outcome_of_error(error: Exception, mesh: TriangleMesh) -> Outcome:
+    """As what is a call on this mesh recorded that raised this?"""
+    if isinstance(error, AlgorithmFailed):
+        cause = "; ".join([str(error), *_broken_premises(mesh)])
+        return Outcome(status="failed", cause=cause)
+    told = "".join(traceback.format_exception(error))
+    if isinstance(error, MemoryError):
+        return Outcome(
+            status="out_of_memory", cause=str(error) or "memory was refused", traceback=told
+        )
+    return Outcome(status="failed", cause=f"{type(error).__name__}: {error}", traceback=told)
+
+
+def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
+    arguments = algorithm.arguments(cell.parameters)
+
+    def call() -> tuple[Any, Timing]:
+        fresh = mesh.fresh()
+        return measure(lambda: algorithm.function(fresh, **arguments))
+
+    return call
+
+
+def _without_collector(call: Call) -> tuple[Any, Timing]:
+    gc.collect()
+    gc.disable()
+    try:
+        return call()
+    finally:
+        gc.enable()
+
+
+def _round(timings: list[Timing], uv_hash: str | None = None) -> Round:
+    middle = sorted(timings, key=lambda timing: timing.total)[(len(timings) - 1) // 2]
+    calls = tuple(timing.total for timing in timings)
+    return Round(calls=calls, phases=middle.phases, uv_hash=uv_hash)
+
+
+def _with_memory(outcome: Outcome, memory: Memory) -> Outcome:
+    found = {"peak_memory_bytes": memory.peak, "memory_increase_bytes": memory.increase}
+    return outcome.model_copy(update=found)
+
+
+def _hash(uv: Any) -> str | None:
+    return hashlib.sha256(uv.tobytes()).hexdigest() if isinstance(uv, np.ndarray) else None
 
 
 def _unusable(found: Any, mesh: TriangleMesh) -> str | None:

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from cembench.errors import MeshError, ParameterError
-from cembench.geometry.files import read_mesh
+from cembench.geometry.files import is_mesh_file, read_mesh
 from cembench.geometry.laplacian import non_delaunay_share
 from cembench.geometry.mesh import TriangleMesh
-from cembench.records import Cell, MeshFacts
+from cembench.records import DEFAULT_ROUNDS, Cell, MeshFacts
 from cembench.registry import Algorithm, Registry
 
 
@@ -34,7 +34,7 @@ class How:
     solves: str = "reuse"
     backend: str = "cvxopt"
     threads: int = 1
-    repeats: int = 3
+    repeats: int = DEFAULT_ROUNDS
 
 
 def plan_cells(
@@ -137,6 +137,22 @@ def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
         except MeshError:
             continue
     return read_mesh(path, kinds[0])
+
+
+def mesh_files(folder: Path) -> list[Path]:
+    """The mesh files of a folder, by name.
+
+    Raises
+    ------
+    MeshError
+        There is no such folder, or no mesh in it.
+
+    """
+    found = sorted(path for path in folder.glob("*") if is_mesh_file(path))
+    if not found:
+        why = "holds no OBJ, OFF, PLY or STL file" if folder.is_dir() else "is no folder"
+        raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
+    return found
 
 
 def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:

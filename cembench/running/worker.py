@@ -1,58 +1,83 @@
-"""The process that measures one cell: ``python -m cembench.running.worker FOLDER``.
+"""The process that measures a cell once: ``python -m cembench.running.worker JOB.json``.
 
-FOLDER holds ``job.json`` (the cell and the plug-ins) and ``mesh.npz`` (a mesh that was checked);
-the worker adds ``uv.npz`` and last ``outcome.json``. If that file is missing, the worker died.
+The job names the mesh's arrays, which were checked, and the file to write. If that file is not
+there in the end, the worker died.
 """
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from pydantic import BaseModel
 
 from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.records import Cell
-from cembench.registry import load_registry
-from cembench.running.measure import measure_cell
+from cembench.records import Cell, Outcome, Round
+from cembench.registry import Algorithm, load_registry
+from cembench.running.measure import check_cell, outcome_of_error, time_cell
+from cembench.running.process import die_with_parent, limit_memory
 
 _MESH_TYPES = {kind.__name__: kind for kind in (TriangleMesh, DiskMesh, HoledMesh)}
 
 
-def main(folder: Path) -> None:
-    """Measure the cell that the folder describes."""
-    job = json.loads((folder / "job.json").read_text())
-    cell = Cell.model_validate(job["cell"])
-    algorithm = load_registry(job["plugins"]).algorithm(cell.algorithm)
-    with np.load(folder / "mesh.npz") as arrays:
-        V, F = arrays["V"], arrays["F"]
+class Job(BaseModel):
+    """What one process has to do."""
+
+    #: "check": one call, its map and its memory. "time": warmed up, as often as is worth it.
+    task: Literal["check", "time"]
+    cell: Cell
+    plugins: tuple[str, ...]
+    mesh_type: str
+    notices: tuple[str, ...]
+    #: Of V and F, as ``.npy``.
+    mesh_files: tuple[Path, Path]
+    #: Takes an :class:`Answer`.
+    answer_file: Path
+    #: Takes the map of a check.
+    uv_file: Path
+    memory_bytes: int | None = None
+
+
+class Answer(BaseModel):
+    """What a process found: the outcome of a check or of what failed, or the timed calls."""
+
+    outcome: Outcome | None = None
+    round: Round | None = None
+
+
+def main(path: Path) -> None:
+    """Do the job that the file describes."""
+    die_with_parent()
+    job = Job.model_validate_json(path.read_bytes())
+    if job.memory_bytes is not None:
+        limit_memory(job.memory_bytes)
+    answer = _time(job) if job.task == "time" else _check(job)
+    job.answer_file.write_text(answer.model_dump_json())
+
+
+def _check(job: Job) -> Answer:
+    outcome, uv = check_cell(*_loaded(job), job.cell)
+    if uv is not None:
+        np.save(job.uv_file, uv)
+    return Answer(outcome=outcome)
+
+
+def _time(job: Job) -> Answer:
+    algorithm, mesh = _loaded(job)
+    try:
+        return Answer(round=time_cell(algorithm, mesh, job.cell))
+    except Exception as error:
+        return Answer(outcome=outcome_of_error(error, mesh))
+
+
+def _loaded(job: Job) -> tuple[Algorithm, TriangleMesh]:
+    algorithm = load_registry(job.plugins).algorithm(job.cell.algorithm)
+    V, F = (np.load(file) for file in job.mesh_files)
     V.setflags(write=False)
     F.setflags(write=False)
-    mesh = _MESH_TYPES[job["mesh_type"]](V, F, cell.mesh, tuple(job["notices"]))
-    outcome, uv = measure_cell(
-        algorithm,
-        algorithm.arguments(cell.parameters),
-        mesh,
-        solves=cell.solves,
-        backend=cell.backend,
-        repeats=cell.repeats,
-        warm_up=cell.repeats > 1,
-    )
-    if uv is not None:
-        np.savez(folder / "uv.npz", uv=uv)
-    outcome = outcome.model_copy(update={"peak_memory_bytes": peak_memory_bytes()})
-    (folder / "outcome.json").write_text(outcome.model_dump_json())
-
-
-def peak_memory_bytes() -> int | None:
-    """The largest resident set this process has had; None where the system does not tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak if sys.platform == "darwin" else peak * 1024
+    return algorithm, _MESH_TYPES[job.mesh_type](V, F, job.cell.mesh, job.notices)
 
 
 if __name__ == "__main__":

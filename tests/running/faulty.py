@@ -1,7 +1,9 @@
 """Algorithms that break each promise once."""
 
 import os
+import re
 import signal
+import subprocess
 import sys
 import time
 
@@ -94,3 +96,81 @@ def writes(mesh: DiskMesh) -> Parameterization:
     mesh.V.setflags(write=True)
     mesh.V[0] += 1
     return Parameterization(uv)
+
+
+@algorithm("spins", title="Spins in C", target="disk")
+def spins(mesh: DiskMesh) -> Parameterization:
+    re.match("(a|a)*b", "a" * 60)
+
+
+@algorithm("hoards", title="Allocates without end", target="disk")
+def hoards(mesh: DiskMesh) -> Parameterization:
+    kept = []
+    while True:
+        kept.append(np.ones(2**20))
+
+
+@algorithm("talks", title="Prints megabytes", target="disk")
+def talks(mesh: DiskMesh) -> Parameterization:
+    for _ in range(64):
+        sys.stdout.write("la " * 2**18)
+    sys.stdout.flush()
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("talks-and-dies", title="Prints megabytes and dies", target="disk")
+def talks_and_dies(mesh: DiskMesh) -> Parameterization:
+    talks(mesh)
+    sys.stdout.write("\nthe last words\n")
+    sys.stdout.flush()
+    os._exit(7)
+
+
+def leave_a_child(**how):
+    return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], **how).pid
+
+
+@algorithm("forks", title="Leaves a child", target="disk")
+def forks(mesh: DiskMesh) -> Parameterization:
+    return Parameterization(good_map(mesh), extras={"child": leave_a_child()})
+
+
+@algorithm("detaches", title="Leaves a child in a session of its own", target="disk")
+def detaches(mesh: DiskMesh) -> Parameterization:
+    child = leave_a_child(start_new_session=True)
+    return Parameterization(good_map(mesh), extras={"child": child})
+
+
+@algorithm("detaches-twice", title="Leaves the child of a child that is gone", target="disk")
+def detaches_twice(mesh: DiskMesh) -> Parameterization:
+    script = (
+        "import subprocess, sys;"
+        "print(subprocess.Popen([sys.executable, '-c', 'import time; time.sleep(600)'],"
+        "start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).pid)"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    return Parameterization(good_map(mesh), extras={"child": int(run.stdout)})
+
+
+@algorithm("hoards-in-a-child", title="A child allocates without end", target="disk")
+def hoards_in_a_child(mesh: DiskMesh) -> Parameterization:
+    script = "kept = []\nwhile True: kept.append(b'x' * 2**22)"
+    subprocess.run([sys.executable, "-c", script], check=True)
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("by-chance", title="By chance", target="disk")
+def by_chance(mesh: DiskMesh) -> Parameterization:
+    turn = np.exp(1j * np.random.default_rng().uniform())
+    return Parameterization(turn * good_map(mesh))
+
+
+@algorithm("fails-later", title="Fails when called again", target="disk")
+def fails_later(mesh: DiskMesh) -> Parameterization:
+    if later:
+        raise ZeroDivisionError("by habit")
+    later.append(True)
+    return Parameterization(good_map(mesh))
+
+
+later = []

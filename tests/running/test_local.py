@@ -1,35 +1,34 @@
+import re
+import time
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from cembench.registry import load_registry
 from cembench.running.environment import describe_environment, with_threads
-from cembench.running.local import run_task, run_tasks
+from cembench.running.local import Options, Watcher, in_random_order, map_once, run_tasks
 from cembench.running.plan import How, plan_cells
 from cembench.store import Store
 from meshes_gen.flat_disk import flat_disk
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
+MEMORY = 500 * 2**20
 
 
-@pytest.fixture(scope="module")
-def environment():
-    return describe_environment()
-
-
-def task_of(name, **how):
-    chosen = load_registry([FAULTY]).algorithm(name)
-    (task,) = plan_cells([chosen], [flat_disk(600)], {}, How(repeats=1, **how), [FAULTY])
-    return task
+def tasks_of(*names, faces=600, **how):
+    registry = load_registry([FAULTY])
+    chosen = [registry.algorithm(name) for name in names]
+    return plan_cells(chosen, [flat_disk(faces)], {}, How(**{"repeats": 1, **how}), [FAULTY])
 
 
 @pytest.mark.parametrize(
     ("name", "status", "cause"),
     [
-        ("sleeps", "timeout", "not finished after 4 s"),
         ("segfaults", "failed", "signal SIGSEGV"),
         ("exits", "failed", "ended with code 7: the last words"),
+        ("talks-and-dies", "failed", "ended with code 7: the last words"),
         ("raises", "failed", "ZeroDivisionError: by nothing"),
         ("gives-up", "failed", "it did not converge"),
         ("nan", "invalid", "NaN or infinite at 1 vertices, the first being 7"),
@@ -42,10 +41,9 @@ def task_of(name, **how):
         ("writes", "invalid", "changed the mesh"),
     ],
 )
-def test_every_fault_is_a_status_with_its_cause(name, status, cause, environment):
-    import re
-
-    record, uv = run_task(task_of(name), environment, timeout=4 if name == "sleeps" else 60)
+def test_every_fault_is_a_status_with_its_cause(name, status, cause):
+    (task,) = tasks_of(name)
+    record, uv = map_once(task)
     assert record.outcome.status == status
     assert re.search(cause, record.outcome.cause), record.outcome.cause
     if name in ("raises", "exits"):
@@ -53,31 +51,133 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause, environment
     assert (uv is None) == (name not in ("mirrored", "off-circle", "folded", "writes"))
 
 
-def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(environment):
-    task = task_of("good")
-    record, uv = run_task(task, environment, timeout=60)
+def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
+    expected = {
+        "sleeps": ("timeout", "not finished after 3 s"),
+        "spins": ("timeout", "not finished after 3 s"),
+        "hoards": ("out_of_memory", "the limit is 500 MiB"),
+        "hoards-in-a-child": ("out_of_memory", "the limit is 500 MiB"),
+        "talks": ("ok", None),
+        "forks": ("ok", None),
+        "detaches": ("ok", None),
+        "detaches-twice": ("ok", None),
+        "by-chance": ("ok", None),
+        "fails-later": ("failed", "in round 1 of 1: ZeroDivisionError: by habit"),
+        "good": ("ok", None),
+        "harmonic-circle": ("ok", None),
+    }
+    started = time.monotonic()
+    options = Options(timeout=3, memory_bytes=MEMORY)
+    found = run_tasks(tasks_of(*expected), Store(tmp_path), options)
+    outcomes = {record.cell.algorithm: record.outcome for record in found}
+    assert {name: o.status for name, o in outcomes.items()} == {
+        name: status for name, (status, _) in expected.items()
+    }
+    for name, (status, cause) in expected.items():
+        assert cause is None or cause in outcomes[name].cause
+        assert (outcomes[name].median_seconds is not None) == (status == "ok")
+    assert MEMORY < outcomes["hoards"].peak_memory_bytes < 4 * MEMORY
+    for name in ("forks", "detaches", "detaches-twice"):
+        assert not psutil.pid_exists(outcomes[name].extras["child"]) or (
+            psutil.Process(outcomes[name].extras["child"]).status() == psutil.STATUS_ZOMBIE
+        )
+        assert "left 1 processes behind" in outcomes[name].notes[0]
+    assert outcomes["by-chance"].notes == (
+        "not deterministic: other bits than in the check came out in rounds 1",
+    )
+    assert outcomes["good"].notes == ()
+    assert time.monotonic() - started < 60
+
+
+def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(tmp_path):
+    (task,) = tasks_of("good", faces=6000, repeats=2)
+    store = Store(tmp_path)
+    (record,) = run_tasks([task], store)
     outcome = record.outcome
     assert (outcome.status, outcome.cause) == ("ok", None)
+    assert [len(r.calls) > 1 for r in outcome.rounds] == [True, True]
+    assert outcome.median_seconds == min(outcome.seconds)
     assert sum(outcome.phases.values()) == pytest.approx(outcome.median_seconds, rel=0.02)
     assert outcome.extras == {"said": 1}
     assert outcome.peak_memory_bytes > 2**24
-    np.testing.assert_array_equal(uv, task.algorithm.function(task.mesh).uv)
+    assert 0 <= outcome.memory_increase_bytes < outcome.peak_memory_bytes
+    np.testing.assert_array_equal(store.uv(task.cell), task.algorithm.function(task.mesh).uv)
 
 
 def test_what_is_in_the_store_is_not_measured_again(tmp_path):
+    class Noting(Watcher):
+        def __init__(self):
+            self.steps, self.kept = [], []
+
+        def starts(self, task, step):
+            self.steps.append((task.cell.algorithm, step))
+
+        def finished(self, task, record, *, kept):
+            self.kept.append(kept)
+
+    def run(tasks, **options):
+        noting = Noting()
+        return run_tasks(tasks, store, Options(**options), noting), noting
+
     store = Store(tmp_path / "run")
-    tasks = [task_of("good"), task_of("gives-up")]
-    first = list(run_tasks(tasks, store))
-    assert [resumed for *_, resumed in first] == [False, False]
-    again = list(run_tasks(tasks, store))
-    assert [resumed for *_, resumed in again] == [True, True]
-    assert [r for _, r, *_ in again] == [r for _, r, *_ in first]
-    np.testing.assert_array_equal(again[0][2], first[0][2])
-    fresh = list(run_tasks(tasks[:1], store, fresh=True))
-    assert fresh[0][1].outcome.seconds != first[0][1].outcome.seconds
-    backslash = list(run_tasks([task_of("good", solves="backslash")], store))
-    assert [resumed for *_, resumed in backslash] == [False]
+    tasks = tasks_of("good", "gives-up")
+    first, noted = run(tasks)
+    assert noted.steps == [("good", "check"), ("gives-up", "check"), ("good", "round 1 of 1")]
+    assert noted.kept == [False, False]
+    again, noted = run(tasks)
+    assert (noted.steps, noted.kept, again) == ([], [True, True], first)
+    _, noted = run(tasks, rerun_failed=True)
+    assert noted.steps == [("gives-up", "check")]
+    fresh, noted = run(tasks[:1], fresh=True)
+    assert fresh[0].outcome.seconds != first[0].outcome.seconds
+    assert len(noted.steps) == 2
+    _, noted = run(tasks_of("good", solves="backslash"))
+    assert noted.kept == [False]
     assert len(store.records()) == 3
+
+
+def test_rounds_go_over_all_cells_in_turn(tmp_path):
+    steps = []
+
+    class Noting(Watcher):
+        def starts(self, task, step):
+            steps.append(step)
+
+    run_tasks(tasks_of("good", "by-chance", repeats=2), Store(tmp_path), None, Noting())
+    assert steps == ["check"] * 2 + ["round 1 of 2"] * 2 + ["round 2 of 2"] * 2
+
+
+def test_the_order_within_a_round_is_random_and_set_by_the_seed():
+    cells = list(range(10))
+    first, again, next_round, other = (
+        in_random_order(cells, seed, number) for seed, number in ((0, 0), (0, 0), (0, 1), (1, 0))
+    )
+    assert sorted(first) == cells
+    assert first == again
+    assert first != next_round
+    assert first != other
+
+
+def test_samples_of_a_killed_run_are_gone_on_with(tmp_path):
+    class KilledError(Exception):
+        pass
+
+    class Killing(Watcher):
+        def starts(self, task, step):
+            if step == "round 2 of 2":
+                raise KilledError
+
+    store = Store(tmp_path)
+    tasks = tasks_of("good", repeats=2)
+    with pytest.raises(KilledError):
+        run_tasks(tasks, store, None, Killing())
+    samples = store.samples(tasks[0].cell, describe_environment()["id"])
+    (kept,) = samples.rounds().values()
+    assert not store.finished()
+    (record,) = run_tasks(tasks, store)
+    assert record.outcome.rounds[0] == kept
+    assert record.outcome.rounds[1].sitting != kept.sitting
+    assert not list((tmp_path / "samples").iterdir())
 
 
 def test_an_edited_plugin_is_a_new_cell(tmp_path):
@@ -97,7 +197,8 @@ def test_threads_are_pinned_for_the_cell_s_process():
     assert {pinned[k] for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")} == {"3"}
 
 
-def test_the_environment_says_what_a_figure_depends_on(environment):
+def test_the_environment_says_what_a_figure_depends_on():
+    environment = describe_environment()
     assert environment["libraries"]["cvxopt"]
     assert environment["memory_bytes"] > 0
     assert environment == describe_environment()

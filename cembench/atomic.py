@@ -1,0 +1,78 @@
+"""Files that are whole or not there, whenever the process that writes them is killed."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from cembench.errors import RecordError
+
+M = TypeVar("M", bound=BaseModel)
+
+#: How the names of files begin that are not finished.
+DRAFT = ".draft-"
+
+
+def read_model(path: Path, model: type[M]) -> M:
+    """Read what :func:`write_model` wrote; :class:`RecordError` says which file is damaged."""
+    try:
+        return model.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        raise RecordError(
+            f"{path} is not a {model.__name__.lower()}: {error.errors()[0]['msg']}. "
+            "Delete it and run again."
+        ) from error
+
+
+def write_model(path: Path, model: BaseModel) -> None:
+    """Write a model as JSON."""
+    text = model.model_dump_json(indent=2)
+    write(path, lambda file: file.write(text.encode()))
+
+
+def write(path: Path, fill: Callable[[BinaryIO], object]) -> None:
+    """Let `fill` write a draft, flush it to disk, and only then give it its name.
+
+    Raises
+    ------
+    RecordError
+        The disk is full, or the place cannot be written to.
+
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, draft = tempfile.mkstemp(dir=path.parent, prefix=DRAFT)
+        try:
+            with os.fdopen(handle, "wb") as file:
+                fill(file)
+                file.flush()
+                os.fsync(file.fileno())
+            Path(draft).replace(path)
+            _flush_folder(path.parent)
+        finally:
+            Path(draft).unlink(missing_ok=True)
+    except OSError as error:
+        raise unwritable(path, error) from error
+
+
+def unwritable(path: Path, error: OSError) -> RecordError:
+    """What to say of a file that could not be written."""
+    return RecordError(
+        f"{path} cannot be written: {error.strerror or error}. Choose another folder with -o."
+    )
+
+
+def _flush_folder(folder: Path) -> None:
+    """Let the renaming itself reach the disk, where the system can say so of a folder."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

@@ -1,0 +1,210 @@
+"""Run a command under limits, and leave nothing of it behind.
+
+The limits hold for everything that the command starts. Its descendants are followed while it runs,
+and recognised afterwards by a mark in their environment, so that also one that left the process
+group, or whose parent is gone, is ended.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import uuid
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from time import monotonic, sleep
+
+import psutil
+
+#: Seconds between two looks at the memory. Each look takes milliseconds of another core.
+LOOK_EVERY = 0.1
+#: How much of what a process says is kept: the end of it.
+KEPT_OUTPUT_BYTES = 4000
+#: A file of output is emptied when it is larger than this.
+_LARGEST_LOG_BYTES = 2**20
+_MARK = "CEMBENCH_PROCESS"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a process and all that it starts may take."""
+
+    #: Wall-clock seconds.
+    seconds: float
+    #: Resident bytes, added up over the tree of processes; None: all that there is.
+    memory_bytes: int | None = None
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a process ended: by itself with a code (negative: a signal), or at a limit."""
+
+    code: int
+    #: "time" or "memory" if it was ended for that.
+    limit: str | None
+    #: Largest resident bytes of the tree that a look found; 0 if it ended before the first.
+    seen_bytes: int
+    #: The end of what it wrote to standard output and error.
+    said: str
+    #: How many processes it left behind, which were ended.
+    left: int = 0
+
+
+def run_limited(
+    command: Sequence[str], environment: Mapping[str, str], limits: Limits, log: Path
+) -> Ending:
+    """Run a command until it ends or reaches a limit; then end all that it has started.
+
+    `log` is a file for its output; however much that is, little is kept.
+    """
+    mark = uuid.uuid4().hex
+    limit, seen = None, 0
+    with log.open("ab") as output:  # appending: what is cut off stays off
+        process = subprocess.Popen(
+            command,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            env={**environment, _MARK: mark},
+            start_new_session=True,
+        )
+        tree = {process.pid: psutil.Process(process.pid)}
+        said = b""
+        deadline = monotonic() + limits.seconds
+        try:
+            while not _ended_within(process, min(LOOK_EVERY, max(deadline - monotonic(), 0))):
+                _follow(tree, process.pid)
+                seen = max(seen, sum(map(_resident_bytes, tree.values())))
+                said = _drain(log, said)
+                if limits.memory_bytes is not None and seen > limits.memory_bytes:
+                    limit = "memory"
+                elif monotonic() >= deadline:
+                    limit = "time"
+                if limit:
+                    break
+        finally:
+            code, left = _end_all(process, tree, mark)
+    said = (said + log.read_bytes())[-KEPT_OUTPUT_BYTES:]
+    return Ending(code, limit, seen, said.decode(errors="replace").strip(), left)
+
+
+def _ended_within(process: subprocess.Popen[bytes], seconds: float) -> bool:
+    """Wait at most so long; on Linux the end of the process wakes us at once."""
+    if process.poll() is not None:
+        return True
+    if hasattr(os, "pidfd_open"):
+        handle = os.pidfd_open(process.pid)
+        try:
+            select.select([handle], [], [], seconds)
+        finally:
+            os.close(handle)
+        return process.poll() is not None
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(seconds)
+    return process.poll() is not None
+
+
+def _follow(tree: dict[int, psutil.Process], root: int) -> None:
+    """Add what the processes of the tree have started since."""
+    for known in list(tree.values()):
+        with suppress(psutil.Error):
+            for child in known.children(recursive=known.pid == root):
+                tree.setdefault(child.pid, child)
+
+
+def _resident_bytes(process: psutil.Process) -> int:
+    try:
+        resident: int = process.memory_info().rss
+    except psutil.Error:
+        return 0
+    return resident
+
+
+def _drain(log: Path, said: bytes) -> bytes:
+    """Keep the end of a log that grows too large, and empty the file."""
+    if log.stat().st_size <= _LARGEST_LOG_BYTES:
+        return said
+    with log.open("rb") as file:
+        file.seek(-KEPT_OUTPUT_BYTES, os.SEEK_END)
+        said = file.read()
+    os.truncate(log, 0)
+    return said
+
+
+def _end_all(
+    process: subprocess.Popen[bytes], tree: dict[int, psutil.Process], mark: str
+) -> tuple[int, int]:
+    """End the process and every descendant, twice: one may have started another meanwhile.
+
+    Gives the code that the process ended with and the number of descendants that were there.
+    """
+    code, left = process.poll(), set()
+    for _ in range(2):
+        others = [one for one in {*tree.values(), *_marked(mark)} if one.pid != process.pid]
+        left |= {one.pid for one in others if _lives(one)}
+        if os.name == "posix":
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+        elif code is None:
+            process.kill()
+        for one in others:
+            with suppress(psutil.Error):
+                one.kill()
+        patience = monotonic() + 1
+        while any(map(_lives, others)) and monotonic() < patience:
+            sleep(0.01)
+    ended = process.wait()
+    return (ended if code is None else code), len(left)
+
+
+def _lives(process: psutil.Process) -> bool:
+    """Does it still do something? One that nobody has asked for its code does not."""
+    try:
+        return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
+    except psutil.Error:
+        return False
+
+
+def _marked(mark: str) -> list[psutil.Process]:
+    """The processes whose environment holds the mark, whoever their parent is by now."""
+    found = []
+    for one in psutil.process_iter():
+        with suppress(psutil.Error, OSError):
+            if one.environ().get(_MARK) == mark:
+                found.append(one)
+    return found
+
+
+def die_with_parent() -> None:
+    """Let the system end this process when its parent is killed (Linux; elsewhere nothing)."""
+    if sys.platform != "linux":
+        return
+    import ctypes
+
+    set_parent_death_signal = 1
+    parent = os.getppid()
+    ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
+    if os.getppid() != parent:  # it was killed just before
+        os._exit(1)
+
+
+def limit_memory(memory_bytes: int) -> None:
+    """Refuse this process what exceeds the limit between two looks at it (not on Windows).
+
+    The system counts what is reserved rather than what is resident, hence half as much again.
+    """
+    try:
+        import resource
+    except ImportError:
+        return
+    reserve = 2**30
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    bound = memory_bytes + memory_bytes // 2 + reserve
+    if hard != resource.RLIM_INFINITY:
+        bound = min(bound, hard)
+    resource.setrlimit(resource.RLIMIT_DATA, (bound, hard))
