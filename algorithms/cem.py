@@ -12,6 +12,7 @@ from scipy import sparse
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.folds import without_folds
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.planar import backward_arcs, polygon_area
@@ -38,10 +39,11 @@ def cem(
     that lowers E_C by less than `tolerance`, or after `max_iterations`; a vertex at the origin,
     which has no inverse, counts as zero in (30); where (30) would make boundary vertices change
     places, which folds the map, that step is (23), and iteration ends where (23) would do so too
-    (``extras["order_kept"]`` counts these steps; 0 on most surfaces). With the vertices ordered
-    interior first, boundary last, and the last one pinned, a single Cholesky factor serves the
-    start, and its leading block all Dirichlet solves. `delaunay` takes the weights of the intrinsic
-    Delaunay triangulation.
+    (`order_kept` counts these steps; 0 on most surfaces); where negative cotangent weights still
+    fold the final map, they are raised around the folds and it is solved again (`fold_repairs`).
+    With the vertices ordered interior first, boundary last, and the last one pinned, a single
+    Cholesky factor serves the start, and its leading block all Dirichlet solves. `delaunay` takes
+    the weights of the intrinsic Delaunay triangulation.
     """
     n_i = len(mesh.interior)
     if n_i == 0:
@@ -49,9 +51,9 @@ def cem(
     L = laplacian(mesh, delaunay=delaunay)
     with phase("assembly"):
         order = np.concatenate([mesh.interior, mesh.boundary])
-        L = sparse.csc_array(sparse.csr_array(L)[order][:, order])
-        pinned = L[:-1, :-1]
-        L_bi, L_bb = sparse.csr_array(L)[n_i:, :n_i], L[n_i:, n_i:]
+        ordered = sparse.csc_array(sparse.csr_array(L)[order][:, order])
+        pinned = ordered[:-1, :-1]
+        L_bi, L_bb = sparse.csr_array(ordered)[n_i:, :n_i], ordered[n_i:, n_i:]
         L_ib = sparse.csr_array(L_bi.T)
     whole = Cholesky(pinned, leading=n_i)
     ring = Cholesky(L_bb)
@@ -86,7 +88,9 @@ def cem(
             break
     uv = np.empty(mesh.n, dtype=np.complex128)
     uv[order] = np.concatenate([f_i, f_b])
-    return Parameterization(uv, len(history) - 1, tuple(history), {"order_kept": order_kept})
+    uv, repairs = without_folds(mesh, L, uv)
+    extras = {"order_kept": order_kept, "fold_repairs": repairs}
+    return Parameterization(uv, len(history) - 1, tuple(history), extras)
 
 
 def _start(mesh: DiskMesh, whole: Cholesky, order: NDArray[np.int64]) -> Complex:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cembench.geometry.folds import without_folds
 from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
@@ -20,7 +21,10 @@ def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterizati
 
     The cheapest map to the disk and the yardstick for all others: nothing adapts the boundary, so
     it is conformal only where the arc lengths happen to be right. `delaunay` takes the weights of
-    the intrinsic Delaunay triangulation.
+    the intrinsic Delaunay triangulation. Decided here: where cotangent weights are negative and the
+    map folds, they are raised around the folds and it is solved again (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
-    return Parameterization(harmonic_extension(L, mesh.boundary, arc_length_circle(mesh)))
+    z = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))
+    z, repairs = without_folds(mesh, L, z)
+    return Parameterization(z, extras={"fold_repairs": repairs})

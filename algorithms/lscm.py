@@ -9,11 +9,14 @@ from scipy import sparse
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.folds import interior_without_folds
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.planar import polygon_area
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
+
+Complex = NDArray[np.complex128]
 
 
 @algorithm(
@@ -29,7 +32,9 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     definite, and one Cholesky solve minimises it. Decided here: the pins are the boundary vertex
     farthest from the mean vertex and the boundary vertex farthest from that one, laid at -1 and 1;
     the image is then scaled to area pi, so that its energies stand beside those of a disk, though
-    its angles are lower for want of a boundary condition.
+    its angles are lower for want of a boundary condition. Where negative cotangent weights fold the
+    interior they are raised around the folds and it is solved again (`fold_repairs`); where that
+    does not help, as with a boundary that crosses itself, the map stays as it was.
     """
     L = laplacian(mesh, delaunay=delaunay)
     n, pins = mesh.n, _far_apart(mesh)
@@ -49,7 +54,15 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
             f"the image of the boundary encloses an area of {area:.3g}, which is not positive: "
             "the map has collapsed between its two pins"
         )
-    return Parameterization(uv * np.sqrt(np.pi / area), extras={"pins": pins.tolist()})
+    uv, repairs = _repaired(mesh, L, uv * np.sqrt(np.pi / area))
+    return Parameterization(uv, extras={"pins": pins.tolist(), "fold_repairs": repairs})
+
+
+def _repaired(mesh: DiskMesh, L: sparse.csc_array, uv: Complex) -> tuple[Complex, int]:
+    try:
+        return interior_without_folds(mesh, L, uv)
+    except AlgorithmFailed:  # no theorem promises it for a boundary that is not convex
+        return uv, 0
 
 
 def _far_apart(mesh: DiskMesh) -> NDArray[np.int64]:

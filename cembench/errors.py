@@ -30,3 +30,7 @@ class AlgorithmFailed(CembenchError):  # noqa: N818 - it is a result's status, n
 
 class NotPositiveDefinite(AlgorithmFailed):
     """A Cholesky factorisation met a pivot that is not positive."""
+
+
+class RenderError(CembenchError):
+    """A picture cannot be drawn or written."""

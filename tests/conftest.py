@@ -6,6 +6,23 @@ from cembench.cli import main
 
 
 @pytest.fixture
+def count_calls(monkeypatch):
+    """Replace a method by one that counts: ``calls = count_calls(Class, "method")``; len(calls)."""
+
+    def watch(owner, name):
+        calls, original = [], getattr(owner, name)
+
+        def counted(*arguments, **options):
+            calls.append(name)
+            return original(*arguments, **options)
+
+        monkeypatch.setattr(owner, name, counted)
+        return calls
+
+    return watch
+
+
+@pytest.fixture
 def cli(capsys, monkeypatch, tmp_path):
     """Run the command line in an empty folder: exit code, standard output, standard error."""
     workplace = tmp_path / "workplace"

@@ -2,6 +2,9 @@
 
 import numpy as np
 
+from cembench import DiskMesh
+from meshes_gen.flat_disk import flat_disk
+
 
 def obj_text(V, F):
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(V, float).tolist()]
@@ -77,3 +80,11 @@ def three_triangles_on_an_edge():
 def two_pieces():
     V, F = flat_rectangle()
     return np.concatenate([V, V + 100]), np.concatenate([F, F + len(V)])
+
+
+def crumpled_disk():
+    """So crumpled inside that many cotangent weights are negative and harmonic maps fold."""
+    mesh = flat_disk(600)
+    noise = 0.15 * np.random.default_rng(0).standard_normal(mesh.V.shape)
+    inside = np.linalg.norm(mesh.V, axis=1) < 0.7
+    return DiskMesh.from_arrays(mesh.V + inside[:, None] * noise, mesh.F, name="crumpled disk")

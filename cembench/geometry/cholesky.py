@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from typing import Any, Literal, Protocol, get_args
 
@@ -80,6 +81,10 @@ def _names(kind: Any) -> str:
     return ", ".join(repr(name) for name in get_args(kind))
 
 
+Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+SolverOf = Callable[[sparse.csc_array], Solver]
+
+
 class _Factor(Protocol):
     def update(self, A: sparse.csc_array) -> None: ...
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
@@ -147,12 +152,37 @@ def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], 
 
         return CholmodFactor
     if backend == "superlu":
-        from cembench.geometry.superlu import SuperLUFactor
+        from cembench.geometry.superlu import superlu_solver
 
-        return SuperLUFactor
-    from cembench.geometry.pardiso import PardisoFactor
+        return partial(_SeparateFactors, superlu_solver)
+    from cembench.geometry.pardiso import pardiso_solver
 
-    return PardisoFactor
+    return partial(_SeparateFactors, pardiso_solver)
+
+
+class _SeparateFactors:
+    """For libraries that solve only with the whole factor: the leading block gets one of its own.
+
+    It is factored when first used. Nothing is kept over an update.
+    """
+
+    def __init__(self, solver_of: SolverOf, A: sparse.csc_array, leading: int | None) -> None:
+        self._solver_of, self._leading = solver_of, leading
+        self.update(A)
+
+    def update(self, A: sparse.csc_array) -> None:
+        self._solve = self._solver_of(A)
+        self._solve_leading: Solver | None = None
+        self._A = A
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self._solve(B)
+
+    def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self._solve_leading is None:
+            k = self._leading
+            self._solve_leading = self._solver_of(sparse.csc_array(self._A[:k, :k]))
+        return self._solve_leading(B)
 
 
 def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:

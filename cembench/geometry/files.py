@@ -189,8 +189,8 @@ def _read_off(path: Path) -> Arrays:
         raise MeshError(
             f"{declared} faces are declared but {len(found.faces)} were found. It was cut short."
         )
-    polygons = len(found.faces) - declared
-    notice = (f"polygons were cut into triangles, {polygons} more than faces",) if polygons else ()
+    cut = f"polygons were cut: {declared} faces became {len(found.faces)} triangles"
+    notice = (cut,) if len(found.faces) > declared else ()
     return np.asarray(found.vertices, float), np.asarray(found.faces, np.int64), notice
 
 

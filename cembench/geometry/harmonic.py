@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.clock import phase
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.mesh import DiskMesh
 
@@ -22,19 +25,22 @@ def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
 
 
 def harmonic_extension(
-    L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[np.complex128]
-) -> NDArray[np.complex128]:
+    L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[Any]
+) -> NDArray[Any]:
     """Which map is harmonic for L and takes these values at the fixed vertices (Eq. 10)?
 
-    L (n, n) positive semi-definite, `fixed` (k,) indices, `values` (k,); the result is (n,).
+    L (n, n) positive semi-definite, `fixed` (k,) indices, `values` (k,), real or complex; the
+    result is (n,), of the same type.
     """
     n = L.shape[0]
-    f = np.zeros(n, dtype=np.complex128)
+    f = np.zeros(n, dtype=values.dtype)
     f[fixed] = values
     free = np.ones(n, dtype=bool)
     free[fixed] = False
     i = np.flatnonzero(free)
     if len(i):
-        rows = sparse.csr_array(L)[i]
-        f[i] = Cholesky(rows[:, i]).solve(-(rows[:, fixed] @ f[fixed]))
+        with phase("assembly"):
+            rows = sparse.csr_array(L)[i]
+            L_ii, right = rows[:, i], -(rows[:, fixed] @ f[fixed])
+        f[i] = Cholesky(L_ii).solve(right)
     return f

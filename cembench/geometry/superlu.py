@@ -2,48 +2,28 @@
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import splu
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
 
 
-class SuperLUFactor:
-    """The interface of :class:`~cembench.geometry.cholmod.CholmodFactor`.
+def superlu_solver(
+    A: sparse.csc_array,
+) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Factor A: which function solves A x = B for real columns B (n, k)?
 
-    SuperLU solves only with its whole factor: the leading block is factored too, when first used.
+    Raises
+    ------
+    NotPositiveDefinite
+        The matrix is singular, or has a pivot that is not positive.
+
     """
-
-    def __init__(self, A: sparse.csc_array, leading: int | None) -> None:
-        self._leading = leading
-        self.update(A)
-
-    def update(self, A: sparse.csc_array) -> None:
-        """Factor another matrix; SuperLU keeps nothing of the analysis."""
-        self._A = A
-        self.__dict__.pop("_leading_factor", None)
-        self._factor = _factor(A)
-
-    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A x = B for real columns B (n, k)."""
-        return np.asarray(self._factor.solve(B))
-
-    def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A_ii x = B for the leading block; B (leading, k)."""
-        return np.asarray(self._leading_factor.solve(B))
-
-    @cached_property
-    def _leading_factor(self) -> SuperLU:
-        k = self._leading
-        return _factor(sparse.csc_array(self._A[:k, :k]))
-
-
-def _factor(A: sparse.csc_array) -> SuperLU:
     with phase("factorisation"):
         try:
             factor = splu(
@@ -55,9 +35,10 @@ def _factor(A: sparse.csc_array) -> SuperLU:
         except RuntimeError as error:
             raise NotPositiveDefinite(f"the matrix is singular ({error})") from None
         # With the diagonal as pivots, these are the D of L D L^T: all positive or not definite.
-        if not (factor.U.diagonal() > 0).all():
+        pivots = factor.U.diagonal()
+        if not (pivots > 0).all():
             raise NotPositiveDefinite(
                 f"the matrix of order {A.shape[0]} is not positive definite "
-                f"(smallest pivot {factor.U.diagonal().min():.3g})"
+                f"(smallest pivot {pivots.min():.3g})"
             )
-        return factor
+    return lambda B: np.asarray(factor.solve(B))

@@ -29,9 +29,6 @@ from cembench.running.memory import Memory, memory_of_call
 
 #: How far from the unit circle a boundary vertex of a disk may lie.
 CIRCLE_TOLERANCE = 1e-9
-#: Up to this share of folded triangles a map is "ok", with the number in its metrics; a mesh can
-#: force some. A map with more is "invalid".
-FOLDED_SHARE = 0.005
 #: A process times further calls until they have taken so many seconds together, or are so many.
 ENOUGH_SECONDS = 0.2
 ENOUGH_CALLS = 5
@@ -55,7 +52,7 @@ def check_cell(
         with linear_algebra(cell.solves, cell.backend):
             (found, timing), memory = memory_of_call(lambda: _without_collector(call))
     except Exception as error:
-        return outcome_of_error(error), None
+        return outcome_of_error(error, mesh), None
     outcome = _with_memory(Outcome(status="invalid", rounds=(_round([timing]),)), memory)
     unusable = _unusable(found, mesh)
     if unusable:
@@ -91,10 +88,11 @@ def time_cell(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Round:
     return _round(timings, _hash(getattr(found, "uv", None)))
 
 
-def outcome_of_error(error: Exception) -> Outcome:
+def outcome_of_error(error: Exception, mesh: TriangleMesh) -> Outcome:
     """As what is a call recorded that raised this?"""
     if isinstance(error, AlgorithmFailed):
-        return Outcome(status="failed", cause=str(error))
+        cause = "; ".join([str(error), *_broken_premises(mesh)])
+        return Outcome(status="failed", cause=cause)
     told = "".join(traceback.format_exception(error))
     if isinstance(error, MemoryError):
         return Outcome(
@@ -151,6 +149,11 @@ def _unusable(found: Any, mesh: TriangleMesh) -> str | None:
     return None
 
 
+def _broken_premises(mesh: TriangleMesh) -> list[str]:
+    broken = [notice for notice in mesh.notices if notice.startswith("Definition 1")]
+    return [f"the mesh breaks a premise of the paper: {'; '.join(broken)}"] if broken else []
+
+
 def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
     """Which promises does this map break? Empty for a valid one."""
     problems = []
@@ -161,8 +164,7 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128])
     flipped = flipped_triangles(mesh, uv)
     if image_area(mesh, uv) <= 0 or flipped == mesh.m:
         problems.append("the map reverses the surface's orientation")
-    elif flipped > FOLDED_SHARE * mesh.m:
-        problems.append(f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.1%})")
-        if any("Definition 1" in notice for notice in mesh.notices):
-            problems.append("the mesh breaks a premise: " + "; ".join(mesh.notices))
+    elif flipped:
+        problems.append(f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})")
+        problems += _broken_premises(mesh)
     return problems

@@ -69,7 +69,7 @@ def _time(job: Job) -> Answer:
     try:
         return Answer(round=time_cell(algorithm, mesh, job.cell))
     except Exception as error:
-        return Answer(outcome=outcome_of_error(error))
+        return Answer(outcome=outcome_of_error(error, mesh))
 
 
 def _loaded(job: Job) -> tuple[Algorithm, TriangleMesh]:

@@ -5,6 +5,7 @@ import scipy.sparse.linalg as spla
 from algorithms.cem import _inverted, cem
 from cembench import AlgorithmFailed, DiskMesh
 from cembench.geometry.cholesky import available_backends, linear_algebra
+from cembench.geometry.cholmod import CholmodFactor
 from cembench.geometry.files import read_mesh
 from cembench.geometry.laplacian import laplacian
 from cembench.metrics import all_metrics
@@ -55,6 +56,12 @@ def test_one_factorisation_gives_what_the_paper_s_lines_give(inversion, iteratio
     assert found.iterations <= iterations
     expected = algorithm_1(mesh, found.iterations, inversion)
     assert abs(found.uv - expected).max() < 1e-9
+
+
+def test_it_factors_its_two_matrices_once_each(count_calls):
+    factored = count_calls(CholmodFactor, "_factor")
+    assert cem(hemi_ellipsoid(600), tolerance=0, max_iterations=5).iterations > 0
+    assert len(factored) == 2  # the pinned L, and the ring L_bb
 
 
 @pytest.mark.parametrize("backend", available_backends())

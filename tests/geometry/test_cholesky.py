@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from cembench.clock import measure
 from cembench.errors import NotPositiveDefinite, ParameterError
 from cembench.geometry.cholesky import Cholesky, available_backends, linear_algebra
+from cembench.geometry.cholmod import CholmodFactor
 from cembench.geometry.laplacian import laplacian
 from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
 
@@ -75,21 +75,18 @@ def test_an_indefinite_matrix_is_an_error(backend):
         Cholesky(A)
 
 
-def test_reuse_factors_once_and_backslash_at_every_solve(matrix):
+def test_reuse_factors_once_and_backslash_at_every_solve(matrix, count_calls):
     A, k = matrix
     b = np.ones(A.shape[0])
-    calls = {}
-    for solves in BOTH:
+    factored = count_calls(CholmodFactor, "_factor")
+    for solves, expected in (("reuse", 1), ("backslash", 20)):
+        factored.clear()
         with linear_algebra(solves):
-
-            def use():
-                factor = Cholesky(A, leading=k)
-                for _ in range(20):
-                    factor.solve_leading(b[:k])
-
-            _, timing = measure(use)
-            calls[solves] = timing.phases["symbolic"]
-    assert calls["backslash"] > 4 * calls["reuse"]
+            factor = Cholesky(A, leading=k)
+            for _ in range(10):
+                factor.solve(b)
+                factor.solve_leading(b[:k])
+        assert len(factored) == expected
 
 
 def test_solve_leading_needs_its_order():
@@ -115,3 +112,24 @@ def test_the_choice_ends_with_its_block(matrix):
         inside = Cholesky(A)
     assert inside._how.backend == "superlu"
     assert Cholesky(A)._how.backend == "cvxopt"
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("solves", BOTH)
+def test_after_an_indefinite_matrix_the_next_is_solved_again(matrix, backend, solves):
+    A, _ = matrix
+    identity = sparse.eye_array(A.shape[0], format="csc")
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    with linear_algebra(solves, backend):
+        factor = Cholesky(A)
+        for k in range(3):
+            with pytest.raises(NotPositiveDefinite):  # "backslash" factors at the solve
+                solved_after_update(factor, A - identity, b)
+            definite = A + k * identity
+            x = solved_after_update(factor, definite, b)
+            assert abs(definite @ x - b).max() < 1e-9 * abs(x).max()
+
+
+def solved_after_update(factor, A, b):
+    factor.update(A)
+    return factor.solve(b)

@@ -1,0 +1,123 @@
+"""Linear disk map: the doubled surface goes to the sphere, half of it to the disk."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.clock import phase
+from cembench.errors import AlgorithmFailed
+from cembench.geometry.beltrami import (
+    beltrami_coefficients,
+    linear_beltrami_solver,
+    weights_of_map,
+)
+from cembench.geometry.doubling import DoubledSurface, doubled, doubled_laplacian
+from cembench.geometry.folds import without_folds
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh
+from cembench.geometry.moebius import three_point_map
+from cembench.geometry.planar import polygon_area
+from cembench.geometry.spherical import balanced_planar_map
+from cembench.geometry.stereographic import to_plane, to_sphere
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+Complex = NDArray[np.complex128]
+
+#: How many vertices nearest to the south pole keep their place while the north is corrected.
+HELD = 50
+#: How near to the south pole a vertex may lie when the sphere is projected from there.
+NEAREST = 1e-8
+
+
+@algorithm(
+    "ldm",
+    title="LDM",
+    target="disk",
+    source="Choi & Lui, A linear formulation for disk conformal parameterization (2015)",
+)
+def ldm(mesh: DiskMesh) -> Parameterization:
+    """Which disk map is half of a conformal map from the doubled surface to the sphere?
+
+    Faithful to the published method and to the program its authors made public: the doubled
+    surface is mapped to the plane harmonically but for its most regular triangle, the two poles
+    are balanced, the distortion at the north pole is corrected with the 50 vertices nearest to the
+    south pole held, a Moebius map through three boundary vertices and the projection of one half
+    give the disk, and a last solve with the boundary on the circle composes away what distortion
+    is left. A handful of linear solves, no iteration.
+
+    Decided here: the first of the three boundary vertices is the one farthest from the mean vertex,
+    so that the numbering plays no role, where the program takes the first of its list (on Chinese
+    Lion 242 of the 245 choices give the published digits, this one among them); the disk's width
+    is that of its boundary; a vertex at the very south pole is moved by 1e-8; triangles that have
+    collapsed in the plane take the surface's cotangents, the limit of what their coefficients
+    give. Where the last map folds, boundary vertices that changed places are put in order, negative
+    cotangent weights around the folds are raised, and it is solved again (`fold_repairs` counts
+    these solves).
+    """
+    if not len(mesh.interior):
+        raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
+    L = laplacian(mesh)
+    double = doubled(mesh)
+    with phase("assembly"):
+        L_double = doubled_laplacian(L, double)
+        V = double.on_both(mesh.V)
+    z = balanced_planar_map(L_double, V, double.F)
+    w = _corrected_at_north(double, V, z)
+    z = _laid_on_disk(mesh, w[: mesh.n])
+    b = mesh.boundary
+    z = linear_beltrami_solver(mesh.F, _weights(z, mesh.F, mesh.V), b, z[b])
+    z, repairs = without_folds(mesh, L, z)
+    return Parameterization(z, extras={"fold_repairs": repairs})
+
+
+def _weights(z: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+    with phase("beltrami"):
+        mu = beltrami_coefficients(z, F, V)
+    with phase("assembly"):
+        return weights_of_map(z, F, mu, V)
+
+
+def _corrected_at_north(double: DoubledSurface, V: NDArray[np.float64], z: Complex) -> Complex:
+    """Make the map conformal at the north pole too; the result is seen from the south pole."""
+    near = np.abs(z)
+    held = np.argsort(near, kind="stable")[: min(HELD, len(z) - 1)]
+    z = np.where(near < NEAREST, NEAREST, z)
+    w: Complex = 1 / z.conj()
+    return linear_beltrami_solver(double.F, _weights(w, double.F, V), held, w[held])
+
+
+def _laid_on_disk(mesh: DiskMesh, w: Complex) -> Complex:
+    """Carry the half of the sphere that w shows to the disk, its boundary to the circle."""
+    b = mesh.boundary
+    first = int(np.argmax(np.linalg.norm(mesh.V[b] - mesh.V.mean(axis=0), axis=1)))
+    b = np.roll(b, -first)
+    loop = to_sphere(w[b], "south")
+    far = int(np.argmax(np.linalg.norm(loop - loop[0], axis=1)))
+    between = (far + 1) // 2 if far > 1 else (far + len(b)) // 2
+    chosen = [0, far, between]
+    w = three_point_map(w[b][chosen], _congruent(loop[chosen]))(w)
+    S = to_sphere(w)
+    S[:, 2] -= S[b, 2].mean()
+    z = to_plane(S, "south" if S[:, 2].mean() >= 0 else "north")
+    z[~np.isfinite(z)] = 0.0  # a vertex at the pole itself; the last solve will place it
+    z *= 2 / np.ptp(z.real[b])
+    z -= complex(z.real[b].min(), z.imag[b].min()) + (1 + 1j)
+    if polygon_area(z[b]) < 0:
+        z = -np.conj(z)
+    modulus = np.abs(z[b])
+    if not modulus.min() > 0:
+        raise AlgorithmFailed("a boundary vertex came to lie at the centre of the disk")
+    z[b] /= modulus
+    return z
+
+
+def _congruent(corners: NDArray[np.float64]) -> Complex:
+    """A triangle of the plane with the sides of this one (3, 3), its first about 0 on the axis."""
+    a, b, c = corners
+    length = float(np.linalg.norm(b - a))
+    axis = (b - a) / length
+    x = float(np.dot(c - a, axis))
+    y = float(np.linalg.norm(c - a - x * axis))
+    return np.array([-length / 2, length / 2, complex(x - length / 2, y)])

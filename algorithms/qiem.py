@@ -1,0 +1,178 @@
+"""Quasi-implicit Euler method: harmonic heat flow of the doubled surface on the sphere."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy import sparse
+
+from cembench.clock import phase
+from cembench.errors import AlgorithmFailed, NotPositiveDefinite
+from cembench.geometry.balancing import moebius_centred
+from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.doubling import doubled, doubled_laplacian
+from cembench.geometry.folds import without_folds
+from cembench.geometry.harmonic import harmonic_extension
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh
+from cembench.geometry.planar import fitted_circle, polygon_area
+from cembench.geometry.spherical import balanced_planar_map
+from cembench.geometry.stereographic import to_plane, to_sphere
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+#: The time step: where it starts, what it is multiplied by after a step and after a failed one,
+#: the share of its theoretical bound that it may reach, and where it counts as zero.
+FIRST, GROWTH, CUT, SHARE, LEAST = 0.1, 1.5, 0.5, 0.9, 1e-6
+
+
+@algorithm(
+    "qiem",
+    title="QIEM",
+    target="disk",
+    source="Huang, Gu, Huang, Lin, Lin & Yau, Geom. Imag. Comput. 1 (2014), 223-258",
+)
+def qiem(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
+    max_iterations: Annotated[int, Field(ge=1)] = 200,
+) -> Parameterization:
+    """Which disk map is half of the limit of the heat flow of the doubled surface on the sphere?
+
+    A quasi-implicit heat flow in the manner of Huang et al.: the surface is glued to its mirror
+    copy and mapped to the sphere, df/dt = -(L f)_tangential, by steps
+    (I + dt (L - D)) f_new = f_old with D the diagonal of <L f, f> at the old map. The matrix
+    changes at every step, its pattern does not. The start is the planar map that is harmonic but
+    for the most regular triangle, on the sphere with its poles balanced.
+
+    Decided here: the mass matrix is the identity. dt starts at 0.1, grows by half after each step,
+    and is halved, the step being repeated, where the energy would rise or the matrix is not
+    positive definite; it stays below 0.9 n / sum(D), beyond which the matrix never is. The flow
+    has converged when, dt having met such a limit, a step lowers the energy by less than
+    `tolerance` of it. After each step the points are put on the sphere and their mean at its middle
+    by a Moebius map; to subtract the mean and divide by the norm does that to first order, but
+    raises the energy of uneven maps. The circle between the copies is turned to a parallel, its
+    half projected from the far pole and scaled to the unit disk, the boundary laid on the circle
+    and the interior solved for once more, which settles the crowded regions that the flow is slow
+    to reach. Folds that remain are repaired as in FDM (`fold_repairs`). The energies recorded are
+    half of the sphere's, less 2 pi.
+    """
+    if not len(mesh.interior):
+        raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
+    L = laplacian(mesh)
+    double = doubled(mesh)
+    with phase("assembly"):
+        L_double = doubled_laplacian(L, double)
+        V = double.on_both(mesh.V)
+    z = balanced_planar_map(L_double, V, double.F)
+    S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
+    z = harmonic_extension(L, mesh.boundary, _boundary_on_circle(mesh, S))
+    z, repairs = without_folds(mesh, L, z)
+    return Parameterization(
+        z,
+        len(energies) - 1,
+        tuple(energy / 2 - 2 * np.pi for energy in energies),
+        {"fold_repairs": repairs},
+    )
+
+
+def _flow(
+    L: sparse.csc_array, S: Real, tolerance: float, max_iterations: int
+) -> tuple[Real, list[float]]:
+    """Let the heat flow run to its limit; the map S (n, 3) there, and the energy of every step."""
+    step = _Step(L)
+    mass = np.ones(len(S))
+    S = moebius_centred(S, mass)
+    LS = L @ S
+    energies = [0.5 * float((S * LS).sum())]
+    dt, limited = FIRST, False
+    while len(energies) <= max_iterations:
+        D = np.einsum("nd,nd->n", LS, S)
+        bound = SHARE * len(S) / D.sum()
+        dt, limited = min(dt, bound), limited or dt >= bound
+        trial = _centred(step(S, D, dt), mass)
+        if trial is not None:
+            L_trial = L @ trial
+            energy = 0.5 * float((trial * L_trial).sum())
+        if trial is None or not energy <= energies[-1]:
+            dt, limited = CUT * dt, True
+            if dt >= LEAST:
+                continue
+            if len(energies) > 1:
+                return S, energies
+            raise AlgorithmFailed(
+                "the heat flow cannot leave its start: every time step down to "
+                f"{LEAST:g} raises the energy, {energies[0]:.6g}"
+            )
+        S, LS, dt = trial, L_trial, GROWTH * dt
+        energies.append(energy)
+        if limited and energies[-2] - energies[-1] < tolerance * abs(energies[-1]):
+            return S, energies
+    raise AlgorithmFailed(
+        f"the heat flow has not converged after {max_iterations} steps: the last one lowered the "
+        f"energy by {1 - energies[-1] / energies[-2]:.2g} of it, tolerance {tolerance:g}; "
+        "allow more with max_iterations, or raise the tolerance"
+    )
+
+
+class _Step:
+    """One quasi-implicit Euler step; the matrix's pattern is analysed once."""
+
+    def __init__(self, L: sparse.csc_array) -> None:
+        self._L = L
+        self._A = L.copy()
+        columns = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))
+        self._diagonal = np.flatnonzero(L.indices == columns)
+        self._cholesky: Cholesky | None = None
+
+    def __call__(self, S: Real, D: Real, dt: float) -> Real | None:
+        """(I + dt (L - D)) x = S; None where the matrix is not positive definite."""
+        with phase("assembly"):
+            self._A.data[:] = dt * self._L.data
+            self._A.data[self._diagonal] += 1 - dt * D
+        try:
+            if self._cholesky is None:
+                self._cholesky = Cholesky(self._A)
+            else:
+                self._cholesky.update(self._A)
+            return self._cholesky.solve(S)
+        except NotPositiveDefinite:
+            return None
+
+
+def _centred(S: Real | None, mass: Real) -> Real | None:
+    """On the sphere, the centre of mass at its middle; None where that cannot be."""
+    if S is None:
+        return None
+    norms = np.linalg.norm(S, axis=1, keepdims=True)
+    if not norms.min() > 0:
+        return None
+    try:
+        return moebius_centred(S / norms, mass)
+    except AlgorithmFailed:
+        return None
+
+
+def _boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
+    """Turn the boundary's circle to a parallel, project it from the pole beyond it, scale."""
+    loop = S[mesh.boundary]
+    turn = np.linalg.svd(loop - loop.mean(axis=0))[2].T
+    loop = loop @ turn
+    # The half that is mapped to the disk lies on the other side of the parallel.
+    in_south = (S[mesh.interior] @ turn[:, 2]).mean() < loop[:, 2].mean()
+    z = to_plane(loop, "north" if in_south else "south")
+    centre, _ = fitted_circle(z)
+    z = z - centre
+    if polygon_area(z) < 0:
+        z = np.conj(z)
+    modulus = np.abs(z)
+    if not (np.isfinite(modulus).all() and modulus.min() > 0):
+        raise AlgorithmFailed("the boundary's image on the sphere is no curve that has an inside")
+    return z / modulus

@@ -1,0 +1,146 @@
+"""What every registered algorithm must keep to, whoever wrote it."""
+
+import numpy as np
+import pytest
+
+from cembench import AlgorithmFailed, DiskMesh, HoledMesh, TriangleMesh
+from cembench.geometry.cholesky import linear_algebra
+from cembench.geometry.planar import signed_areas
+from cembench.metrics import all_metrics
+from cembench.registry import load_registry
+from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from tests import gallery
+
+ALGORITHMS = load_registry().algorithms
+
+#: How far the figures may move, relatively, when the same surface is given another way.
+SAME_FIGURES = 1e-6
+#: How far the map may move when factors are not kept.
+SAME_MAP = 1e-9
+COMPARED = (
+    "dirichlet_energy",
+    "image_area",
+    "conformal_energy",
+    "angle_error_mean_deg",
+    "angle_error_sd_deg",
+    "dilatation_mean",
+)
+
+
+def uneven_half_ellipsoid():
+    """Nothing about it is symmetric, so no choice between equals hangs on rounding or numbering."""
+    mesh = hemi_ellipsoid(1500)
+    rng = np.random.default_rng(7)
+    V = mesh.V + 0.01 * rng.standard_normal(mesh.V.shape)
+    V[:, 2] += 0.3 * V[:, 0] ** 2 + 0.1 * V[:, 1]
+    return DiskMesh.from_arrays(V, mesh.F)
+
+
+def uneven_tube():
+    V, F = gallery.tube()
+    return HoledMesh.from_arrays(V + 0.05 * np.random.default_rng(7).standard_normal(V.shape), F)
+
+
+SURFACES = {
+    DiskMesh: uneven_half_ellipsoid,
+    TriangleMesh: uneven_half_ellipsoid,
+    HoledMesh: uneven_tube,
+}
+
+
+@pytest.fixture(params=sorted(ALGORITHMS))
+def spec(request):
+    return ALGORITHMS[request.param]
+
+
+@pytest.fixture
+def mesh(spec):
+    return SURFACES[spec.mesh_type]()
+
+
+def run(spec, mesh):
+    return spec.function(mesh, **spec.arguments({}))
+
+
+def assert_same_figures(spec, mesh, other):
+    expected = all_metrics(mesh, run(spec, mesh).uv)
+    found = all_metrics(other, run(spec, other).uv)
+    for name in COMPARED:
+        scale = expected["image_area"] if name.endswith(("energy", "area")) else expected[name]
+        assert abs(found[name] - expected[name]) <= SAME_FIGURES * scale, name
+    assert found["flipped_triangles"] == expected["flipped_triangles"]
+
+
+def test_the_map_is_complex_finite_and_keeps_orientation(spec, mesh):
+    uv = run(spec, mesh).uv
+    assert uv.shape == (mesh.n,)
+    assert uv.dtype == np.complex128
+    assert np.isfinite(uv).all()
+    assert (signed_areas(uv, mesh.F) > 0).all()
+
+
+def test_the_boundary_lies_where_the_target_says(spec, mesh):
+    uv = run(spec, mesh).uv
+    if spec.target == "disk":
+        assert abs(abs(uv[mesh.boundary]) - 1).max() <= 1e-12
+    elif spec.target == "free boundary":
+        assert all_metrics(mesh, uv)["image_area"] == pytest.approx(np.pi)
+    else:
+        outer = max(mesh.loops, key=lambda loop: np.abs(uv[loop]).max())
+        assert abs(abs(uv[outer]) - 1).max() <= 1e-12
+
+
+def test_what_is_reported_beside_the_map_fits_it(spec, mesh):
+    result = run(spec, mesh)
+    assert result.iterations >= 0
+    assert np.isfinite(result.energy_history).all()
+    if result.energy_history:
+        assert len(result.energy_history) == result.iterations + 1
+
+
+def test_the_same_call_gives_the_same_bits(spec, mesh):
+    assert run(spec, mesh.fresh()).uv.tobytes() == run(spec, mesh.fresh()).uv.tobytes()
+
+
+def test_the_mesh_is_left_as_it_was(spec, mesh):
+    before = mesh.fresh().hash
+    run(spec, mesh)
+    assert mesh.fresh().hash == before
+
+
+def test_rotation_translation_and_scale_do_not_matter(spec, mesh):
+    Q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    Q *= np.sign(np.linalg.det(Q))
+    moved = type(mesh).from_arrays(40 * mesh.V @ Q.T + [1, -2, 3], mesh.F)
+    assert_same_figures(spec, mesh, moved)
+
+
+def test_numbering_does_not_matter(spec, mesh):
+    rng = np.random.default_rng(4)
+    number = rng.permutation(mesh.n)
+    V = np.empty_like(mesh.V)
+    V[number] = mesh.V
+    F = mesh.F[
+        np.arange(mesh.m)[:, None], (rng.integers(3, size=mesh.m)[:, None] + np.arange(3)) % 3
+    ]
+    renumbered = type(mesh).from_arrays(V, number[F][rng.permutation(mesh.m)])
+    assert_same_figures(spec, mesh, renumbered)
+
+
+def test_both_ways_of_solving_give_the_same_map(spec, mesh):
+    with linear_algebra("reuse"):
+        reused = run(spec, mesh.fresh()).uv
+    with linear_algebra("backslash"):
+        fresh = run(spec, mesh.fresh()).uv
+    assert abs(reused - fresh).max() <= SAME_MAP
+
+
+def test_a_surface_without_interior_gives_a_map_or_a_cause(spec):
+    if spec.mesh_type is HoledMesh:
+        pytest.skip("a strip has no hole")
+    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6))
+    try:
+        uv = run(spec, strip).uv
+    except AlgorithmFailed:
+        return
+    assert np.isfinite(uv).all()

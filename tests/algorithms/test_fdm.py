@@ -1,0 +1,78 @@
+import numpy as np
+import pytest
+
+from algorithms import fdm as module
+from algorithms.fdm import fdm
+from cembench import AlgorithmFailed, DiskMesh
+from cembench.geometry.beltrami import beltrami_coefficients
+from cembench.geometry.doubling import doubled
+from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.planar import signed_areas
+from cembench.metrics import all_metrics
+from meshes_gen.flat_disk import flat_disk
+from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from tests import gallery
+
+
+def error_of_reflected_coefficients(faces):
+    mesh = flat_disk(faces, stretch=1.4)
+    z = mesh.V[:, 0] / 1.4 + 1j * mesh.V[:, 1]
+    mu = beltrami_coefficients(z, mesh.F, mesh.V)
+    double = doubled(mesh)
+    both = double.on_both(module._reflected(z))
+    both[: mesh.n] = z
+    exact = beltrami_coefficients(both, double.F[mesh.m :], double.on_both(mesh.V))
+    outer = np.abs(z)[mesh.F].min(axis=1) > 0.5  # elsewhere reflection is far from linear
+    return np.abs(module._mirrored(mesh, z, mu) / exact - 1)[outer].max()
+
+
+def test_reflected_coefficients_approach_those_of_the_reflected_map():
+    coarse, fine = (error_of_reflected_coefficients(faces) for faces in (6 * 40**2, 6 * 80**2))
+    assert fine < 0.15
+    assert np.log2(coarse / fine) > 0.8, (coarse, fine)
+
+
+def test_each_iteration_but_the_last_changes_the_distortion():
+    mesh = hemi_ellipsoid(5000)
+    found = fdm(mesh, max_iterations=20)
+    assert 1 < found.iterations < 20
+    assert len(found.energy_history) == found.iterations + 1
+    assert fdm(mesh, max_iterations=2).iterations == 2
+    assert found.energy_history[-1] < found.energy_history[0]
+
+
+def test_the_history_ends_with_the_energy_of_the_map():
+    mesh = hemi_ellipsoid(3000)
+    found = fdm(mesh)
+    measured = all_metrics(mesh, found.uv)["conformal_energy"]
+    assert found.energy_history[-1] == pytest.approx(measured, rel=1e-9)
+
+
+def test_ears_on_the_boundary_collapse_in_the_half_plane_and_do_no_harm():
+    # The corner triangles of a rectangle have all three vertices on the boundary.
+    V, F = gallery.flat_rectangle(12, 20)
+    mesh = DiskMesh.from_arrays(V, F)
+    assert any("without an interior neighbour" in notice for notice in mesh.notices)
+    assert all_metrics(mesh, fdm(mesh).uv)["flipped_triangles"] == 0
+
+
+def test_a_start_that_folds_gives_way_to_uniform_weights():
+    mesh = gallery.crumpled_disk()
+    L = laplacian(mesh)
+    folded = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))
+    assert (signed_areas(folded, mesh.F) < 0).any()
+    assert (signed_areas(module._start(mesh, L), mesh.F) > 0).all()
+
+
+def test_folds_are_repaired():
+    mesh = gallery.crumpled_disk()
+    found = fdm(mesh)
+    assert found.extras["fold_repairs"] > 0
+    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+
+
+def test_a_mesh_without_interior_is_refused():
+    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6))
+    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
+        fdm(strip)

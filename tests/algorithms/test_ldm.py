@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+from algorithms import ldm as module
+from algorithms.ldm import ldm
+from cembench import AlgorithmFailed, DiskMesh
+from cembench.clock import measure
+from cembench.metrics import all_metrics
+from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from tests import gallery
+
+
+def test_it_is_direct():
+    found = ldm(hemi_ellipsoid(600))
+    assert found.iterations == 0
+    assert found.energy_history == ()
+
+
+def test_its_time_is_told_by_phases():
+    _, timing = measure(lambda: ldm(hemi_ellipsoid(600)))
+    expected = {"laplacian", "assembly", "beltrami", "factorisation", "solves", "boundary"}
+    assert expected <= set(timing.phases)
+
+
+def test_three_points_keep_their_distances():
+    corners = np.random.default_rng(0).standard_normal((3, 3))
+    flat = module._congruent(corners)
+    np.testing.assert_allclose(
+        np.abs(flat - np.roll(flat, 1)),
+        np.linalg.norm(corners - np.roll(corners, 1, axis=0), axis=1),
+    )
+    assert (flat[0] + flat[1]) == pytest.approx(0)
+
+
+@pytest.mark.parametrize("rows", [8, 12])
+def test_ears_on_the_boundary_do_no_harm(rows):
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(rows, 20))
+    assert all_metrics(mesh, ldm(mesh).uv)["flipped_triangles"] == 0
+
+
+def test_folds_are_repaired():
+    crumpled = gallery.crumpled_disk()
+    found = ldm(crumpled)
+    assert found.extras["fold_repairs"] > 0
+    assert all_metrics(crumpled, found.uv)["flipped_triangles"] == 0
+
+
+def test_a_mesh_without_interior_is_refused():
+    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6))
+    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
+        ldm(strip)
