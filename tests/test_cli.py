@@ -156,7 +156,7 @@ def real_cells():
             yield pytest.param(name, algorithm, marks=[pytest.mark.slow] if slow else [])
 
 
-@pytest.mark.parametrize(("name", "algorithm"), real_cells())
+@pytest.mark.parametrize(("name", "algorithm"), list(real_cells()))
 def test_map_ends_ok_on_every_real_disk(cli, name, algorithm):
     code, out, err = cli("map", real_mesh(name), "-a", algorithm, "--json")
     assert code == 0, err
