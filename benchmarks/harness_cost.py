@@ -43,7 +43,7 @@ from meshes_gen.spherical_cap import spherical_cap
 mesh = spherical_cap(int(sys.argv[1]))
 cem(mesh.fresh())
 seconds = []
-while len(seconds) < 5 and sum(seconds) < 0.2:
+while len(seconds) < 5 and sum(seconds) < 0.1:
     arrays = mesh.fresh()
     start = perf_counter()
     cem(arrays)
