@@ -53,7 +53,6 @@ def write(path: Path, fill: Callable[[BinaryIO], object]) -> None:
                 file.flush()
                 os.fsync(file.fileno())
             Path(draft).replace(path)
-            _flush_folder(path.parent)
         finally:
             Path(draft).unlink(missing_ok=True)
     except OSError as error:
@@ -67,8 +66,11 @@ def unwritable(path: Path, error: OSError) -> RecordError:
     )
 
 
-def _flush_folder(folder: Path) -> None:
-    """Let the renaming itself reach the disk, where the system can say so of a folder."""
+def flush_folder(folder: Path) -> None:
+    """Let new names in a folder reach the disk too, where the system can do that.
+
+    Without it a power cut, unlike a kill, can take back the last files that :func:`write` named.
+    """
     if os.name != "posix":
         return
     handle = os.open(folder, os.O_RDONLY)

@@ -6,13 +6,13 @@
     RUN/maps/<mesh>--<algorithm>--<key>.npz       uv, complex128 (n,)
     RUN/environments/<id>.json
     RUN/plan.json                                 the cells that were last asked for
-    RUN/samples/<mesh>--<algorithm>--<key>/<id>/  what is known of a cell that is not finished:
-        check.json  uv.npz  round-0.json ...      one file for each process that has ended
+    RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
+        <id>.jsonl  <id>.npz                      a line for each process that has ended, the map
     RUN/lock                                      held by the run that measures
 
-Every file is written to a draft, flushed to disk and renamed: it is whole or not there. A cell's
-samples become its record when the last is there; the record is written before they are deleted,
-so that whatever moment a run is killed at, each finished process is known exactly once.
+Every other file is written to a draft, flushed to disk and renamed: it is whole or not there.
+A cell's samples become its record when the last is there; the record is written before they are
+deleted, so that whatever moment a run is killed at, each finished process is known exactly once.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from filelock import FileLock, Timeout
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from cembench.atomic import DRAFT, read_model, unwritable, write, write_model
+from cembench.atomic import DRAFT, flush_folder, read_model, unwritable, write, write_model
 from cembench.errors import RecordError
 from cembench.records import SCHEMA_VERSION, Cell, Record
 from cembench.samples import Samples, read_map
@@ -77,7 +77,11 @@ class Store:
             write(self._map_path(record.cell), lambda file: np.savez_compressed(file, uv=uv))
         else:
             self._map_path(record.cell).unlink(missing_ok=True)
-        write_model(self._record_path(record.cell), record)
+        path = self._record_path(record.cell)
+        write_model(path, record)
+        for folder in (self._map_path(record.cell).parent, path.parent):
+            if folder.exists():
+                flush_folder(folder)
         self.forget_samples(record.cell)
 
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
@@ -86,12 +90,12 @@ class Store:
 
     def samples(self, cell: Cell, environment: str) -> Samples:
         """What was measured so far of a cell in this environment, and goes on to be."""
-        return Samples(self.folder / "samples" / cell.label / environment)
+        return Samples(self.folder / "samples" / cell.label / f"{environment}.jsonl")
 
     def rounds_done(self, cell: Cell) -> int | None:
         """How many rounds of an unfinished cell are kept? None where it was not begun."""
-        folders = list((self.folder / "samples" / cell.label).glob("*"))
-        return max((len(Samples(f).rounds()) for f in folders), default=None)
+        journals = (self.folder / "samples" / cell.label).glob("*.jsonl")
+        return max((len(Samples(journal).rounds()) for journal in journals), default=None)
 
     def forget_samples(self, cell: Cell) -> None:
         """Delete what is kept of an unfinished cell."""

@@ -3,7 +3,7 @@ import textwrap
 import pytest
 
 from cembench import DiskMesh, ParameterError, Parameterization, RegistryError, algorithm, surface
-from cembench.registry import load_registry
+from cembench.registry import load_algorithm, load_registry
 
 GOOD = """
     from typing import Annotated
@@ -112,3 +112,11 @@ def test_decorators_leave_the_function_alone():
 
     assert local(None) == "called"
     assert here(3) == 3
+
+
+def test_one_algorithm_can_be_loaded_alone(plugin):
+    path = plugin(GOOD)
+    assert load_algorithm("cem") is load_registry().algorithm("cem")
+    assert load_algorithm("mine", [path]).title == "Mine"
+    with pytest.raises(RegistryError, match=r"unknown algorithm 'none'; known: .*cem"):
+        load_algorithm("none", [path])

@@ -100,12 +100,28 @@ def test_samples_are_kept_by_environment_until_the_record_is_there(record, tmp_p
     assert store.rounds_done(record.cell) is None
 
 
+def test_a_line_that_a_kill_cut_short_is_not_there_and_is_cut_off(record, tmp_path):
+    samples = Store(tmp_path).samples(record.cell, "e")
+    samples.save_round(0, record.outcome.rounds[0])
+    with samples.journal.open("ab") as file:
+        file.write(b'{"number":1,"rou')
+    assert samples.rounds() == {0: record.outcome.rounds[0]}
+    samples.save_round(2, record.outcome.rounds[2])
+    assert list(samples.rounds()) == [0, 2]
+
+
 def test_a_damaged_sample_is_said(record, tmp_path):
     samples = Store(tmp_path).samples(record.cell, "e")
     samples.save_round(0, record.outcome.rounds[0])
-    (samples.folder / "round-0.json").write_text("{}")
-    with pytest.raises(RecordError, match=r"round-0\.json is not a round: Field required"):
+    samples.journal.write_text('{"number": "none"}\n')
+    with pytest.raises(RecordError, match=r"e\.jsonl is damaged: Input should be a valid integer"):
         samples.rounds()
+
+
+def test_samples_that_cannot_be_written_are_said(record, tmp_path):
+    (tmp_path / "samples").touch()
+    with pytest.raises(RecordError, match="cannot be written"):
+        Store(tmp_path).samples(record.cell, "e").save_round(0, record.outcome.rounds[0])
 
 
 def test_a_lock_is_held_by_one_and_what_a_killed_run_left_is_cleared(tmp_path):

@@ -13,7 +13,7 @@ import signal
 import sys
 import tempfile
 import uuid
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -79,16 +79,18 @@ def run_tasks(
     store: Store,
     options: Options | None = None,
     watcher: Watcher | None = None,
+    launcher: Callable[[Path, Options], Launcher] | None = None,
 ) -> list[Record]:
     """Measure what the store does not hold yet; the records, in the tasks' order.
 
     Each process's result is on disk before the next one starts. A second run into the same store
-    waits for the first.
+    waits for the first. `launcher` makes what starts the processes, given a folder for its files.
     """
     options, watcher = options or Options(), watcher or Watcher()
+    launcher = launcher or Launcher
     with store.locked(watcher.waits) as scratch:
         store.save_plan([task.cell for task in tasks])
-        run = _Run(store, _Launcher(scratch, options), options, watcher, describe_environment())
+        run = _Run(store, launcher(scratch, options), options, watcher, describe_environment())
         run.measure(tasks)
     return [run.records[task.cell.label] for task in tasks]
 
@@ -102,7 +104,7 @@ def map_once(
     """
     started = _now()
     with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
-        outcome, uv = _Launcher(Path(folder), options or Options()).check(task)
+        outcome, uv = Launcher(Path(folder), options or Options()).check(task)
     return _record(task, outcome, describe_environment()["id"], started), uv
 
 
@@ -116,7 +118,7 @@ class _Run:
     """One sitting: what it has to do is worked out from what the store holds."""
 
     store: Store
-    launcher: _Launcher
+    launcher: Launcher
     options: Options
     watcher: Watcher
     environment: dict[str, Any]
@@ -238,7 +240,7 @@ def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Rec
 
 
 @dataclass(frozen=True)
-class _Launcher:
+class Launcher:
     """Starts the processes; `scratch` is where they and it exchange files."""
 
     scratch: Path

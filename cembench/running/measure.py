@@ -30,7 +30,7 @@ from cembench.running.memory import Memory, memory_of_call
 #: How far from the unit circle a boundary vertex of a disk may lie.
 CIRCLE_TOLERANCE = 1e-9
 #: A process times further calls until they have taken so many seconds together, or are so many.
-ENOUGH_SECONDS = 0.2
+ENOUGH_SECONDS = 0.1
 ENOUGH_CALLS = 5
 
 Call = Callable[[], tuple[Any, Timing]]

@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.records import Cell, Outcome, Round
-from cembench.registry import Algorithm, load_registry
+from cembench.registry import Algorithm, load_algorithm
 from cembench.running.measure import check_cell, outcome_of_error, time_cell
 from cembench.running.process import die_with_parent, limit_memory
 
@@ -73,7 +73,7 @@ def _time(job: Job) -> Answer:
 
 
 def _loaded(job: Job) -> tuple[Algorithm, TriangleMesh]:
-    algorithm = load_registry(job.plugins).algorithm(job.cell.algorithm)
+    algorithm = load_algorithm(job.cell.algorithm, job.plugins)
     V, F = (np.load(file) for file in job.mesh_files)
     V.setflags(write=False)
     F.setflags(write=False)

@@ -10,6 +10,7 @@ import time
 
 import pytest
 
+from cembench.samples import Samples
 from cembench.store import Store
 from tests.running.test_local import FAULTY
 
@@ -42,8 +43,8 @@ def test_a_run_killed_at_random_moments_loses_nothing_that_was_finished(tmp_path
         assert {name: found[name] for name in kept} == kept
         kept = found
         Store(folder).finished()  # each can be read
-        for samples in folder.glob("samples/*/*/*.json"):
-            json.loads(samples.read_bytes())
+        for journal in folder.glob("samples/*/*.jsonl"):
+            Samples(journal).rounds()
     run = started(folder)
     rows = json.loads(run.communicate()[0])
     assert {row["algorithm"]: row["status"] for row in rows} == {

@@ -1,0 +1,40 @@
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.test_comparison import record_of
+
+SCRIPT = Path(__file__).parents[1] / "benchmarks/repeatability.py"
+
+
+def test_the_table_tells_the_spread_and_the_false_alarms():
+    tell = runpy.run_path(str(SCRIPT))["tell"]
+
+    def run(other, twin):
+        return [
+            record_of([seconds] * 6, algorithm=name, mesh="hat")
+            for name, seconds in (
+                ("cem", 1.0),
+                ("cem-twin", twin),
+                ("fdm", other),
+                ("fdm-twin", other),
+            )
+        ]
+
+    text = tell([run(3.0, 1.0), run(3.5, 1.0), run(4.0, 1.1)], "fdm")
+    assert "| hat | 1 | 2.50 | 2.00 | 3.00 | 28.6% |" in text
+    assert "A/A: 1 of 6 comparisons of an algorithm with its twin (16.7%)" in text
+    assert "No A/A comparison" in tell([[record_of([1.0], algorithm="cem")]], "fdm")
+
+
+def test_it_measures_twins_once_and_goes_on_when_called_again(tmp_path):
+    command = [sys.executable, SCRIPT, "--runs", "1", "--surfaces", "flat-disk", "--faces", "100"]
+    command += ["--against", "harmonic-circle", "--repeats", "1", "-o", tmp_path]
+    first, again = (
+        subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(2)
+    )
+    assert "| flat-disk | 96 |" in first.stdout
+    assert again.stdout == first.stdout == (tmp_path / "repeatability.md").read_text() + "\n"
+    assert "4/4] flat-disk / " in first.stderr
+    assert again.stderr.count("kept") == 4
