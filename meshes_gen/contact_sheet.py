@@ -39,11 +39,14 @@ up = np.cross(side, view)
 for direction, strength in ((view + 0.9 * up - 0.9 * side, 0.85), (view + 0.9 * side, 0.3), (view - up, 0.12)):
     plot.add_light(pv.Light(position=centre + 10 * radius * direction, focal_point=centre,
                             intensity=strength, light_type="scene light"))
+flatwise = V @ np.stack([side, up], axis=1)
+low, high = flatwise.min(0), flatwise.max(0)
+centre = centre + side * ((low + high)[0] / 2 - centre @ side) + up * ((low + high)[1] / 2 - centre @ up)
 plot.camera.position = centre + 6 * radius * view
 plot.camera.focal_point = centre
 plot.camera.up = (0, 0, 1)
 plot.camera.parallel_projection = True
-plot.camera.parallel_scale = 0.86 * radius
+plot.camera.parallel_scale = 0.53 * (high - low).max()
 plot.enable_anti_aliasing("ssaa")
 plot.screenshot(sys.argv[2])
 """

@@ -52,6 +52,6 @@ def left_hand_body(seed: int = 0) -> Body:
             d = join(d, tendon, 0.06)
         for a, b in (((0.34, -0.16, 0.30), (-0.30, -0.16, 0.42)), ((0.05, -0.2, -0.15), (0.3, -0.16, 0.36))):
             d = d + 0.02 * np.exp(-((cone(p, a, b, 0.0, 0.0) / 0.035) ** 2))
-        return d - 0.006 * broad(p) - 0.002 * fine(p)
+        return d - 0.004 * broad(p) - 0.001 * fine(p)
 
     return Body(f, halfspace((0, 0, 1), -0.92), (-0.85, -0.62, -1.1), (1.05, 0.45, 2.05), 190)

@@ -81,7 +81,7 @@ class Head:
         j = self.person.jaw
         d = ellipsoid(p, (0, 0.15, 0.30), (0.76, 0.94, 0.80))
         d = join(d, ellipsoid(p, (0, -0.20, -0.33), (0.57 * j, 0.58, 0.78)), 0.25)
-        d = join(d, ellipsoid(p, (0, -0.63, -0.98), (0.17 * j, 0.13, 0.13)), 0.2)
+        d = join(d, ellipsoid(p, (0, -0.60, -0.97), (0.20 * j, 0.15, 0.14)), 0.3)
         return join(d, ellipsoid(p, (0, -0.02, -0.72), (0.54 * j, 0.40, 0.28)), 0.25)
 
     def front(self, x: float, z: float) -> float:
@@ -126,6 +126,8 @@ class Head:
             d = join(d, sphere(p, cheek, (0.15 + 0.35 * e.cheeks) * P.cheeks), 0.16)
             d = carve(d, ellipsoid(p, eye + (0, -0.09, 0), (0.185, 0.12, 0.115)), 0.12)
             d = join(d, tube(p, c[f"brow_{side}"], [0.045, 0.055 * P.brow, 0.035]), 0.09)
+        base = np.array([0, self.front_cached(0, -0.34) - 0.02, -0.34])
+        d = join(d, cone(p, c["bridge"] + (0, 0.05, 0), base, 0.06, 0.125 * P.nose_width), 0.10)
         d = join(d, cone(p, c["bridge"], c["tip"], 0.045, 0.085 * P.nose_width), 0.10)
         for s in (-1, 1):
             wing = c["tip"] + (0.095 * s * P.nose_width, 0.10, -0.035)
@@ -158,16 +160,19 @@ class Head:
         return join(d, join(carve(lid, slit, 0.015), ball, 0.006), 0.035)
 
     def _lips(self, p: Real, d: Real, line: Real) -> Real:
-        thick = (0.050 + 0.12 * self.expression.pout) * self.person.lips
+        thick = (0.056 + 0.12 * self.expression.pout) * self.person.lips
         radii = thick * np.array([0.35, 0.85, 0.95, 0.85, 0.35])
-        inwards = np.array([0, 0.03, 0])
+        inwards = np.array([0, 0.02, 0])
         upper = line + inwards + np.outer([0.0, 0.9, 0.75, 0.9, 0.0], [0, 0, thick])
         lower = line + inwards - np.outer([0.0, 0.8, 1.1, 0.8, 0.0], [0, 0, thick])
+        if self.expression.pout > 0:  # the flesh behind lips pushed forward
+            d = join(d, tube(p, line + (0, 0.11, 0), 1.1 * thick, 0.03), 0.12)
         d = join(d, tube(p, upper, radii, 0.03), 0.04)
         d = join(d, tube(p, lower, 1.1 * radii, 0.03), 0.04)
-        groove = tube(p, line - inwards * 0.6, np.array([0.6, 1, 1, 1, 0.6]) * 0.017, 0.01)
+        depth = 0.017 + 0.12 * self.expression.pout
+        groove = tube(p, line - inwards * 0.6, np.array([0.6, 1, 1, 1, 0.6]) * depth, 0.01)
         d = carve(d, groove, 0.025)
-        return d - 0.03 * self.expression.pout * bump(p, line[2] + (0, 0, -0.02), 0.25)
+        return d
 
     def _ear(self, p: Real, s: int) -> Real:
         turn = rotation("z", -s * 25.0) @ rotation("x", -10.0)
@@ -191,7 +196,7 @@ class Head:
         return found
 
 
-def with_skin(head: Field, seed: int, amplitude: float = 0.006) -> Field:
+def with_skin(head: Field, seed: int, amplitude: float = 0.0025) -> Field:
     """The same head with the unevenness of skin, seeded."""
     broad, fine = Noise(seed, 0.30), Noise(seed + 1, 0.10)
     return lambda p: head(p) - amplitude * (broad(p) + 0.4 * fine(p))

@@ -10,7 +10,7 @@ time, so fine detail of the solid appears as the mesh becomes fine enough to hol
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -23,6 +23,7 @@ from cembench.errors import MeshError
 from cembench.geometry import topology
 from cembench.geometry.mesh import DiskMesh
 from meshes_gen.implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
+from meshes_gen.tunnels import plugged, plugs_for
 from meshes_gen.local_operations import (
     Faces,
     area_vectors,
@@ -104,25 +105,53 @@ def sample(body: Body) -> tuple[Real, Real, float]:
     return values, lower, spacing
 
 
-def march(body: Body) -> tuple[Real, Faces, float]:
-    """The surface f = 0 by marching cubes, oriented outwards; also the grid's spacing."""
+def march(body: Body) -> tuple[Real, Faces, Body, float]:
+    """The surface f = 0 by marching cubes, oriented outwards, cut where ``keep = 0``.
+
+    Tunnels a few cells wide are plugged. Also the body with its plugs, and the grid's spacing.
+    """
     values, lower, spacing = sample(body)
-    solid = values < 0  # islands and bubbles of the noise are no part of the surface
+    grid = values.shape
+    for attempt in range(9):
+        _remove_strays(values, spacing)
+        V, F = _cut_surface(body, values, lower, spacing)
+        if topology.euler_characteristic(F, len(V)) == 1 or attempt == 8:
+            break
+        plugs = plugs_for(V, F, spacing, (0.03 + 0.015 * attempt) * body.size)
+        if not plugs:
+            break
+        for plug in plugs:
+            low = np.floor((plug.centre - 2.6 * plug.radius - lower) / spacing).astype(int)
+            high = np.ceil((plug.centre + 2.6 * plug.radius - lower) / spacing).astype(int) + 1
+            low, high = np.clip(low, 0, grid), np.clip(high, 0, grid)
+            axes = [np.arange(low[d], high[d]) for d in range(3)]
+            index = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+            place = tuple(index.T)
+            values[place] = plug.add(lower + spacing * index, values[place])
+        body = replace(body, f=plugged(body.f, plugs))
+    return V, F, body, spacing
+
+
+def _remove_strays(values: Real, spacing: float) -> None:
+    """Fill bubbles and drop islands, in place: they are no part of the surface."""
     for inside in (True, False):
-        labels, count = ndimage.label(solid if inside else ~solid)
+        labels, count = ndimage.label(values < 0 if inside else values >= 0)
         if count > 1:
             sizes = np.bincount(labels.ravel())
             sizes[0] = 0
             stray = (labels > 0) & (labels != sizes.argmax())
-            values[stray] = spacing if inside else -spacing
+            values[stray] = 0.5 * spacing if inside else -0.5 * spacing
+
+
+def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
     V, F, _, _ = marching_cubes(values, 0.0)
-    V, F = lower + spacing * V.astype(np.float64), F.astype(np.int64)
-    V, F = compact(V, F)
+    V, F = compact(lower + spacing * V.astype(np.float64), F.astype(np.int64))
     V = to_surface(body.f, V, 0.05 * spacing, 0.4 * spacing, rounds=2)
     middle = V[F].mean(axis=1)
     if (area_vectors(V, F) * gradient(body.f, middle, 0.05 * spacing)).sum() < 0:
         F = np.ascontiguousarray(F[:, ::-1])
-    return V, F, spacing
+    shape = Shape(body, 0.02 * spacing)
+    return cut(V, F, body.keep, lambda p: shape.settle(p, spacing), spacing)
 
 
 def cut(V: Real, F: Faces, keep: Field, settle: Callable[[Real], Real], spacing: float) -> tuple[
@@ -416,9 +445,8 @@ def disk_of(
 
     """
     use = has_remeshing_filter() if use_pymeshlab is None else use_pymeshlab
-    V, F, spacing = march(body)
+    V, F, body, spacing = march(body)
     shape = Shape(body, 0.02 * spacing)
-    V, F = cut(V, F, body.keep, lambda p: shape.settle(p, spacing), spacing)
     levels = 0
     while faces / 4**levels > BASE:
         levels += 1
