@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshes_gen.implicit import Body, Noise, Real, bump, cone, ellipsoid, halfspace, join, meet, to_surface
+from meshes_gen.implicit import (
+    Body,
+    Noise,
+    Real,
+    bump,
+    cone,
+    ellipsoid,
+    halfspace,
+    join,
+    meet,
+    to_surface,
+)
+
 
 def human_brain_body(seed: int = 0) -> Body:
     """A hemisphere, front to the left (-x), its flat side away; `seed` sets the folds."""

@@ -30,7 +30,11 @@ def nefertiti_body(seed: int = 0) -> Body:
 
     def f(p: Real) -> Real:
         d = head(p)
-        d = join(d, tube(p, [(0, 0.16, -0.5), (lean, 0.34, -1.35), (0, 0.62, -2.2)], [0.40, 0.33, 0.42]), 0.15)
+        d = join(
+            d,
+            tube(p, [(0, 0.16, -0.5), (lean, 0.34, -1.35), (0, 0.62, -2.2)], [0.40, 0.33, 0.42]),
+            0.15,
+        )
         base = ellipsoid(p, (0, 0.70, -2.5), (1.15, 0.52, 0.55))
         d = join(d, base, 0.25)
         axis = np.array([0, 0.62, 0.78]) / np.hypot(0.62, 0.78)
@@ -54,7 +58,9 @@ def david_head_body(seed: int = 0) -> Body:
     k = np.arange(150)
     z = 1 - 2 * (k + 0.5) / 150
     angle = k * np.pi * (3 - np.sqrt(5))
-    way = np.stack([np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z], axis=1)
+    way = np.stack(
+        [np.sqrt(1 - z**2) * np.cos(angle), np.sqrt(1 - z**2) * np.sin(angle), z], axis=1
+    )
     way = way[(0.55 * way[:, 1] + way[:, 2] > -0.20) | ((way[:, 1] > 0.45) & (way[:, 2] > -0.8))]
     centre, radii = np.array([0, 0.24, 0.34]), np.array([0.82, 0.92, 0.82])
     roots = centre + way * radii
@@ -87,7 +93,9 @@ def bimba_statue_body(seed: int = 0) -> Body:
         d = head(p)
         wig = ellipsoid(p, (0, 0.26, 0.36), (0.83, 0.93, 0.80))
         strand = np.cos(26 * np.arctan2(p[:, 0], p[:, 2] + 0.3) + 2.0 * hair(p))
-        wig = wig - 0.020 * strand * np.clip((p[:, 1] + 0.65) * 4, 0, 1) * np.clip((1.0 - p[:, 1]) * 3, 0, 1)
+        wig = wig - 0.020 * strand * np.clip((p[:, 1] + 0.65) * 4, 0, 1) * np.clip(
+            (1.0 - p[:, 1]) * 3, 0, 1
+        )
         d = join(d, wig, 0.03)
         knot = ellipsoid(p, (0, 1.22, 0.42), (0.36, 0.30, 0.36))
         twist = np.arctan2(p[:, 2] - 0.42, p[:, 0])
@@ -112,7 +120,9 @@ def bimba_statue_body(seed: int = 0) -> Body:
 
 def knit_cap_man_body(seed: int = 0) -> Body:
     """A bearded man with a knit cap: turned-up rim, pompon, and every stitch a bump."""
-    person = Person(jaw=1.08, nose=1.15, nose_width=1.2, lips=0.95, eyes=0.95, brow=1.3, cheeks=1.05)
+    person = Person(
+        jaw=1.08, nose=1.15, nose_width=1.2, lips=0.95, eyes=0.95, brow=1.3, cheeks=1.05
+    )
     head = Head(person, NEUTRAL)
     beard = Noise(seed + 2, 0.13, waves=30)
     fluff = Noise(seed + 8, 0.10, waves=30)

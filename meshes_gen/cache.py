@@ -78,7 +78,7 @@ def cached(
 def read(mesh_type: type[M], path: Path) -> M | None:
     """The mesh in a file, checked; None if there is none or it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             V, F = data["V"], data["F"]
             digest, name = str(data["hash"]), str(data["name"])
             notices = tuple(str(notice) for notice in data["notices"])

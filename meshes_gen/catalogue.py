@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.errors import RegistryError
@@ -61,7 +62,9 @@ BODIES: Mapping[str, Callable[[int], Body]] = {
 }
 
 
-def stand_in(name: str, faces: int | None = None, *, seed: int = 0, delaunay: bool = True) -> DiskMesh:
+def stand_in(
+    name: str, faces: int | None = None, *, seed: int = 0, delaunay: bool = True
+) -> DiskMesh:
     """The stand-in for a row, with its row's counts or, with `faces`, at any size.
 
     `seed` sets whatever is random in its shape; with ``delaunay=False`` about 5 % of the interior
@@ -157,13 +160,14 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
     }
 
 
-def surface_facts(mesh: TriangleMesh) -> dict[str, Any]:
+def surface_facts(mesh: TriangleMesh, uv: NDArray[np.complex128] | None = None) -> dict[str, Any]:
     """What does `cembench list surfaces` tell about a mesh?
 
     Keys: vertices, faces, boundary_vertices (of the longest loop), loops, non_delaunay_share (of
-    the interior edges), notices.
+    the interior edges), notices; and, where a conformal map `uv` (n,) of the mesh is given, the
+    figures of :func:`conformal_factor_span`.
     """
-    return {
+    facts = {
         "vertices": mesh.n,
         "faces": mesh.m,
         "boundary_vertices": max(len(loop) for loop in mesh.loops),
@@ -171,13 +175,14 @@ def surface_facts(mesh: TriangleMesh) -> dict[str, Any]:
         "non_delaunay_share": non_delaunay_share(mesh),
         "notices": list(mesh.notices),
     }
+    return facts if uv is None else facts | conformal_factor_span(mesh, uv)
 
 
-def conformal_factor_span(mesh: TriangleMesh, uv: np.ndarray[Any, np.dtype[np.complex128]]) -> dict[str, float]:
+def conformal_factor_span(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, float]:
     """How unevenly does a map scale lengths: largest over smallest factor of a triangle?
 
-    The factor is the root of image area over surface area, a ratio of lengths. `span` is the ratio
-    of the extremes, `span_99_8` that of the 99.9 and 0.1 percentiles over the triangles.
+    The factor is the root of image area over surface area, a ratio of lengths. `conformal_factor_span` is the
+    ratio of the extremes, `conformal_factor_span_99_8` that of the 99.9 and 0.1 percentiles over the triangles.
     """
     a, b, c = (uv[mesh.F[:, k]] for k in range(3))
     image = np.abs(((b - a).conj() * (c - a)).imag)
@@ -185,7 +190,10 @@ def conformal_factor_span(mesh: TriangleMesh, uv: np.ndarray[Any, np.dtype[np.co
     flat = np.linalg.norm(np.cross(q - p, r - p), axis=1)
     factor = np.sqrt(np.maximum(image, 1e-300) / flat)
     low, high = np.percentile(factor, [0.1, 99.9])
-    return {"span": float(factor.max() / factor.min()), "span_99_8": float(high / low)}
+    return {
+        "conformal_factor_span": float(factor.max() / factor.min()),
+        "conformal_factor_span_99_8": float(high / low),
+    }
 
 
 def row_check(name: str, mesh: DiskMesh) -> dict[str, Any]:

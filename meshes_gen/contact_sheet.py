@@ -18,7 +18,17 @@ from cembench.geometry.mesh import TriangleMesh
 from meshes_gen.local_operations import vertex_normals
 
 #: From where each surface is seen (x, y, z); figures look along -y.
-VIEWS: Mapping[str, tuple[float, float, float]] = {}
+VIEWS: Mapping[str, tuple[float, float, float]] = {
+    "left-hand": (0.15, -1.0, 0.1),
+    "stanford-bunny": (-0.45, -1.0, 0.3),
+    "human-brain": (-0.25, -1.0, 0.25),
+    "foot": (0.8, -0.8, 0.35),
+    "cowboy-hat": (0.8, -0.9, 0.35),
+    "chinese-lion": (0.25, -1.0, 0.1),
+    "statue-of-liberty": (0.3, -1.0, 0.1),
+    "isis-statue": (0.7, -1.0, 0.2),
+    "nefertiti": (0.9, -0.7, 0.15),
+}
 DEFAULT_VIEW = (0.55, -1.0, 0.25)
 
 _DRAW = """
@@ -76,9 +86,7 @@ def thumbnail(
     return "matplotlib"
 
 
-def _draw_with_matplotlib(
-    mesh: TriangleMesh, path: Path, view: Sequence[float], size: int
-) -> None:
+def _draw_with_matplotlib(mesh: TriangleMesh, path: Path, view: Sequence[float], size: int) -> None:
     """The same by scattering shaded vertices, nearest last: no triangle is drawn a million times."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -95,7 +103,6 @@ def _draw_with_matplotlib(
     figure = Figure(figsize=(size / 100, size / 100), dpi=100)
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0, 0, 1, 1))
-    radius = np.ptp(mesh.V @ np.stack([side, up], axis=1), axis=0).max()
     dot = max(1.0, 2 * 72 / 100 * size * np.sqrt(2 / max(len(mesh.V), 1)))
     axes.scatter(
         mesh.V[order] @ side,
@@ -106,7 +113,6 @@ def _draw_with_matplotlib(
     )
     axes.set_aspect("equal")
     axes.set_axis_off()
-    del radius
     figure.savefig(path)
 
 

@@ -15,7 +15,6 @@ from meshes_gen.implicit import (
     Field,
     Noise,
     Real,
-    bump,
     carve,
     cone,
     ellipsoid,
@@ -141,7 +140,9 @@ class Head:
             for s in (-1, 1):
                 d = join(d, self._ear(p, s), 0.06)
         if self.neck:
-            throat = tube(p, [(0, 0.22, -0.55), (0, 0.30, -1.3), (0, 0.36, -2.2)], [0.43, 0.42, 0.5])
+            throat = tube(
+                p, [(0, 0.22, -0.55), (0, 0.30, -1.3), (0, 0.36, -2.2)], [0.43, 0.42, 0.5]
+            )
             d = join(d, throat, 0.15)
         return d
 

@@ -33,6 +33,8 @@ class Body:
         A box that holds the whole solid, with room to spare where it is not cut.
     cells : int
         Cells of the first sampling grid along the longest side of the box.
+    loops : int
+        Boundary loops that the cut leaves: 1 for a disk, more for a surface with holes.
 
     """
 
@@ -41,6 +43,7 @@ class Body:
     lower: tuple[float, float, float]
     upper: tuple[float, float, float]
     cells: int = 150
+    loops: int = 1
 
     @property
     def size(self) -> float:
@@ -131,9 +134,7 @@ def tube(p: Real, points: ArrayLike, radii: ArrayLike, k: float = 0.0) -> Real:
     """Distance to a chain of :func:`cone` through points (j, 3), joined with smoothness k."""
     c = np.asarray(points, dtype=np.float64)
     r = np.broadcast_to(np.asarray(radii, dtype=np.float64), (len(c),))
-    parts = [
-        cone(p, c[i], c[i + 1], float(r[i]), float(r[i + 1])) for i in range(len(c) - 1)
-    ]
+    parts = [cone(p, c[i], c[i + 1], float(r[i]), float(r[i + 1])) for i in range(len(c) - 1)]
     d = parts[0]
     for part in parts[1:]:
         d = join(d, part, k) if k else np.minimum(d, part)

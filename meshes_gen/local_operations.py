@@ -110,9 +110,9 @@ def _ranks(priority: Real) -> NDArray[np.int64]:
     return ranks
 
 
-def split(V: Real, F: Faces, edges: Edges, chosen: NDArray[np.int64], priority: Real) -> tuple[
-    Real, Faces
-]:
+def split(
+    V: Real, F: Faces, edges: Edges, chosen: NDArray[np.int64], priority: Real
+) -> tuple[Real, Faces]:
     """Halve those of the `chosen` edges that are first by `priority` in both their triangles."""
     rank = _ranks(priority)
     face, corner, ends = edges.face[chosen], edges.corner[chosen], edges.ends[chosen]
@@ -135,7 +135,12 @@ def split(V: Real, F: Faces, edges: Edges, chosen: NDArray[np.int64], priority: 
 
 
 def collapse(
-    V: Real, F: Faces, edges: Edges, chosen: NDArray[np.int64], length: Real, most: int | None = None
+    V: Real,
+    F: Faces,
+    edges: Edges,
+    chosen: NDArray[np.int64],
+    length: Real,
+    most: int | None = None,
 ) -> tuple[Real, Faces]:
     """Contract an independent set of the `chosen` edges, the shortest by `length` first.
 
@@ -186,7 +191,9 @@ def collapse(
         [((moved[:, c] - moved[:, (c + 1) % 3]) ** 2).sum(axis=1) for c in range(3)]
     ).max(axis=0)
     size = np.linalg.norm(after, axis=1)
-    cosine = (before * after).sum(axis=1) / np.maximum(np.linalg.norm(before, axis=1) * size, 1e-300)
+    cosine = (before * after).sum(axis=1) / np.maximum(
+        np.linalg.norm(before, axis=1) * size, 1e-300
+    )
     bad = (cosine < 0.3) | (size < 0.02 * longest)
     spoiled = np.zeros(len(ends), dtype=bool)
     spoiled[o.max(axis=1)[bad]] = True
@@ -281,7 +288,8 @@ def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
     An edge whose flip would fold the surface, or double an edge, stays.
     """
     n = len(V)
-    active = np.arange(len(F))  # after the first round, only what lies about the last changes
+    # After the first round, only what lies about the last changes.
+    active, near = np.arange(len(F)), np.ones(n, dtype=bool)
     for _ in range(rounds):
         part = F[active]
         edges = edges_of(part, n)
@@ -289,7 +297,8 @@ def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
         weight = quads.weight(V)
         bad = weight < -1e-10
         quads, weight = quads.take(bad), weight[bad]
-        better = (quads.flipped_weight(V) > weight + 1e-9) & ~quads.folds(V)
+        # All edges at p must be in sight, or the other diagonal may be an edge unseen.
+        better = near[quads.p] & (quads.flipped_weight(V) > weight + 1e-9) & ~quads.folds(V)
         quads, weight = quads.take(better), weight[better]
         if not len(weight):
             break
@@ -300,7 +309,7 @@ def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
         F[active] = part
         near = np.zeros(n, dtype=bool)
         near[F[active[changed]]] = True
-        for _ in range(3):  # three rings, so that all edges at a candidate's corners are in sight
+        for _ in range(2):
             near[F[near[F].any(axis=1)]] = True
         active = np.flatnonzero(near[F].any(axis=1))
     return F

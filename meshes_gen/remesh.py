@@ -12,18 +12,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from cembench.errors import MeshError
 from cembench.geometry import topology
-from cembench.geometry.mesh import DiskMesh
+from cembench.geometry.mesh import DiskMesh, TriangleMesh
 from meshes_gen.implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
-from meshes_gen.tunnels import plugged, plugs_for
 from meshes_gen.local_operations import (
     Faces,
     area_vectors,
@@ -39,6 +38,9 @@ from meshes_gen.local_operations import (
     subdivide,
     vertex_normals,
 )
+from meshes_gen.tunnels import plugged, plugs_for
+
+M = TypeVar("M", bound=TriangleMesh)
 
 #: Largest count that is remeshed directly; beyond it, subdivision.
 BASE = 110_000
@@ -115,7 +117,7 @@ def march(body: Body) -> tuple[Real, Faces, Body, float]:
     for attempt in range(9):
         _remove_strays(values, spacing)
         V, F = _cut_surface(body, values, lower, spacing)
-        if topology.euler_characteristic(F, len(V)) == 1 or attempt == 8:
+        if topology.euler_characteristic(F, len(V)) == 2 - body.loops or attempt == 8:
             break
         plugs = plugs_for(V, F, spacing, (0.03 + 0.015 * attempt) * body.size)
         if not plugs:
@@ -154,9 +156,9 @@ def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple
     return cut(V, F, body.keep, lambda p: shape.settle(p, spacing), spacing)
 
 
-def cut(V: Real, F: Faces, keep: Field, settle: Callable[[Real], Real], spacing: float) -> tuple[
-    Real, Faces
-]:
+def cut(
+    V: Real, F: Faces, keep: Field, settle: Callable[[Real], Real], spacing: float
+) -> tuple[Real, Faces]:
     """The part of the mesh with ``keep >= 0``, ending in vertices on ``keep = 0``.
 
     Vertices close to the cut are moved onto it by `settle` first, so that it leaves no splinters.
@@ -329,9 +331,9 @@ def to_boundary_count(V: Real, F: Faces, boundary: int, shape: Shape) -> tuple[R
     return V, F
 
 
-def to_face_count(V: Real, F: Faces, faces: int, shape: Shape, sizes: Sizes | None = None) -> tuple[
-    Real, Faces
-]:
+def to_face_count(
+    V: Real, F: Faces, faces: int, shape: Shape, sizes: Sizes | None = None
+) -> tuple[Real, Faces]:
     """Split long or collapse short interior edges until there are `faces` triangles, or one more.
 
     The boundary stays as it is.
@@ -422,7 +424,8 @@ def remesh(
     return V, F
 
 
-def disk_of(
+def mesh_of(
+    mesh_type: type[M],
     body: Body,
     faces: int,
     boundary: int,
@@ -431,17 +434,18 @@ def disk_of(
     delaunay: bool = True,
     seed: int = 0,
     use_pymeshlab: bool | None = None,
-) -> DiskMesh:
-    """The surface of `body` as a disk with `faces` triangles and `boundary` boundary vertices.
+) -> M:
+    """The surface of `body` with `faces` triangles and `boundary` boundary vertices in all.
 
-    The counts are met exactly up to one triangle. With ``delaunay=False`` about 5 % of the interior
-    edges, chosen with `seed`, are turned so that they are not Delaunay. The mesh's notices say
-    whether pymeshlab's filter was missing.
+    `mesh_type` is DiskMesh for a body with one boundary loop, HoledMesh for more. The counts are
+    met exactly, up to one triangle where their parities disagree. With ``delaunay=False`` about 5 %
+    of the interior edges, chosen with `seed`, are turned so that they are not Delaunay. The mesh's
+    notices say whether pymeshlab's filter was missing; `use_pymeshlab` overrides the check for it.
 
     Raises
     ------
     MeshError
-        The surface is no topological disk at this size: too few triangles for its features.
+        The surface has not the topology asked for: too few triangles for its features.
 
     """
     use = has_remeshing_filter() if use_pymeshlab is None else use_pymeshlab
@@ -467,11 +471,34 @@ def disk_of(
     V, F = split_chords(V, F)
     F = flip_ears(F, len(V))
     try:
-        return DiskMesh.from_arrays(V, F, name=name, notices=() if use else (FALLBACK_NOTE,))
+        return mesh_type.from_arrays(V, F, name=name, notices=() if use else (FALLBACK_NOTE,))
     except MeshError as error:
         raise MeshError(
-            f"{name} with {faces} faces came out unusable ({error}) Ask for more faces."
+            f"{name} with {faces} faces came out unusable: {error} Ask for more faces."
         ) from error
+
+
+def disk_of(
+    body: Body,
+    faces: int,
+    boundary: int,
+    *,
+    name: str,
+    delaunay: bool = True,
+    seed: int = 0,
+    use_pymeshlab: bool | None = None,
+) -> DiskMesh:
+    """:func:`mesh_of` for a topological disk."""
+    return mesh_of(
+        DiskMesh,
+        body,
+        faces,
+        boundary,
+        name=name,
+        delaunay=delaunay,
+        seed=seed,
+        use_pymeshlab=use_pymeshlab,
+    )
 
 
 def break_delaunay(V: Real, F: Faces, seed: int, share: float = NON_DELAUNAY) -> Faces:
