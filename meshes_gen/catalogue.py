@@ -181,8 +181,9 @@ def surface_facts(mesh: TriangleMesh, uv: NDArray[np.complex128] | None = None) 
 def conformal_factor_span(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, float]:
     """How unevenly does a map scale lengths: largest over smallest factor of a triangle?
 
-    The factor is the root of image area over surface area, a ratio of lengths. `conformal_factor_span` is the
-    ratio of the extremes, `conformal_factor_span_99_8` that of the 99.9 and 0.1 percentiles over the triangles.
+    The factor is the root of image area over surface area, a ratio of lengths.
+    `conformal_factor_span` is the ratio of the extremes, `conformal_factor_span_99_8` that of the
+    99.9 and 0.1 percentiles over the triangles.
     """
     a, b, c = (uv[mesh.F[:, k]] for k in range(3))
     image = np.abs(((b - a).conj() * (c - a)).imag)

@@ -46,12 +46,14 @@ radius = np.linalg.norm(V.max(0) - V.min(0)) / 2
 view = view / np.linalg.norm(view)
 side = np.cross(view, (0, 0, 1.0)); side /= np.linalg.norm(side) + 1e-12
 up = np.cross(side, view)
-for direction, strength in ((view + 0.9 * up - 0.9 * side, 0.85), (view + 0.9 * side, 0.3), (view - up, 0.12)):
+lights = (view + 0.9 * up - 0.9 * side, 0.85), (view + 0.9 * side, 0.3), (view - up, 0.12)
+for direction, strength in lights:
     plot.add_light(pv.Light(position=centre + 10 * radius * direction, focal_point=centre,
                             intensity=strength, light_type="scene light"))
 flatwise = V @ np.stack([side, up], axis=1)
 low, high = flatwise.min(0), flatwise.max(0)
-centre = centre + side * ((low + high)[0] / 2 - centre @ side) + up * ((low + high)[1] / 2 - centre @ up)
+middle = (low + high) / 2
+centre = centre + side * (middle[0] - centre @ side) + up * (middle[1] - centre @ up)
 plot.camera.position = centre + 6 * radius * view
 plot.camera.focal_point = centre
 plot.camera.up = (0, 0, 1)
@@ -87,7 +89,7 @@ def thumbnail(
 
 
 def _draw_with_matplotlib(mesh: TriangleMesh, path: Path, view: Sequence[float], size: int) -> None:
-    """The same by scattering shaded vertices, nearest last: no triangle is drawn a million times."""
+    """The same by scattering shaded vertices, the nearest last."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

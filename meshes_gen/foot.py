@@ -49,7 +49,7 @@ def foot_body(seed: int = 0) -> Body:
                 p,
                 [
                     (0.02 + 0.06 * k - 0.1, 0.25, 0.60 - 0.02 * k),
-                    np.add(base, (0, 0.0, radii[0] * 0.75)),
+                    (base[0], base[1], base[2] + 0.75 * radii[0]),
                 ],
                 0.015,
             )

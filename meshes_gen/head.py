@@ -172,8 +172,7 @@ class Head:
         d = join(d, tube(p, lower, 1.1 * radii, 0.03), 0.04)
         depth = 0.017 + 0.12 * self.expression.pout
         groove = tube(p, line - inwards * 0.6, np.array([0.6, 1, 1, 1, 0.6]) * depth, 0.01)
-        d = carve(d, groove, 0.025)
-        return d
+        return carve(d, groove, 0.025)
 
     def _ear(self, p: Real, s: int) -> Real:
         turn = rotation("z", -s * 25.0) @ rotation("x", -10.0)

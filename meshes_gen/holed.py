@@ -22,7 +22,7 @@ CAP, PLACE, HOLE = 100.0, 55.0, 14.0
 
 
 def hole_centres(holes: int) -> NDArray[np.float64]:
-    """Where are the holes of the cap? Points on the unit sphere (holes, 3), evenly about the pole."""
+    """Where are the holes of the cap? Unit vectors (holes, 3), evenly about the pole."""
     turn = 2 * np.pi * np.arange(holes) / holes
     polar = np.deg2rad(PLACE)
     return np.stack(

@@ -146,7 +146,7 @@ def _remove_strays(values: Real, spacing: float) -> None:
 
 
 def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
-    V, F, _, _ = marching_cubes(values, 0.0)
+    V, F, _, _ = marching_cubes(values, 0.0)  # type: ignore[no-untyped-call] # has no type hints
     V, F = compact(lower + spacing * V.astype(np.float64), F.astype(np.int64))
     V = to_surface(body.f, V, 0.05 * spacing, 0.4 * spacing, rounds=2)
     middle = V[F].mean(axis=1)
@@ -378,8 +378,8 @@ def flip_ears(F: Faces, n: int) -> Faces:
     if not (rim > 1).any():
         return F
     quads = quads_of(F, edges)
-    ear = (rim[quads.face] > 1).any(axis=1)
-    return flip(F, quads.take(ear), np.ones(int(ear.sum())), edges, n)[0]
+    ear = np.flatnonzero((rim[quads.face] > 1).any(axis=1))
+    return flip(F, quads.take(ear), np.ones(len(ear)), edges, n)[0]
 
 
 # ---- the whole ------------------------------------------------------------------------------
