@@ -140,22 +140,26 @@ def knit_cap_man_body(seed: int = 0) -> Body:
         top = np.clip((1.02 - q[:, 2]) * 3, 0, 1) * np.clip(np.hypot(q[:, 0], q[:, 1]) * 3, 0, 1)
         return amplitude * (0.7 * rib + 0.5 * leg * rib - 0.5) * top
 
-    def f(p: Real) -> Real:
-        d = head(p)
-        chin = bump(p, (0, -0.45, -0.95), (0.62, 0.42, 0.36))
-        mouth = bump(p, (0, -0.85, -0.62), (0.24, 0.3, 0.10))
-        d = d - np.clip(chin - mouth, 0, 1) * (0.09 + 0.018 * beard(p))
+    def knitted(p: Real) -> Real:
         cap = ellipsoid(p, middle + (0, 0.02, 0.02), (0.88, 1.04, 0.84))
         cap = meet(cap, 0.22 - p[:, 2] + 0.12 * p[:, 1], 0.05)
         rim = ellipsoid(p, middle, (0.955, 1.115, 1.12))
         level = p[:, 2] - 0.12 * p[:, 1]
         rim = meet(rim, np.abs(level - 0.33) - 0.17, 0.14)
         cap = join(cap - stitches(p, 0.034), rim - stitches(p, 0.040), 0.06)
-        d = join(d, cap, 0.02)
         outwards = p - tuft
         outwards /= np.maximum(np.linalg.norm(outwards, axis=1, keepdims=True), 1e-9) / 0.26
         pompon = sphere(p, tuft, 0.26) - 0.022 * fluff(outwards)
-        d = join(d, pompon, 0.03)
+        return join(cap, pompon, 0.03)
+
+    def f(p: Real) -> Real:
+        d = head(p)
+        chin = bump(p, (0, -0.45, -0.95), (0.62, 0.42, 0.36))
+        mouth = bump(p, (0, -0.85, -0.62), (0.24, 0.3, 0.10))
+        d = d - np.clip(chin - mouth, 0, 1) * (0.09 + 0.018 * beard(p))
+        upper = p[:, 2] > -0.35
+        if upper.any():
+            d[upper] = join(d[upper], knitted(p[upper]), 0.02)
         collar = ring(p, (0, 0.33, -1.62), (0, 0.1, 1), 0.46, 0.13)
         return join(d, collar, 0.05)
 

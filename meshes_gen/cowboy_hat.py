@@ -17,7 +17,7 @@ def cowboy_hat_body(seed: int = 0) -> Body:
         # The sides rise steeply, front and back dip.
         height = 0.62 * np.clip(np.abs(x) - 0.62, 0, None) ** 1.6 * 1.5 - 0.10 * (y / 1.6) ** 2
         slope = 1 + 0.9 * np.clip(np.abs(x) - 0.6, 0, 1)
-        slab = np.abs(z - height) / slope - 0.055
+        slab = np.abs(z - height) / slope - 0.075
         return meet(slab, (r - 1) * 1.3, 0.06)
 
     def crown(p: Real) -> Real:

@@ -117,8 +117,26 @@ class Head:
 
     def __call__(self, p: Real) -> Real:
         """The head at points p (n, 3)."""
-        P, e, c = self.person, self.expression, self._points()
         d = self.skull(p)
+        # Features are local: the sums with them change nothing farther away.
+        front = (p[:, 1] < -0.2) & (p[:, 2] < 0.55) & (p[:, 2] > -1.35)
+        if front.any():
+            d[front] = self._features(p[front], d[front])
+        if self.ears:
+            for s in (-1, 1):
+                near = np.abs(p - (0.80 * s, 0.12, -0.08)).max(axis=1) < 0.5
+                if near.any():
+                    d[near] = join(d[near], self._ear(p[near], s), 0.06)
+        if self.neck:
+            throat = tube(
+                p, [(0, 0.22, -0.55), (0, 0.30, -1.3), (0, 0.36, -2.2)], [0.43, 0.42, 0.5]
+            )
+            d = join(d, throat, 0.15)
+        return d
+
+    def _features(self, p: Real, d: Real) -> Real:
+        """The skull's field d at p with cheeks, brows, eyes, nose and mouth."""
+        P, e, c = self.person, self.expression, self._points()
         for s, side in ((-1, "right"), (1, "left")):
             eye = c[f"eye_{side}"]
             cheek = (0.36 * s, self.front_cached(0.36 * s, -0.30) + 0.13, -0.30 + e.cheeks)
@@ -135,16 +153,7 @@ class Head:
             d = carve(d, cone(p, hole, hole + (0.01 * s, 0.05, 0.09), 0.030, 0.02), 0.02)
         for side in ("right", "left"):
             d = self._eye(p, d, c[f"eye_{side}"])
-        d = self._lips(p, d, c["mouth"])
-        if self.ears:
-            for s in (-1, 1):
-                d = join(d, self._ear(p, s), 0.06)
-        if self.neck:
-            throat = tube(
-                p, [(0, 0.22, -0.55), (0, 0.30, -1.3), (0, 0.36, -2.2)], [0.43, 0.42, 0.5]
-            )
-            d = join(d, throat, 0.15)
-        return d
+        return self._lips(p, d, c["mouth"])
 
     def front_cached(self, x: float, z: float) -> float:
         """:meth:`front`, remembered."""

@@ -119,7 +119,7 @@ def march(body: Body) -> tuple[Real, Faces, Body, float]:
         V, F = _cut_surface(body, values, lower, spacing)
         if topology.euler_characteristic(F, len(V)) == 2 - body.loops or attempt == 8:
             break
-        plugs = plugs_for(V, F, spacing, (0.03 + 0.015 * attempt) * body.size)
+        plugs = plugs_for(V, F, spacing, min(0.03 + 0.015 * attempt, 0.09) * body.size)
         if not plugs:
             break
         for plug in plugs:

@@ -67,10 +67,10 @@ def statue_of_liberty_body(seed: int = 0) -> Body:
         d = join(d, hair - 0.012 * np.cos(40 * p[:, 2] + 9 * p[:, 0]), 0.04)
         crown = ring(p, (0, -0.02, 5.24), (0, -0.25, 1), 0.33, 0.055)
         d = join(d, crown, 0.03)
-        for turn in np.deg2rad([-66, -44, -22, 0, 22, 44, 66]):
+        for turn in np.deg2rad([-60, -40, -20, 0, 20, 40, 60]):
             out = np.array([np.sin(turn), -0.10, np.cos(turn)])
             a = np.array([0.0, -0.02, 5.14]) + 0.06 * out
-            d = join(d, cone(p, a, a + 0.80 * out, 0.058, 0.028), 0.03)
+            d = join(d, cone(p, a, a + 0.66 * out, 0.055, 0.030), 0.03)
         arm = [(-0.55, 0.0, 3.95), (-0.88, -0.06, 4.75), (-0.98, -0.10, 5.55)]
         d = join(d, tube(p, arm, [0.22, 0.16, 0.115], 0.05), 0.14)
         d = join(d, sphere(p, (-0.45, 0.0, 4.10), 0.32), 0.15)
