@@ -7,6 +7,7 @@ Units of about 9 cm: the face looks along -y, z is up, x = 0 is the plane of sym
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,20 +101,21 @@ class Head:
         y = np.array([self.front(a, b) for a, b in zip(x, z, strict=True)]) - push
         return np.stack([x, y, z], axis=1)
 
+    @cached_property
     def _points(self) -> dict[str, NDArray[np.float64]]:
-        if not self._cache:
-            P, c = self.person, self._cache
-            c["mouth"] = self._mouth()
-            for s, side in ((-1, "right"), (1, "left")):
-                x = 0.275 * s
-                c[f"eye_{side}"] = np.array([x, self.front(x, -0.02) + 0.075, -0.02])
-                bx = np.array([0.12, 0.30, 0.47]) * s
-                bz = np.array([0.13, 0.185, 0.13]) + self.expression.brows[(s + 1) // 2]
-                by = np.array([self.front(a, b) for a, b in zip(bx, bz, strict=True)]) + 0.0
-                c[f"brow_{side}"] = np.stack([bx, by, bz], axis=1)
-            c["tip"] = np.array([0, self.front(0, -0.33) - 0.21 * P.nose, -0.335])
-            c["bridge"] = np.array([0, self.front(0, 0.06) - 0.0, 0.08])
-        return self._cache
+        # Whole or not at all: fields are evaluated on several threads.
+        P, c = self.person, dict[str, NDArray[np.float64]]()
+        c["mouth"] = self._mouth()
+        for s, side in ((-1, "right"), (1, "left")):
+            x = 0.275 * s
+            c[f"eye_{side}"] = np.array([x, self.front(x, -0.02) + 0.075, -0.02])
+            bx = np.array([0.12, 0.30, 0.47]) * s
+            bz = np.array([0.13, 0.185, 0.13]) + self.expression.brows[(s + 1) // 2]
+            by = np.array([self.front(a, b) for a, b in zip(bx, bz, strict=True)]) + 0.0
+            c[f"brow_{side}"] = np.stack([bx, by, bz], axis=1)
+        c["tip"] = np.array([0, self.front(0, -0.33) - 0.21 * P.nose, -0.335])
+        c["bridge"] = np.array([0, self.front(0, 0.06) - 0.0, 0.08])
+        return c
 
     def __call__(self, p: Real) -> Real:
         """The head at points p (n, 3)."""
@@ -136,7 +138,7 @@ class Head:
 
     def _features(self, p: Real, d: Real) -> Real:
         """The skull's field d at p with cheeks, brows, eyes, nose and mouth."""
-        P, e, c = self.person, self.expression, self._points()
+        P, e, c = self.person, self.expression, self._points
         for s, side in ((-1, "right"), (1, "left")):
             eye = c[f"eye_{side}"]
             cheek = (0.36 * s, self.front_cached(0.36 * s, -0.30) + 0.13, -0.30 + e.cheeks)
@@ -176,7 +178,7 @@ class Head:
         upper = line + inwards + np.outer([0.0, 0.9, 0.75, 0.9, 0.0], [0, 0, thick])
         lower = line + inwards - np.outer([0.0, 0.8, 1.1, 0.8, 0.0], [0, 0, thick])
         if self.expression.pout > 0:  # the flesh behind lips pushed forward
-            d = join(d, tube(p, line + (0, 0.11, 0), 1.1 * thick, 0.03), 0.12)
+            d = join(d, tube(p, line + (0, 0.10, 0), 1.3 * thick, 0.03), 0.12)
         d = join(d, tube(p, upper, radii, 0.03), 0.04)
         d = join(d, tube(p, lower, 1.1 * radii, 0.03), 0.04)
         depth = 0.017 + 0.12 * self.expression.pout
@@ -192,7 +194,7 @@ class Head:
 
     def landmarks(self) -> dict[str, NDArray[np.float64]]:
         """Points near the surface: nose tip, eye corners, mouth corners; (3,) each."""
-        c, P = self._points(), self.person
+        c, P = self._points, self.person
         found = {
             "nose_tip": c["tip"] + (0, -0.085 * P.nose_width, 0),
             "mouth_corner_right": c["mouth"][0],
