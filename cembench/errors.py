@@ -24,6 +24,10 @@ class RecordError(CembenchError):
     """A run directory, or a record in it, cannot be read or written."""
 
 
+class DatasetError(CembenchError):
+    """A real mesh is unknown, cannot be fetched, or is not what its checksum says."""
+
+
 class AlgorithmFailed(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
     """An algorithm gave up; the message is the cause."""
 

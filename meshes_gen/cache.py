@@ -1,0 +1,119 @@
+"""Surfaces made once: a cache keyed by everything that they depend on.
+
+A file is written under a name of its own and then renamed, so a reader sees a whole file or none;
+two processes that make the same surface at once both succeed, and the later one wins. What cannot
+be read back (a half-written or damaged file) counts as absent.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import uuid
+import zipfile
+from collections.abc import Callable, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+import pooch
+
+from cembench.errors import MeshError
+from cembench.geometry.mesh import TriangleMesh
+
+#: Raise this when a generator's result changes: every cached surface is then made anew.
+GENERATOR_VERSION = 1
+
+#: Overrides the directory of the cache.
+VARIABLE = "CEMBENCH_CACHE"
+
+M = TypeVar("M", bound=TriangleMesh)
+
+
+def cache_directory() -> Path:
+    """Where are surfaces and downloads kept? `CEMBENCH_CACHE`, or the user's cache directory."""
+    return Path(os.environ.get(VARIABLE) or pooch.os_cache("cembench"))
+
+
+def _version(package: str) -> str | None:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return None
+
+
+def content_key(name: str, parameters: Mapping[str, Any]) -> str:
+    """The key of a surface: generator version, name, parameters and library versions; 32 digits."""
+    libraries = ("numpy", "scipy", "scikit-image", "pymeshlab")
+    content = {
+        "generator": GENERATOR_VERSION,
+        "name": name,
+        "parameters": dict(parameters),
+        "libraries": {package: _version(package) for package in libraries},
+    }
+    text = json.dumps(content, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+
+def cached(
+    mesh_type: type[M], name: str, parameters: Mapping[str, Any], make: Callable[[], M]
+) -> M:
+    """The surface of this name and parameters: from the cache, else made by `make` and kept.
+
+    A cache that cannot be written to is done without.
+    """
+    path = cache_directory() / "surfaces" / f"{name}-{content_key(name, parameters)}.npz"
+    mesh = read(mesh_type, path)
+    if mesh is None:
+        mesh = make()
+        try:
+            write(mesh, path)
+        except OSError:
+            return mesh
+    return mesh
+
+
+def read(mesh_type: type[M], path: Path) -> M | None:
+    """The mesh in a file, checked; None if there is none or it is damaged."""
+    try:
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
+            V, F = data["V"], data["F"]
+            digest, name = str(data["hash"]), str(data["name"])
+            notices = tuple(str(notice) for notice in data["notices"])
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    # The mesh passed its checks when it was written; the hash says that it is the same one.
+    mesh = mesh_type(V, F.astype(np.int64), name, notices)
+    if mesh.hash != digest:
+        return None
+    mesh.V.setflags(write=False)
+    mesh.F.setflags(write=False)
+    return mesh
+
+
+def write(mesh: TriangleMesh, path: Path) -> None:
+    """Write a mesh whole or not at all."""
+    if mesh.n > np.iinfo(np.int32).max:
+        raise MeshError(
+            f"{mesh.name} has {mesh.n} vertices; the cache holds at most "
+            f"{np.iinfo(np.int32).max}. Use the mesh without the cache."
+        )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.stem}-{os.getpid()}-{uuid.uuid4().hex}.part")
+    try:
+        with temporary.open("wb") as file:
+            np.savez(
+                file,
+                V=mesh.V,
+                F=mesh.F.astype(np.int32),
+                hash=np.array(mesh.hash),
+                name=np.array(mesh.name),
+                notices=np.array(mesh.notices, dtype=np.str_),
+            )
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,36 @@
+"""A cone with its tip: a power of the unrolled sector maps it conformally onto a disk."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.geometry.mesh import DiskMesh
+from cembench.registry import surface
+from meshes_gen.disk_grid import disk_grid
+
+
+@surface("cone", title="Cone", source="closed form")
+def cone(
+    faces: Annotated[int, Field(ge=24)] = 20_000,
+    *,
+    angle: Annotated[float, Field(gt=0, lt=90)] = 30.0,
+) -> DiskMesh:
+    """A round cone of slant length 1; `angle` in degrees between its axis and its side.
+
+    Its exact conformal map to the unit disk is :func:`exact_map`.
+    """
+    z, F = disk_grid(faces)
+    tilt = np.deg2rad(angle)
+    V = np.stack([np.sin(tilt) * z.real, np.sin(tilt) * z.imag, -np.cos(tilt) * np.abs(z)], axis=1)
+    return DiskMesh.from_arrays(V, F, name="cone")
+
+
+def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex128]:
+    """The cone's conformal map to the unit disk: the slant length to the power 1 / sin(angle)."""
+    slant = np.linalg.norm(V, axis=1)
+    around = np.arctan2(V[:, 1], V[:, 0])
+    return slant ** (1 / np.sin(np.deg2rad(angle))) * np.exp(1j * around)

@@ -1,0 +1,24 @@
+"""Faces cut out of a parametric head: Liu's with four expressions, Ho's with two."""
+
+from __future__ import annotations
+
+from meshes_gen.head import NEUTRAL, POUTING, SMILE, WRY, Expression, Head, Person, with_skin
+from meshes_gen.implicit import Body, Field, Real, ellipsoid
+
+LIU = Person(jaw=1.0, nose=1.0, nose_width=1.0, lips=1.0, cheeks=1.0, skin_seed=11)
+HO = Person(
+    jaw=1.1, nose=0.85, nose_width=1.2, lips=1.1, eyes=0.8, brow=0.9, cheeks=1.15, skin_seed=23
+)
+EXPRESSIONS = {"neutral": NEUTRAL, "smile": SMILE, "pouting": POUTING, "wry": WRY}
+
+
+def mask(p: Real) -> Real:
+    """Positive on the face: from the hairline to under the chin, back to the ears."""
+    return -ellipsoid(p, (0, -0.62, -0.10), (0.92, 0.72, 1.12))
+
+
+def face_body(person: Person, expression: Expression, seed: int = 0) -> Body:
+    """The solid of a person's head with an expression, cut to the face."""
+    head = Head(person, expression, ears=False)
+    f: Field = with_skin(head, person.skin_seed + seed)
+    return Body(f, mask, (-0.95, -1.30, -1.60), (0.95, 0.35, 1.25), 170)

@@ -1,0 +1,529 @@
+"""From an implicit solid to a disk of given counts.
+
+Marching cubes, a clean cut along ``keep = 0``, isotropic remeshing (pymeshlab's filter, or local
+operations alone where the filter is missing), then: the boundary resampled to its count, the
+triangles to theirs, everything kept on the surface by Newton steps, and Delaunay flips. Large
+counts are reached by subdividing a mesh of at most :data:`BASE` triangles, back to the surface each
+time, so fine detail of the solid appears as the mesh becomes fine enough to hold it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+from scipy import ndimage
+from scipy.spatial import cKDTree
+from skimage.measure import marching_cubes
+
+from cembench.errors import MeshError
+from cembench.geometry import topology
+from cembench.geometry.mesh import DiskMesh, TriangleMesh
+from meshes_gen.implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
+from meshes_gen.local_operations import (
+    Faces,
+    area_vectors,
+    boundary_mask,
+    collapse,
+    compact,
+    delaunay_flips,
+    edges_of,
+    flip,
+    mean_of_neighbours,
+    quads_of,
+    split,
+    subdivide,
+    vertex_normals,
+)
+from meshes_gen.tunnels import plugged, plugs_for
+
+M = TypeVar("M", bound=TriangleMesh)
+
+#: Largest count that is remeshed directly; beyond it, subdivision.
+BASE = 110_000
+
+#: Which share of the interior edges `delaunay=False` leaves not Delaunay.
+NON_DELAUNAY = 0.05
+
+#: What the notices say where pymeshlab's filter is missing.
+FALLBACK_NOTE = (
+    "remeshed by local operations alone: pymeshlab's isotropic remeshing filter is missing "
+    "(see `cembench doctor`)"
+)
+
+
+@lru_cache(maxsize=1)
+def has_remeshing_filter() -> bool:
+    """Can pymeshlab remesh here? Its plug-ins vanish silently where libOpenGL is missing."""
+    try:
+        import pymeshlab
+    except ImportError:
+        return False
+    return hasattr(pymeshlab.MeshSet, "meshing_isotropic_explicit_remeshing") or hasattr(
+        pymeshlab.MeshSet(), "meshing_isotropic_explicit_remeshing"
+    )
+
+
+def remeshing_advice() -> str | None:
+    """What should be installed so that surfaces are remeshed the usual way? None: nothing."""
+    if has_remeshing_filter():
+        return None
+    return (
+        "pymeshlab's filter meshing_isotropic_explicit_remeshing is missing; surfaces are remeshed "
+        "by local operations instead, which gives other meshes. Install pymeshlab and the system "
+        "library libOpenGL (Debian, Ubuntu: apt-get install libopengl0)."
+    )
+
+
+# ---- a first mesh ---------------------------------------------------------------------------
+
+
+def sample(body: Body) -> tuple[Real, Real, float]:
+    """The field on a grid: values, lower corner, spacing.
+
+    Away from the surface, where only the sign matters, values come from a grid four times coarser.
+    """
+    lower, extent = np.array(body.lower), np.subtract(body.upper, body.lower)
+    spacing = body.size / body.cells
+    coarse_shape = np.ceil(extent / (4 * spacing)).astype(int) + 1
+    axes = [lower[d] + 4 * spacing * np.arange(coarse_shape[d]) for d in range(3)]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    coarse = evaluate(body.f, points).reshape(tuple(coarse_shape))
+    values = coarse
+    for axis in range(3):
+        count = coarse_shape[axis]
+        at = np.arange(4 * (count - 1) + 1) / 4
+        low = np.minimum(at.astype(int), count - 2)
+        shape = [1, 1, 1]
+        shape[axis] = len(at)
+        t = (at - low).reshape(shape)
+        values = np.take(values, low, axis) * (1 - t) + np.take(values, low + 1, axis) * t
+    near = np.abs(values) < 10 * spacing
+    index = np.argwhere(near)
+    values[near] = evaluate(body.f, lower + spacing * index)
+    return values, lower, spacing
+
+
+def march(body: Body) -> tuple[Real, Faces, Body, float]:
+    """The surface f = 0 by marching cubes, oriented outwards, cut where ``keep = 0``.
+
+    Tunnels a few cells wide are plugged. Also the body with its plugs, and the grid's spacing.
+    """
+    values, lower, spacing = sample(body)
+    grid = values.shape
+    for attempt in range(9):
+        _remove_strays(values, spacing)
+        V, F = _cut_surface(body, values, lower, spacing)
+        if topology.euler_characteristic(F, len(V)) == 2 - body.loops or attempt == 8:
+            break
+        plugs = plugs_for(V, F, spacing, min(0.03 + 0.015 * attempt, 0.09) * body.size)
+        if not plugs:
+            break
+        for plug in plugs:
+            low = np.floor((plug.centre - 2.6 * plug.radius - lower) / spacing).astype(int)
+            high = np.ceil((plug.centre + 2.6 * plug.radius - lower) / spacing).astype(int) + 1
+            low, high = np.clip(low, 0, grid), np.clip(high, 0, grid)
+            axes = [np.arange(low[d], high[d]) for d in range(3)]
+            index = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+            place = tuple(index.T)
+            values[place] = plug.add(lower + spacing * index, values[place])
+        body = replace(body, f=plugged(body.f, plugs))
+    return V, F, body, spacing
+
+
+def _remove_strays(values: Real, spacing: float) -> None:
+    """Fill bubbles and drop islands, in place: they are no part of the surface."""
+    for inside in (True, False):
+        labels, count = ndimage.label(values < 0 if inside else values >= 0)
+        if count > 1:
+            sizes = np.bincount(labels.ravel())
+            sizes[0] = 0
+            stray = (labels > 0) & (labels != sizes.argmax())
+            values[stray] = 0.5 * spacing if inside else -0.5 * spacing
+
+
+def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
+    V, F, _, _ = marching_cubes(values, 0.0)  # type: ignore[no-untyped-call] # has no type hints
+    V, F = compact(lower + spacing * V.astype(np.float64), F.astype(np.int64))
+    V = to_surface(body.f, V, 0.05 * spacing, 0.4 * spacing, rounds=2)
+    middle = V[F].mean(axis=1)
+    if (area_vectors(V, F) * gradient(body.f, middle, 0.05 * spacing)).sum() < 0:
+        F = np.ascontiguousarray(F[:, ::-1])
+    shape = Shape(body, 0.02 * spacing)
+    return cut(V, F, body.keep, lambda p: shape.settle(p, spacing), spacing)
+
+
+def cut(
+    V: Real, F: Faces, keep: Field, settle: Callable[[Real], Real], spacing: float
+) -> tuple[Real, Faces]:
+    """The part of the mesh with ``keep >= 0``, ending in vertices on ``keep = 0``.
+
+    Vertices close to the cut are moved onto it by `settle` first, so that it leaves no splinters.
+    """
+    g = evaluate(keep, V)
+    close = np.flatnonzero(np.abs(g) < 0.25 * spacing)
+    V = V.copy()
+    V[close] = settle(V[close])
+    g = evaluate(keep, V)
+    g[np.abs(g) < 1e-3 * spacing] = 0.0
+    sign = np.sign(g).astype(int)
+    s = sign[F]
+    kept = [F[(s >= 0).all(axis=1) & (s > 0).any(axis=1)]]
+    mixed = F[(s > 0).any(axis=1) & (s < 0).any(axis=1)]
+    s = sign[mixed]
+    edges = edges_of(mixed, len(V))
+    crossing = edges.ends[sign[edges.ends].prod(axis=1) < 0]
+    crossing = np.sort(crossing, axis=1)
+    ga, gb = g[crossing[:, 0]], g[crossing[:, 1]]
+    t = (ga / (ga - gb))[:, None]
+    key = crossing[:, 0] * len(V) + crossing[:, 1]
+    order = np.argsort(key)
+    key = key[order]
+    new = ((1 - t) * V[crossing[:, 0]] + t * V[crossing[:, 1]])[order]
+
+    def between(a: Faces, b: Faces) -> Faces:
+        return len(V) + np.searchsorted(key, np.minimum(a, b) * len(V) + np.maximum(a, b))
+
+    for c in range(3):
+        a, b, d = mixed[:, c], mixed[:, (c + 1) % 3], mixed[:, (c + 2) % 3]
+        sa, sb, sd = s[:, c], s[:, (c + 1) % 3], s[:, (c + 2) % 3]
+        for pattern, triangles in (
+            ((1, -1, -1), lambda a, b, d: [(a, between(a, b), between(a, d))]),
+            ((1, 0, -1), lambda a, b, d: [(a, b, between(a, d))]),
+            ((1, -1, 0), lambda a, b, d: [(a, between(a, b), d)]),
+            (
+                (-1, 1, 1),
+                lambda a, b, d: [(between(a, b), b, d), (between(a, b), d, between(a, d))],
+            ),
+        ):
+            k = (sa == pattern[0]) & (sb == pattern[1]) & (sd == pattern[2])
+            kept += [np.stack(corners, axis=1) for corners in triangles(a[k], b[k], d[k])]
+    V, F = compact(np.concatenate([V, new]), np.concatenate(kept))
+    return largest_piece(V, F)
+
+
+def largest_piece(V: Real, F: Faces) -> tuple[Real, Faces]:
+    """The connected component with the most vertices."""
+    count, label = topology.components(F, len(V))
+    if count > 1:
+        F = F[label[F[:, 0]] == np.bincount(label).argmax()]
+    return compact(V, F)
+
+
+# ---- sizes ----------------------------------------------------------------------------------
+
+
+@dataclass
+class Shape:
+    """What keeps vertices on the surface: inside on f = 0, the boundary also on keep = 0."""
+
+    body: Body
+    step: float
+
+    def settle(self, p: Real, reach: float) -> Real:
+        """Points of the boundary curve near p."""
+        return to_curve(self.body.f, self.body.keep, p, self.step, reach)
+
+    def project(self, V: Real, F: Faces, reach: float, rounds: int = 3) -> Real:
+        """All vertices back to where they belong, none moving more than `reach` a round."""
+        rim = boundary_mask(F, len(V))
+        V = V.copy()
+        V[~rim] = to_surface(self.body.f, V[~rim], self.step, reach, rounds)
+        V[rim] = self.settle(V[rim], reach)
+        return V
+
+
+def edge_length(area: float, faces: int) -> float:
+    """The edge of an equilateral triangle, `faces` of which have this area."""
+    return float(np.sqrt(4 * area / (np.sqrt(3) * faces)))
+
+
+def relax(V: Real, F: Faces, shape: Shape, reach: float, strength: float = 0.6) -> Real:
+    """Even out the vertices along the surface; those of the boundary along the boundary."""
+    n = len(V)
+    edges = edges_of(F, n)
+    ends = edges.ends[edges.on_boundary]
+    rim = np.zeros(n, dtype=bool)
+    rim[ends] = True
+    move = mean_of_neighbours(V, F) - V
+    normal = vertex_normals(V, F)
+    move -= normal * (move * normal).sum(axis=1, keepdims=True)
+    along = np.zeros((n, 3))
+    for a, b in (ends.T, ends.T[::-1]):
+        np.add.at(along, a, 0.5 * V[b])
+    move[rim] = along[rim] - V[rim]
+    return shape.project(V + strength * move, F, reach, rounds=2)
+
+
+class Sizes:
+    """Wanted edge length: `inside` far from the boundary, `rim` on it, graded between them."""
+
+    def __init__(self, V: Real, F: Faces, inside: float, rim: float) -> None:
+        self.inside, self.rim = inside, rim
+        self._tree = cKDTree(V[boundary_mask(F, len(V))])
+        # The length changes by at most a quarter of the distance.
+        self._reach = 4 * max(abs(rim - inside), 0.25 * min(rim, inside))
+
+    def at(self, p: Real) -> Real:
+        """Wanted length at points (k, 3)."""
+        d, _ = self._tree.query(p)
+        return self.inside + (self.rim - self.inside) * np.exp(-d / self._reach)
+
+
+def resize(V: Real, F: Faces, shape: Shape, sizes: Sizes) -> tuple[Real, Faces]:
+    """One round of splits, collapses, flips and relaxation towards the wanted lengths."""
+    for _ in range(3):
+        edges = edges_of(F, len(V))
+        ratio = _length(V, edges.ends) / sizes.at(V[edges.ends].mean(axis=1))
+        long = np.flatnonzero(ratio > 4 / 3)
+        if len(long) < 0.002 * len(ratio):
+            break
+        V, F = split(V, F, edges, long, ratio[long])
+    for _ in range(4):
+        edges = edges_of(F, len(V))
+        ratio = _length(V, edges.ends) / sizes.at(V[edges.ends].mean(axis=1))
+        short = np.flatnonzero(ratio < 4 / 5)
+        before = len(V)
+        V, F = collapse(V, F, edges, short, ratio[short])
+        if before - len(V) < 0.002 * before:
+            break
+    F = delaunay_flips(V, F)
+    V = relax(V, F, shape, 0.5 * sizes.inside)
+    return V, delaunay_flips(V, F)
+
+
+def _length(V: Real, ends: Faces) -> Real:
+    return np.linalg.norm(V[ends[:, 0]] - V[ends[:, 1]], axis=1)
+
+
+def perimeter(V: Real, F: Faces) -> float:
+    """Length of the boundary."""
+    edges = edges_of(F, len(V))
+    return float(_length(V, edges.ends[edges.on_boundary]).sum())
+
+
+def area(V: Real, F: Faces) -> float:
+    """Area of the surface."""
+    return 0.5 * float(np.linalg.norm(area_vectors(V, F), axis=1).sum())
+
+
+def to_boundary_count(V: Real, F: Faces, boundary: int, shape: Shape) -> tuple[Real, Faces]:
+    """Split the longest or collapse the shortest boundary edges until there are `boundary`."""
+    for _ in range(60):
+        edges = edges_of(F, len(V))
+        rim = np.flatnonzero(edges.on_boundary)
+        surplus = len(rim) - boundary
+        if surplus == 0:
+            break
+        length = _length(V, edges.ends[rim])
+        order = np.argsort(length, kind="stable")
+        if surplus > 0:
+            some = order[: max(surplus, min(len(rim), 4 * surplus))]
+            V, F = collapse(V, F, edges, rim[some], length[some], most=surplus)
+        else:
+            some = order[surplus:]
+            V, F = split(V, F, edges, rim[some], length[some])
+        V = relax(V, F, shape, float(length.mean()), 0.3)
+        F = delaunay_flips(V, F)
+    return V, F
+
+
+def to_face_count(
+    V: Real, F: Faces, faces: int, shape: Shape, sizes: Sizes | None = None
+) -> tuple[Real, Faces]:
+    """Split long or collapse short interior edges until there are `faces` triangles, or one more.
+
+    The boundary stays as it is.
+    """
+    for _ in range(60):
+        surplus = (len(F) - faces) // 2
+        if surplus == 0:
+            break
+        edges = edges_of(F, len(V))
+        rim = boundary_mask(F, len(V))
+        inner = np.flatnonzero(~rim[edges.ends].any(axis=1))
+        length = _length(V, edges.ends[inner])
+        if sizes is not None:
+            length = length / sizes.at(V[edges.ends[inner]].mean(axis=1))
+        order = np.argsort(length, kind="stable")
+        if surplus > 0:
+            some = order[: min(len(order), 12 * surplus + 20)]
+            V, F = collapse(V, F, edges, inner[some], length[some], most=surplus)
+        else:
+            some = order[max(0, len(order) + surplus) :]
+            V, F = split(V, F, edges, inner[some], length[some])
+        F = delaunay_flips(V, F)
+    return V, F
+
+
+def split_chords(V: Real, F: Faces) -> tuple[Real, Faces]:
+    """Split interior edges between two boundary vertices, which Definition 1 does not like."""
+    for _ in range(5):
+        edges = edges_of(F, len(V))
+        rim = boundary_mask(F, len(V))
+        chords = np.flatnonzero(~edges.on_boundary & rim[edges.ends].all(axis=1))
+        if not len(chords):
+            break
+        V, F = split(V, F, edges, chords, np.ones(len(chords)))
+    return V, F
+
+
+def flip_ears(F: Faces, n: int) -> Faces:
+    """Give every boundary vertex an interior neighbour: flip the edge that cuts it off."""
+    edges = edges_of(F, n)
+    rim = np.bincount(edges.face[edges.on_boundary, 0], minlength=len(F))
+    if not (rim > 1).any():
+        return F
+    quads = quads_of(F, edges)
+    ear = np.flatnonzero((rim[quads.face] > 1).any(axis=1))
+    return flip(F, quads.take(ear), np.ones(len(ear)), edges, n)[0]
+
+
+# ---- the whole ------------------------------------------------------------------------------
+
+
+def pymeshlab_remesh(V: Real, F: Faces, length: float, rounds: int = 6) -> tuple[Real, Faces]:
+    """Isotropic explicit remeshing to this edge length by pymeshlab."""
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(V, F.astype(np.int32)))
+    meshes.meshing_isotropic_explicit_remeshing(
+        targetlen=pymeshlab.PureValue(length), iterations=rounds, checksurfdist=False
+    )
+    mesh = meshes.current_mesh()
+    mesh.compact()
+    return largest_piece(mesh.vertex_matrix(), mesh.face_matrix().astype(np.int64))
+
+
+def remesh(
+    V: Real, F: Faces, faces: int, boundary: int, shape: Shape, use_pymeshlab: bool
+) -> tuple[Real, Faces]:
+    """A mesh of the same surface with these counts, the interior as even as they allow."""
+    target = edge_length(area(V, F), faces)
+    if use_pymeshlab:
+        V, F = pymeshlab_remesh(V, F, target)
+        V = shape.project(V, F, target)
+    inside = target
+    for k in range(7):
+        sizes = Sizes(V, F, inside, perimeter(V, F) / boundary)
+        V, F = resize(V, F, shape, sizes)
+        # The rounds of collapse and split do not hit the count by themselves.
+        inside *= float(np.clip(np.sqrt(len(F) / faces), 0.7, 1.4))
+        if k >= 2 and abs(len(F) / faces - 1) < 0.02:
+            break
+    V, F = to_boundary_count(V, F, boundary, shape)
+    V, F = split_chords(V, F)
+    V, F = to_face_count(V, F, faces, shape, Sizes(V, F, inside, perimeter(V, F) / boundary))
+    for _ in range(3):
+        V = relax(V, F, shape, 0.5 * target)
+        F = delaunay_flips(V, F)
+    return V, F
+
+
+def mesh_of(
+    mesh_type: type[M],
+    body: Body,
+    faces: int,
+    boundary: int,
+    *,
+    name: str,
+    delaunay: bool = True,
+    seed: int = 0,
+    use_pymeshlab: bool | None = None,
+) -> M:
+    """The surface of `body` with `faces` triangles and `boundary` boundary vertices in all.
+
+    `mesh_type` is DiskMesh for a body with one boundary loop, HoledMesh for more. The counts are
+    met exactly, up to one triangle where their parities disagree. With ``delaunay=False`` about 5 %
+    of the interior edges, chosen with `seed`, are turned so that they are not Delaunay. The mesh's
+    notices say whether pymeshlab's filter was missing; `use_pymeshlab` overrides the check for it.
+
+    Raises
+    ------
+    MeshError
+        The surface has not the topology asked for: too few triangles for its features.
+
+    """
+    use = has_remeshing_filter() if use_pymeshlab is None else use_pymeshlab
+    V, F, body, spacing = march(body)
+    shape = Shape(body, 0.02 * spacing)
+    levels = 0
+    while faces / 4**levels > BASE:
+        levels += 1
+    V, F = remesh(V, F, round(faces / 4**levels), round(boundary / 2**levels), shape, use)
+    for _ in range(levels):
+        V, F = subdivide(V, F)
+        reach = edge_length(area(V, F), len(F))
+        V = shape.project(V, F, 0.5 * reach)
+        F = delaunay_flips(V, F)
+        V = relax(V, F, shape, 0.3 * reach)
+        F = delaunay_flips(V, F)
+    V, F = to_boundary_count(V, F, boundary, shape)
+    V, F = to_face_count(V, F, faces, shape)
+    V = shape.project(V, F, 0.3 * edge_length(area(V, F), len(F)), rounds=4)
+    F = delaunay_flips(V, F)
+    if not delaunay:
+        F = break_delaunay(V, F, seed)
+    V, F = split_chords(V, F)
+    F = flip_ears(F, len(V))
+    try:
+        return mesh_type.from_arrays(V, F, name=name, notices=() if use else (FALLBACK_NOTE,))
+    except MeshError as error:
+        raise MeshError(
+            f"{name} with {faces} faces came out unusable: {error} Ask for more faces."
+        ) from error
+
+
+def disk_of(
+    body: Body,
+    faces: int,
+    boundary: int,
+    *,
+    name: str,
+    delaunay: bool = True,
+    seed: int = 0,
+    use_pymeshlab: bool | None = None,
+) -> DiskMesh:
+    """:func:`mesh_of` for a topological disk."""
+    return mesh_of(
+        DiskMesh,
+        body,
+        faces,
+        boundary,
+        name=name,
+        delaunay=delaunay,
+        seed=seed,
+        use_pymeshlab=use_pymeshlab,
+    )
+
+
+def break_delaunay(V: Real, F: Faces, seed: int, share: float = NON_DELAUNAY) -> Faces:
+    """Turn edges, chosen with `seed`, until about `share` of the interior ones are not Delaunay.
+
+    Mild cases first, as in scanned meshes: the two angles opposite to the edge sum to little more
+    than 180 degrees.
+    """
+    rng = np.random.default_rng(seed)
+    n = len(V)
+    for _ in range(30):
+        edges = edges_of(F, n)
+        quads = quads_of(F, edges)
+        weight = quads.weight(V)
+        missing = round((share - (weight < -1e-10).mean()) * len(weight))
+        if missing <= 0.02 * share * len(weight):
+            break
+        flipped = quads.flipped_weight(V)
+        rim = np.zeros(n, dtype=bool)
+        rim[edges.ends[edges.on_boundary]] = True
+        mild = (weight >= 0) & (flipped < -1e-3) & (flipped > -0.8) & ~quads.folds(V)
+        mild &= ~rim[quads.p] & ~rim[quads.q] & ~rim[quads.i] & ~rim[quads.j]
+        candidates = np.flatnonzero(mild)
+        if not len(candidates):
+            break
+        some = rng.permutation(candidates)[: max(1, round(0.8 * missing))]
+        F, _ = flip(F, quads.take(some), -weight[some], edges, n)
+    return F

@@ -1,0 +1,138 @@
+"""Every stand-in is held to its row of the paper's Table 2."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from algorithms.cem import cem
+from cembench.errors import RegistryError
+from cembench.geometry.laplacian import non_delaunay_share
+from cembench.geometry.mesh import DiskMesh
+from cembench.metrics import flipped_triangles
+from cembench.registry import load_registry
+from meshes_gen import catalogue
+from meshes_gen.rows import ROWS
+
+#: Made in seconds; the others are for the slow run.
+QUICK = ("nefertiti", "cowboy-hat", "chinese-vase")
+#: Their conformal factor spans three orders of magnitude (ratio of extreme length factors).
+HARD = (
+    "foot",
+    "stanford-bunny",
+    "human-brain",
+    "left-hand",
+    "statue-of-liberty",
+    "isis-statue",
+    "bimba-statue",
+)
+ALL = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in ROWS]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fresh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
+    """A cache of these tests' own: what is tested is what the generators make now."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("CEMBENCH_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+def _tilt(mesh: DiskMesh) -> float:
+    """Share of the area that faces away from the direction most of the surface faces."""
+    a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
+    N = np.cross(b - a, c - a)
+    mean = N.sum(axis=0)
+    size = np.linalg.norm(N, axis=1)
+    return float(size[N @ mean < 0].sum() / size.sum())
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_stand_in_meets_its_row(name: str) -> None:
+    mesh = catalogue.stand_in(name)
+    check = catalogue.row_check(name, mesh)
+    assert abs(check["faces_off"]) <= 0.01
+    assert abs(check["boundary_off"]) <= 0.10
+    assert check["ok"]
+    assert mesh.notices == ()
+    assert non_delaunay_share(mesh) < 1e-3
+    # Not a height field over a disk: in no direction does the whole surface face one way.
+    assert _tilt(mesh) > 0.002
+    uv = cem(mesh).uv
+    assert flipped_triangles(mesh, uv) == 0
+    facts = catalogue.surface_facts(mesh, uv)
+    assert facts["faces"] == mesh.m
+    if name in HARD:
+        assert facts["conformal_factor_span"] >= 1e3
+        assert facts["conformal_factor_span_99_8"] >= 1e3
+
+
+def test_rows_are_in_the_registry_under_their_models_names() -> None:
+    surfaces = load_registry().surfaces
+    for name, row in ROWS.items():
+        assert surfaces[name].title == row.model
+        defaults = {p.name: p.default for p in surfaces[name].parameters}
+        assert defaults == {"faces": row.faces, "seed": 0, "delaunay": True}
+    assert len(ROWS) == 20
+
+
+def test_boundaries_follow_from_table_2() -> None:
+    assert ROWS["nefertiti"].boundary == 34
+    assert ROWS["chinese-lion"].boundary == 245
+    assert ROWS["left-hand"].boundary == 246
+    assert ROWS["bimba-statue"].boundary == 1160
+
+
+def test_same_seed_same_bytes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    first = catalogue.stand_in("chinese-vase", 2_000)
+    monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
+    assert catalogue.stand_in("chinese-vase", 2_000).hash == first.hash
+    assert catalogue.stand_in("chinese-vase", 2_000, seed=1).hash != first.hash
+
+
+@pytest.mark.parametrize("faces", [1_000, 9_001])
+def test_any_size(faces: int) -> None:
+    mesh = catalogue.stand_in("cowboy-hat", faces)
+    assert abs(mesh.m - faces) <= 1
+    assert mesh.notices == ()
+
+
+def test_some_edges_not_delaunay_on_request() -> None:
+    mesh = catalogue.stand_in("cowboy-hat", delaunay=False)
+    assert non_delaunay_share(mesh) == pytest.approx(0.05, abs=0.01)
+    assert catalogue.row_check("cowboy-hat", mesh)["ok"]
+
+
+def test_another_route_without_pymeshlab(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("meshes_gen.remesh.has_remeshing_filter", lambda: False)
+    monkeypatch.setattr("meshes_gen.catalogue.has_remeshing_filter", lambda: False)
+    mesh = catalogue.stand_in("cowboy-hat")
+    assert "pymeshlab" in mesh.notices[0]
+    assert "doctor" in mesh.notices[0]
+    assert catalogue.row_check("cowboy-hat", mesh)["ok"]
+
+
+def test_unknown_stand_in_lists_the_known() -> None:
+    with pytest.raises(RegistryError, match=r"unknown stand-in 'teapot'; known: nefertiti, .*"):
+        catalogue.stand_in("teapot")
+
+
+@pytest.mark.slow
+def test_landmarks_of_the_four_expressions() -> None:
+    places = {}
+    for name in ("liu-neutral-face", "liu-smile-face", "liu-pouting-face", "liu-wry-face"):
+        mesh = catalogue.stand_in(name, 20_000)
+        marks = catalogue.landmarks(name, mesh)
+        assert len(marks) == len(set(marks.values())) == 7
+        places[name] = {key: mesh.V[vertex] for key, vertex in marks.items()}
+    neutral, smile = places["liu-neutral-face"], places["liu-smile-face"]
+    assert np.linalg.norm(neutral["nose_tip"] - smile["nose_tip"]) < 0.04  # the same person
+    assert smile["mouth_corner_left"][2] > neutral["mouth_corner_left"][2] + 0.05
+    wry = places["liu-wry-face"]
+    assert wry["mouth_corner_right"][2] > wry["mouth_corner_left"][2] + 0.1
+
+
+def test_only_faces_have_landmarks() -> None:
+    with pytest.raises(RegistryError, match="'foot' has no landmarks"):
+        catalogue.landmarks("foot", catalogue.stand_in("nefertiti"))
