@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.optimize import isotonic_regression
 
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
@@ -113,6 +112,8 @@ def in_order(circle: Complex) -> Complex:
     arcs = np.roll(arcs, -first)
     spread = LEAST_ARC * 2 * np.pi / len(circle) * np.arange(len(circle))
     angles = np.concatenate([[0.0], np.cumsum(arcs[:-1])])
+    from scipy.optimize import isotonic_regression  # slow to load, and rarely needed
+
     angles = isotonic_regression(angles - spread).x + spread
     ordered = np.roll(np.exp(1j * angles) * np.roll(circle, -first)[0], first)
     turns = round(arcs.sum() / (2 * np.pi))

@@ -6,7 +6,6 @@ cotangents opposite to edge ij; it is positive exactly where an interior edge is
 
 from __future__ import annotations
 
-import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -64,6 +63,8 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
     with phase("laplacian"):
         if not delaunay:
             return cotangent_laplacian(mesh.V, mesh.F)
+        import igl  # slow to load, and rarely needed
+
         negative, _, _ = igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)
         return sparse.csc_array(-negative)
 

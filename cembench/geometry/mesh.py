@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
 
-import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csgraph
@@ -228,6 +227,8 @@ def _oriented(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
     """Orient all triangles alike, as most of them are; how many had to be turned over?"""
     if not len(topology.repeated_half_edges(F)):
         return F, 0
+    import igl  # here and below: every measured process would wait for it, and none needs it
+
     turned, piece = igl.bfs_orient(F)
     flipped = (turned != F).any(axis=1)
     # The search keeps the first triangle it meets; keep the majority instead, piece by piece.
@@ -246,6 +247,8 @@ def _oriented(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
 
 
 def _check_vertex_stars(F: NDArray[np.int64]) -> None:
+    import igl
+
     bad = np.flatnonzero(~igl.is_vertex_manifold(F))
     if len(bad):
         raise MeshError(

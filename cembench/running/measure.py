@@ -89,7 +89,7 @@ def time_cell(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Round:
 
 
 def outcome_of_error(error: Exception, mesh: TriangleMesh) -> Outcome:
-    """As what is a call recorded that raised this?"""
+    """As what is a call on this mesh recorded that raised this?"""
     if isinstance(error, AlgorithmFailed):
         cause = "; ".join([str(error), *_broken_premises(mesh)])
         return Outcome(status="failed", cause=cause)
