@@ -81,7 +81,10 @@ def _plugins() -> Finding:
 def _renderer() -> Finding:
     from cembench.reporting.preview import renderer_status
 
-    ok, message = renderer_status()
+    try:
+        ok, message = renderer_status()
+    except ImportError as error:  # a library that is required; said in its own line
+        ok, message = False, str(error)
     return Finding(
         "pictures",
         ok,
