@@ -11,12 +11,13 @@ median total::
 from __future__ import annotations
 
 import argparse
+import tempfile
 from pathlib import Path
 
 from cembench.registry import load_registry
-from cembench.running.environment import describe_environment
-from cembench.running.local import run_task
+from cembench.running.local import Options, run_tasks
 from cembench.running.plan import How, generate_surface, plan_cells, read_mesh_for
+from cembench.store import Store
 
 #: Phases that take less than this share of the total in every line go under "rest".
 SHOWN = 0.05
@@ -39,13 +40,16 @@ def main() -> None:
         surface = read_mesh_for(arguments.mesh, chosen)
     else:
         surface = generate_surface(registry, "spherical-cap", arguments.faces)
-    environment = describe_environment()
-    lines = []
-    for solves in ("reuse", "backslash"):
-        how = How(solves=solves, repeats=arguments.repeats)
-        for task in plan_cells(chosen, [surface], {}, how):
-            record, _ = run_task(task, environment, timeout=arguments.timeout)
-            lines.append((task.algorithm, solves, record.outcome))
+    tasks = [
+        task
+        for solves in ("reuse", "backslash")
+        for task in plan_cells(chosen, [surface], {}, How(solves=solves, repeats=arguments.repeats))
+    ]
+    with tempfile.TemporaryDirectory() as folder:
+        records = run_tasks(tasks, Store(Path(folder)), Options(timeout=arguments.timeout))
+    lines = [
+        (task.algorithm, r.cell.solves, r.outcome) for task, r in zip(tasks, records, strict=True)
+    ]
     lines.sort(key=lambda line: names.index(line[0].name))
 
     shown = sorted(
