@@ -46,7 +46,7 @@ def harmonic_around_triangle(
     side = b - a
     x = np.dot(c - a, side) / np.dot(side, side)
     y = np.linalg.norm(c - a - x * side) / np.linalg.norm(side)
-    z = harmonic_extension(L, triangle, np.array([0, 1, complex(x, y)], dtype=np.complex128))
+    z: Complex = harmonic_extension(L, triangle, np.array([0, 1, x + 1j * y]))
     return z - z.mean()
 
 
