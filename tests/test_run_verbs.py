@@ -135,10 +135,14 @@ def test_both_policies_stand_in_tables_of_their_own(cli):
     assert max(map(len, out[: out.index("Records and maps")].splitlines())) <= 80
 
 
-def test_a_folder_of_meshes_and_a_profile_can_be_named(cli):
+def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
     from cembench.geometry.files import write_mesh
+    from cembench.registry import Registry, load_registry
     from meshes_gen.flat_disk import flat_disk
 
+    # Stand-ins that take no time to make, instead of the real ones.
+    bare = Registry(load_registry().algorithms, {})
+    monkeypatch.setattr("cembench.registry._installed", lambda: bare)
     (cli.folder / "meshes").mkdir()
     for name in ("b.obj", "a.ply"):
         write_mesh(cli.folder / "meshes" / name, flat_disk(100))

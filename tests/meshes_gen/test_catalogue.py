@@ -12,6 +12,7 @@ from cembench.errors import RegistryError
 from cembench.geometry.laplacian import non_delaunay_share
 from cembench.geometry.mesh import DiskMesh
 from cembench.metrics import flipped_triangles
+from cembench.paper.profiles import Profile, surfaces_of
 from cembench.registry import load_registry
 from meshes_gen import catalogue
 from meshes_gen.rows import ROWS
@@ -136,3 +137,7 @@ def test_landmarks_of_the_four_expressions() -> None:
 def test_only_faces_have_landmarks() -> None:
     with pytest.raises(RegistryError, match="'foot' has no landmarks"):
         catalogue.landmarks("foot", catalogue.stand_in("nefertiti"))
+
+
+def test_the_quick_profile_takes_the_stand_ins_of_the_eight_smallest_models() -> None:
+    assert surfaces_of(Profile.quick, load_registry()) == list(ROWS)[:8]
