@@ -28,7 +28,7 @@ from meshes_gen.hand import left_hand_body
 from meshes_gen.head import Head
 from meshes_gen.implicit import Body
 from meshes_gen.lion import chinese_lion_body
-from meshes_gen.remesh import disk_of, has_remeshing_filter
+from meshes_gen.remesh import has_remeshing_filter, mesh_of
 from meshes_gen.rows import ROWS
 from meshes_gen.statues import isis_statue_body, statue_of_liberty_body
 from meshes_gen.vessels import bourbon_bottle_body, chinese_vase_body
@@ -90,7 +90,7 @@ def stand_in(
 
     def make() -> DiskMesh:
         body, boundary = BODIES[name](seed), ROWS[name].boundary_at(count)
-        return disk_of(body, count, boundary, name=name, delaunay=delaunay, seed=seed)
+        return mesh_of(DiskMesh, body, count, boundary, name=name, delaunay=delaunay, seed=seed)
 
     return cached(DiskMesh, name, parameters, make)
 

@@ -21,7 +21,7 @@ from skimage.measure import marching_cubes
 
 from cembench.errors import MeshError
 from cembench.geometry import topology
-from cembench.geometry.mesh import DiskMesh, TriangleMesh
+from cembench.geometry.mesh import TriangleMesh
 from meshes_gen.implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
 from meshes_gen.local_operations import (
     Faces,
@@ -495,29 +495,6 @@ def mesh_of(
         raise MeshError(
             f"{name} with {faces} faces came out unusable: {error} Ask for more faces."
         ) from error
-
-
-def disk_of(
-    body: Body,
-    faces: int,
-    boundary: int,
-    *,
-    name: str,
-    delaunay: bool = True,
-    seed: int = 0,
-    use_pymeshlab: bool | None = None,
-) -> DiskMesh:
-    """:func:`mesh_of` for a topological disk."""
-    return mesh_of(
-        DiskMesh,
-        body,
-        faces,
-        boundary,
-        name=name,
-        delaunay=delaunay,
-        seed=seed,
-        use_pymeshlab=use_pymeshlab,
-    )
 
 
 def break_delaunay(V: Real, F: Faces, seed: int, share: float = NON_DELAUNAY) -> Faces:
