@@ -236,7 +236,14 @@ def run(
     from cembench.paper.profiles import surfaces_of
     from cembench.registry import load_registry
     from cembench.running.local import Options
-    from cembench.running.plan import How, generate_surface, mesh_files, plan_cells, read_mesh_for
+    from cembench.running.plan import (
+        How,
+        generate_surface,
+        mesh_files,
+        plan_cells,
+        read_mesh_for,
+        standing_of,
+    )
     from cembench.store import Store
 
     policies = _policies(solves)
@@ -254,10 +261,11 @@ def run(
     with err.status("reading surfaces", spinner="line"):
         found = [read_mesh_for(path, chosen) for path in files]
         found += [generate_surface(registry, name, faces) for name in dict.fromkeys(generated)]
+    standing = standing_of(registry, generated)
     tasks = []
     for policy in policies:
         how = How(policy, _installed(backend), threads, repeats)
-        tasks += plan_cells(chosen, found, _assignments(parameter), how, plugin)
+        tasks += plan_cells(chosen, found, _assignments(parameter), how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
         return
@@ -284,16 +292,19 @@ def reproduce(
     from cembench.paper.profiles import Profile, surfaces_of
     from cembench.registry import load_registry
     from cembench.running.local import Options
-    from cembench.running.plan import How, generate_surface, plan_cells
+    from cembench.running.plan import How, generate_surface, plan_cells, standing_of
     from cembench.store import Store
 
     options = Options(memory_bytes=_memory_bytes(None), fresh=fresh)
     registry = load_registry()
     surfaces = []
-    for name in surfaces_of(Profile.quick, registry):
+    names = surfaces_of(Profile.quick, registry)
+    for name in names:
         with err.status(f"making {name}", spinner="line"):
             surfaces.append(generate_surface(registry, name))
-    tasks = plan_cells(list(registry.algorithms.values()), surfaces, {}, How(repeats=1))
+    chosen = list(registry.algorithms.values())
+    standing = standing_of(registry, names)
+    tasks = plan_cells(chosen, surfaces, {}, How(repeats=1), standing=standing)
     store = Store(output)
     records = _measure(tasks, store, options)
     pictures = output / "pictures"
@@ -332,7 +343,9 @@ def doctor(*, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
-for verb, example in run_verbs.VERBS:
+#: Modules whose verbs are not written in this one.
+_MORE = (run_verbs,)
+for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 
 

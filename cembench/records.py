@@ -19,6 +19,9 @@ SCHEMA_VERSION = 1
 #: chance that all lie on one side of it is 2 / 2^6.
 DEFAULT_ROUNDS = 6
 
+#: Is a surface a model of the paper, a stand-in for one, or neither?
+MeshOrigin = Literal["model", "stand-in", "surface"]
+
 Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
 
 
@@ -59,6 +62,9 @@ class MeshFacts(BaseModel):
     boundary_vertices: int
     non_delaunay_share: float
     notices: tuple[str, ...] = ()
+    #: The model of the paper's Table 1 that it is ("model") or stands for ("stand-in"), if any.
+    paper_row: str = ""
+    origin: MeshOrigin = "surface"
 
 
 class Round(BaseModel):

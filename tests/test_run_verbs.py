@@ -164,3 +164,11 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
     arguments = ("run", "-a", "cem", "--plugin", plugin, "--dry-run", "--json")
     found = json.loads(cli(*arguments, "--mesh-dir", "meshes", "--profile", "quick")[1])
     assert [cell["mesh"] for cell in found["cells"]] == ["a", "b", *(f"s{k}" for k in range(8))]
+
+
+def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
+    from cembench.registry import load_registry
+    from cembench.running.plan import Standing, standing_of
+
+    found = standing_of(load_registry(), ["foot", "flat-disk"])
+    assert found == {"foot": Standing("Foot", "stand-in")}

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from cembench.errors import MeshError, ParameterError
 from cembench.geometry.files import is_mesh_file, read_mesh
 from cembench.geometry.laplacian import non_delaunay_share
 from cembench.geometry.mesh import TriangleMesh
-from cembench.records import DEFAULT_ROUNDS, Cell, MeshFacts
+from cembench.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.registry import Algorithm, Registry
 
 
@@ -25,6 +26,14 @@ class Task:
     mesh: TriangleMesh
     facts: MeshFacts
     plugins: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Which row of the paper's Table 1 a surface has, and whether it is that model or stands in."""
+
+    paper_row: str = ""
+    origin: MeshOrigin = "surface"
 
 
 @dataclass(frozen=True)
@@ -43,11 +52,13 @@ def plan_cells(
     parameters: Mapping[str, Any],
     how: How,
     plugins: Sequence[str] = (),
+    standing: Mapping[str, Standing] = MappingProxyType({}),
 ) -> list[Task]:
     """Every algorithm on every surface that it takes, surfaces outermost.
 
     In `parameters`, the key ``name`` goes to every algorithm that has such a parameter and
-    ``algorithm.name`` to that one alone.
+    ``algorithm.name`` to that one alone. `standing` is by the surfaces' names; a surface that is
+    not in it is none of the paper's.
 
     Raises
     ------
@@ -71,7 +82,7 @@ def plan_cells(
                 f"{mesh.name} is a {type(mesh).__name__}, which none of the chosen algorithms "
                 f"takes: {chosen}."
             )
-        facts = mesh_facts(mesh)
+        facts = mesh_facts(mesh, standing.get(mesh.name, Standing()))
         for taker in takers:
             cell = Cell(
                 algorithm=taker.name,
@@ -110,7 +121,7 @@ def distribute_parameters(
     return {a.name: a.arguments(chosen[a.name]) for a in algorithms}
 
 
-def mesh_facts(mesh: TriangleMesh) -> MeshFacts:
+def mesh_facts(mesh: TriangleMesh, standing: Standing = Standing()) -> MeshFacts:
     """What does a table say of this surface?"""
     return MeshFacts(
         vertices=mesh.n,
@@ -118,6 +129,8 @@ def mesh_facts(mesh: TriangleMesh) -> MeshFacts:
         boundary_vertices=sum(len(loop) for loop in mesh.loops),
         non_delaunay_share=non_delaunay_share(mesh),
         notices=mesh.notices,
+        paper_row=standing.paper_row,
+        origin=standing.origin,
     )
 
 
@@ -161,6 +174,12 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
     given = {} if faces is None else {"faces": faces}
     mesh: TriangleMesh = family.function(**family.arguments(given))
     return mesh
+
+
+def standing_of(registry: Registry, names: Iterable[str]) -> dict[str, Standing]:
+    """Which rows of the paper do these registered surfaces stand for? Others are left out."""
+    rows = {name: registry.surface(name).paper_row for name in names}
+    return {name: Standing(row, "stand-in") for name, row in rows.items() if row}
 
 
 def _code_hash(algorithm: Algorithm) -> str:

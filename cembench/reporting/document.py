@@ -1,0 +1,165 @@
+"""What a report holds, whatever it is rendered to.
+
+A number is made once, as a :class:`Value` with its origin and the record it was read from;
+Markdown, LaTeX, CSV, HTML and the terminal only print it. Figures are files beside their data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import PurePosixPath
+from typing import Any, Literal, TypeAlias
+
+#: Where a figure comes from; a table never puts two of these into one column without a mark.
+Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
+
+#: What a reader is told of an origin, and the mark behind a number of it.
+ORIGINS: Mapping[Origin, tuple[str, str]] = {
+    "printed": ("printed in the paper", "ᵖ"),
+    "model": ("measured here on the paper's own model", "ᵐ"),
+    "stand-in": ("measured here on a stand-in for the paper's model", "ˢ"),
+    "surface": ("measured here on a surface that is not in the paper", ""),
+    "derived": ("computed from other figures of this report", ""),
+}
+
+#: Does a claim of the paper hold in this run?
+Verdict = Literal["holds", "holds in part", "does not hold here", "not tested here"]
+
+
+@dataclass(frozen=True)
+class Value:
+    """One entry of a table.
+
+    Parameters
+    ----------
+    text : str
+        As it is printed, in every form of the report.
+    number : float or None
+        The same with full precision, by which a column is sorted; None for words and gaps.
+    origin : Origin
+        Where the number comes from.
+    record : str
+        Key of the record that it was read from; empty for printed and derived ones.
+    why : str
+        Why there is no number, or what is to be known of it (a misprint, an unstable time).
+
+    """
+
+    text: str
+    number: float | None = None
+    origin: Origin = ""
+    record: str = ""
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column; neighbours of equal `group` stand under one heading."""
+
+    title: str
+    group: str = ""
+    unit: str = ""
+    numeric: bool = True
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; `name` is its file name and anchor, `rows` are as long as `columns`."""
+
+    name: str
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Value, ...], ...]
+    caption: str = ""
+    #: Below the table: how many surfaces an aggregate runs over, misprints, causes of gaps.
+    notes: tuple[str, ...] = ()
+    #: Rows at the end that hold aggregates; sorting leaves them where they are.
+    footer_rows: int = 0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture or plot, as files relative to the report's folder.
+
+    Parameters
+    ----------
+    files : tuple of PurePosixPath
+        The same figure in each form it has: PNG, SVG, PDF; the first one is shown.
+    data : PurePosixPath or None
+        The CSV that it was drawn from.
+    plot : mapping or None
+        The same as a Plotly figure in JSON, for forms that can be zoomed; None for pictures.
+    alternative : str
+        What a reader who cannot see it should know.
+    paper : str
+        The paper's figure that it regenerates, as "Figure 8"; empty for others.
+
+    """
+
+    name: str
+    title: str
+    files: tuple[PurePosixPath, ...]
+    caption: str = ""
+    data: PurePosixPath | None = None
+    plot: Mapping[str, Any] | None = None
+    alternative: str = ""
+    paper: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper's text, put to the test."""
+
+    sentence: str
+    place: str
+    test: str
+    figures: str
+    verdict: Verdict
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Something that has a place in the report but is not there; `command` would make it."""
+
+    title: str
+    why: str
+    command: str = ""
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph."""
+
+    words: str
+
+
+Item: TypeAlias = "Table | Figure | Claim | Gap | Text"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the report; `page` gives it a page of its own where a form has pages."""
+
+    name: str
+    title: str
+    items: tuple[Item, ...] = ()
+    sections: tuple[Section, ...] = ()
+    page: bool = False
+
+
+@dataclass(frozen=True)
+class Report:
+    """A whole report.
+
+    `command` is the one that makes it again; `facts` are what stands at its head (machine, date,
+    versions, cells by status) as pairs of words.
+    """
+
+    title: str
+    command: str
+    facts: tuple[tuple[str, str], ...]
+    sections: tuple[Section, ...]
+    #: Records by key, as rows (cembench.reporting.frame), to which the values link.
+    records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
