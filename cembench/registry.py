@@ -29,6 +29,9 @@ from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
 #: What an algorithm maps to; tables never mix these without saying so.
 Target = Literal["disk", "free boundary", "circular holes"]
 
+#: Finds named places on a mesh of a surface family: name -> vertex, counted from 0.
+Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
+
 _MARK = "__cembench__"
 C = TypeVar("C", bound=Callable[..., Any])
 
@@ -106,6 +109,7 @@ class Surface(_Registered):
 
     source: str = ""
     paper_row: str = ""
+    landmarks: Landmarks | None = None
 
 
 def algorithm(
@@ -169,12 +173,19 @@ def algorithm(
 
 
 def surface(
-    name: str, *, title: str, source: str = "", notes: str = "", paper_row: str = ""
+    name: str,
+    *,
+    title: str,
+    source: str = "",
+    notes: str = "",
+    paper_row: str = "",
+    landmarks: Landmarks | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
     `faces` is the number of triangles asked for; it has a default. `paper_row` is the model of the
-    paper's Table 1 that the surface stands for, if any: the profiles are made of those.
+    paper's Table 1 that the surface stands for, if any: the profiles are made of those. `landmarks`
+    finds named vertices, such as the tip of a nose, on a mesh that the function made, of any size.
 
     Raises
     ------
@@ -194,6 +205,7 @@ def surface(
             notes=notes or _notes(function),
             source=source,
             paper_row=paper_row,
+            landmarks=landmarks,
         )
         setattr(function, _MARK, spec)
         return function

@@ -7,6 +7,7 @@ result comes from the cache (:mod:`meshes_gen.cache`) once it has been made.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -95,40 +96,6 @@ def stand_in(
     return cached(DiskMesh, name, parameters, make)
 
 
-def _registered(name: str) -> Callable[..., DiskMesh]:
-    row = ROWS[name]
-
-    def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:
-        return stand_in(name, faces, seed=seed, delaunay=delaunay)
-
-    make.__name__ = make.__qualname__ = name.replace("-", "_")
-    make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."
-    declare = surface(name, title=row.model, source="procedural stand-in", paper_row=row.model)
-    return declare(make)
-
-
-nefertiti = _registered("nefertiti")
-cowboy_hat = _registered("cowboy-hat")
-chinese_vase = _registered("chinese-vase")
-bourbon_bottle = _registered("bourbon-bottle")
-foot = _registered("foot")
-chinese_lion = _registered("chinese-lion")
-david_head = _registered("david-head")
-stanford_bunny = _registered("stanford-bunny")
-human_brain = _registered("human-brain")
-ho_pouting_face = _registered("ho-pouting-face")
-ho_neutral_face = _registered("ho-neutral-face")
-left_hand = _registered("left-hand")
-statue_of_liberty = _registered("statue-of-liberty")
-liu_neutral_face = _registered("liu-neutral-face")
-liu_smile_face = _registered("liu-smile-face")
-liu_pouting_face = _registered("liu-pouting-face")
-liu_wry_face = _registered("liu-wry-face")
-isis_statue = _registered("isis-statue")
-bimba_statue = _registered("bimba-statue")
-knit_cap_man = _registered("knit-cap-man")
-
-
 #: Which person makes which expression in the stand-ins that are faces.
 FACES = {
     "ho-pouting-face": (HO, "pouting"),
@@ -159,6 +126,46 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
     return {
         key: int(np.argmin(((mesh.V - point) ** 2).sum(axis=1))) for key, point in points.items()
     }
+
+
+def _registered(name: str) -> Callable[..., DiskMesh]:
+    row = ROWS[name]
+
+    def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:
+        return stand_in(name, faces, seed=seed, delaunay=delaunay)
+
+    make.__name__ = make.__qualname__ = name.replace("-", "_")
+    make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."
+    declare = surface(
+        name,
+        title=row.model,
+        source="procedural stand-in",
+        paper_row=row.model,
+        landmarks=partial(landmarks, name) if name in FACES else None,
+    )
+    return declare(make)
+
+
+nefertiti = _registered("nefertiti")
+cowboy_hat = _registered("cowboy-hat")
+chinese_vase = _registered("chinese-vase")
+bourbon_bottle = _registered("bourbon-bottle")
+foot = _registered("foot")
+chinese_lion = _registered("chinese-lion")
+david_head = _registered("david-head")
+stanford_bunny = _registered("stanford-bunny")
+human_brain = _registered("human-brain")
+ho_pouting_face = _registered("ho-pouting-face")
+ho_neutral_face = _registered("ho-neutral-face")
+left_hand = _registered("left-hand")
+statue_of_liberty = _registered("statue-of-liberty")
+liu_neutral_face = _registered("liu-neutral-face")
+liu_smile_face = _registered("liu-smile-face")
+liu_pouting_face = _registered("liu-pouting-face")
+liu_wry_face = _registered("liu-wry-face")
+isis_statue = _registered("isis-statue")
+bimba_statue = _registered("bimba-statue")
+knit_cap_man = _registered("knit-cap-man")
 
 
 def surface_facts(mesh: TriangleMesh, uv: NDArray[np.complex128] | None = None) -> dict[str, Any]:

@@ -141,3 +141,13 @@ def test_only_faces_have_landmarks() -> None:
 
 def test_the_quick_profile_takes_the_stand_ins_of_the_eight_smallest_models() -> None:
     assert surfaces_of(Profile.quick, load_registry()) == list(ROWS)[:8]
+
+
+def test_landmarks_of_faces_are_found_through_the_registry() -> None:
+    surfaces = load_registry().surfaces
+    mesh = catalogue.stand_in("nefertiti")  # any mesh has nearest vertices; this one is made fast
+    for name in catalogue.FACES:
+        find = surfaces[name].landmarks
+        assert find is not None
+        assert find(mesh) == catalogue.landmarks(name, mesh)
+    assert surfaces["foot"].landmarks is None
