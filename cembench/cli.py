@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from cembench import run_verbs
+from cembench import fetch_verbs, run_verbs
 from cembench.console import Json, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
 from cembench.paper.profiles import Profile
@@ -110,10 +110,12 @@ def list_(
 @app.command(
     "map",
     epilog="Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
-    "cembench map face.ply -a cem -p max_iterations=13 --json",
+    "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand",
 )
 def map_(
-    mesh: Annotated[Path, typer.Argument(help="Surface: OBJ, OFF, PLY or STL.")],
+    mesh: Annotated[
+        Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`.")
+    ],
     *,
     algorithm: Annotated[str, typer.Option("-a", "--algorithm", help="See `list`.")] = "cem",
     parameter: Parameters = [],  # noqa: B006
@@ -140,16 +142,20 @@ def map_(
     from cembench.reporting.frame import row
     from cembench.reporting.terminal import figures_table
     from cembench.running.local import Options, map_once
-    from cembench.running.plan import How, plan_cells, read_mesh_for
+    from cembench.running.plan import How, plan_cells, read_mesh_for, standing_of_file
 
     options = Options(timeout=timeout, memory_bytes=_memory_bytes(memory))
-    chosen = load_registry(plugin).algorithm(algorithm)
+    registry = load_registry(plugin)
+    chosen = registry.algorithm(algorithm)
     if output is not None:
         check_writable_format(output, with_uv=True)
+    if not mesh.exists() and str(mesh) in registry.datasets:
+        mesh = fetch_verbs.fetched(registry.dataset(str(mesh)))
     with err.status("reading", spinner="line"):
         surface = read_mesh_for(mesh, [chosen])
+        standing = {surface.name: standing_of_file(registry, mesh, surface)}
     how = How(solves.value, _installed(backend), threads, repeats=1)
-    tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin)
+    tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin, standing)
     with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
         record, uv = map_once(tasks[0], options)
     ok = record.outcome.status == "ok"
@@ -191,6 +197,9 @@ def run(
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
     mesh_dir: Annotated[
         list[Path], typer.Option("--mesh-dir", help="All mesh files of a folder. Repeatable.")
+    ] = [],  # noqa: B006
+    dataset: Annotated[
+        list[str], typer.Option("--dataset", help="Fetched surfaces (see `fetch`), with commas.")
     ] = [],  # noqa: B006
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
@@ -243,6 +252,7 @@ def run(
         plan_cells,
         read_mesh_for,
         standing_of,
+        standing_of_file,
     )
     from cembench.store import Store
 
@@ -252,16 +262,21 @@ def run(
     names = split(algorithms) or list(registry.algorithms)
     chosen = [registry.algorithm(name) for name in names]
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
+    files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
     generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
     if not files and not generated:
         raise ParameterError(
-            "nothing to run on: name a --profile, or at least one --mesh FILE or --surfaces NAME "
-            "(see `cembench list surfaces`)."
+            "nothing to run on: name a --profile, or at least one --mesh FILE, --dataset NAME (see "
+            "`cembench fetch`) or --surfaces NAME (see `cembench list surfaces`)."
         )
     with err.status("reading surfaces", spinner="line"):
         found = [read_mesh_for(path, chosen) for path in files]
+        standing = {
+            mesh.name: standing_of_file(registry, path, mesh)
+            for path, mesh in zip(files, found, strict=True)
+        }
         found += [generate_surface(registry, name, faces) for name in dict.fromkeys(generated)]
-    standing = standing_of(registry, generated)
+    standing |= standing_of(registry, generated)
     tasks = []
     for policy in policies:
         how = How(policy, _installed(backend), threads, repeats)
@@ -344,7 +359,7 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 #: Modules whose verbs are not written in this one.
-_MORE = (run_verbs,)
+_MORE = (run_verbs, fetch_verbs)
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 

@@ -18,23 +18,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import pooch
 
+from cembench.datasets import cache_directory
 from cembench.errors import MeshError
 from cembench.geometry.mesh import TriangleMesh
 
 #: Raise this when a generator's result changes: every cached surface is then made anew.
 GENERATOR_VERSION = 1
 
-#: Overrides the directory of the cache.
-VARIABLE = "CEMBENCH_CACHE"
-
 M = TypeVar("M", bound=TriangleMesh)
-
-
-def cache_directory() -> Path:
-    """Where are surfaces and downloads kept? `CEMBENCH_CACHE`, or the user's cache directory."""
-    return Path(os.environ.get(VARIABLE) or pooch.os_cache("cembench"))
 
 
 def _version(package: str) -> str | None:

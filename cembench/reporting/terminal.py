@@ -10,6 +10,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cembench import paper
 from cembench.comparison import (
     UNSTABLE_WIDTH,
     Change,
@@ -20,6 +21,7 @@ from cembench.comparison import (
     references,
     seconds_interval,
 )
+from cembench.datasets import Dataset
 from cembench.estimate import Estimate
 from cembench.records import Cell, Record
 from cembench.registry import Algorithm, Surface
@@ -195,6 +197,8 @@ def figures_table(record: Record) -> Table:
         f"faces, {facts.boundary_vertices:,} on the boundary, "
         f"{facts.non_delaunay_share:.1%} of the edges not Delaunay",
     )
+    if facts.paper_row:
+        table.add_row("in the paper", _printed(record))
     table.add_row("algorithm", f"{record.title} ({record.target})" + _given(record))
     for label, name, form, unit in (
         ("conformal energy", "conformal_energy", ".6f", ""),
@@ -227,6 +231,17 @@ def figures_table(record: Record) -> Table:
     for note in outcome.notes:
         table.add_row("note", note)
     return table
+
+
+def _printed(record: Record) -> str:
+    """What the paper says of this surface, and of this algorithm on it; printed, not measured."""
+    row, name = record.mesh.paper_row, record.cell.algorithm
+    what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
+    figures = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
+    energy, mean, sd = (figures.get(name + end) for end in ("", "_mean", "_sd"))
+    if energy is None or mean is None or sd is None:
+        return what
+    return f"{what}; printed: E_C {energy:.4f}, angles {mean:.2f} in the mean, SD {sd:.2f}"
 
 
 def _given(record: Record) -> str:
@@ -264,6 +279,20 @@ def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableT
     for s in surfaces:
         row = [s.name, s.title, _parameters(s)]
         table.add_row(*row, *([_flowing(s.notes)] if verbose else []))
+    return table
+
+
+def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
+    """What can be fetched, and is it there already?"""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("dataset", "title", "in the paper"):
+        table.add_column(heading)
+    table.add_column("size", justify="right")
+    table.add_column("licence")
+    table.add_column("here")
+    for d, here in datasets:
+        size = "-" if d.size is None else f"{d.size / 1e6:.1f} MB"
+        table.add_row(d.name, d.title, d.paper_row or "-", size, d.licence, "yes" if here else "no")
     return table
 
 

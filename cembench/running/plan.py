@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from cembench.datasets import recognised
 from cembench.errors import MeshError, ParameterError
 from cembench.geometry.files import is_mesh_file, read_mesh
 from cembench.geometry.laplacian import non_delaunay_share
@@ -56,6 +57,8 @@ def plan_cells(
 ) -> list[Task]:
     """Every algorithm on every surface that it takes, surfaces outermost.
 
+    A surface that comes twice under one name, as from two files of one folder, counts once.
+
     In `parameters`, the key ``name`` goes to every algorithm that has such a parameter and
     ``algorithm.name`` to that one alone. `standing` is by the surfaces' names; a surface that is
     not in it is none of the paper's.
@@ -65,9 +68,10 @@ def plan_cells(
     ParameterError
         A parameter that none of the algorithms has, or a value that one refuses.
     MeshError
-        Two surfaces of one name, or one that no algorithm takes.
+        Two different surfaces of one name, or one that no algorithm takes.
 
     """
+    meshes = list({(mesh.name, mesh.hash): mesh for mesh in meshes}.values())
     names = [mesh.name for mesh in meshes]
     for name in names:
         if names.count(name) > 1:
@@ -163,7 +167,7 @@ def mesh_files(folder: Path) -> list[Path]:
     """
     found = sorted(path for path in folder.glob("*") if is_mesh_file(path))
     if not found:
-        why = "holds no OBJ, OFF, PLY or STL file" if folder.is_dir() else "is no folder"
+        why = "holds no OBJ, OFF, PLY, STL or MAT file" if folder.is_dir() else "is no folder"
         raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
     return found
 
@@ -180,6 +184,13 @@ def standing_of(registry: Registry, names: Iterable[str]) -> dict[str, Standing]
     """Which rows of the paper do these registered surfaces stand for? Others are left out."""
     rows = {name: registry.surface(name).paper_row for name in names}
     return {name: Standing(row, "stand-in") for name, row in rows.items() if row}
+
+
+def standing_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> Standing:
+    """Is what was read from this file one of the paper's models?"""
+    dataset = recognised(registry.datasets.values(), path, mesh.hash)
+    row = dataset.paper_row if dataset else ""
+    return Standing(row, "model") if row else Standing()
 
 
 def _code_hash(algorithm: Algorithm) -> str:
