@@ -15,6 +15,9 @@ from cembench.metrics import flipped_triangles
 from cembench.paper.profiles import Profile, surfaces_of
 from cembench.registry import load_registry
 from meshes_gen import catalogue
+from meshes_gen.faces import EXPRESSIONS
+from meshes_gen.head import Head
+from meshes_gen.remesh import march
 from meshes_gen.rows import ROWS
 
 #: Made in seconds; the others are for the slow run.
@@ -141,6 +144,22 @@ def test_only_faces_have_landmarks() -> None:
 
 def test_the_quick_profile_takes_the_stand_ins_of_the_eight_smallest_models() -> None:
     assert surfaces_of(Profile.quick, load_registry()) == list(ROWS)[:8]
+
+
+def test_pouting_lips_leave_no_tunnel_to_plug(monkeypatch: pytest.MonkeyPatch) -> None:
+    plugged: list[object] = []
+    monkeypatch.setattr("meshes_gen.remesh.plugs_for", lambda *a: plugged.append(a))
+    march(catalogue.BODIES["ho-pouting-face"](0))
+    assert not plugged
+
+
+@pytest.mark.parametrize("name", list(catalogue.FACES))
+def test_landmarks_lie_on_the_surface(name: str) -> None:
+    body, (person, expression) = catalogue.BODIES[name](0), catalogue.FACES[name]
+    points = Head(person, EXPRESSIONS[expression], ears=False).landmarks()
+    assert len(points) == 7
+    for key, point in points.items():
+        assert abs(body.f(point[None])[0]) < 0.04, key  # heads are 1.5 wide
 
 
 def test_landmarks_of_faces_are_found_through_the_registry() -> None:
