@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
@@ -22,8 +22,9 @@ from cembench.records import DEFAULT_ROUNDS
 if TYPE_CHECKING:
     from cembench.geometry.mesh import TriangleMesh
     from cembench.records import Record
-    from cembench.registry import Algorithm, Registry
+    from cembench.registry import Algorithm, Registry, Surface
     from cembench.reporting.progress import PlainProgress
+    from cembench.reporting.surface_facts import SurfaceFacts
     from cembench.running.local import Options
     from cembench.running.plan import Task
     from cembench.store import Store
@@ -82,22 +83,34 @@ BackendOption = Annotated[Backend, typer.Option(help="The library that factors m
 @app.command(
     "list",
     epilog="Examples:  cembench list  ·  cembench list algorithms --verbose  ·  "
-    "cembench list --plugin mine.py",
+    "cembench list surfaces --measure  ·  cembench list --plugin mine.py",
 )
 def list_(
     kind: Annotated[Kind | None, typer.Argument(help="Only these.")] = None,
     *,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say all about each.")] = False,
+    measure: Annotated[
+        bool,
+        typer.Option("--measure", help="Measure the stand-ins that were not: minutes."),
+    ] = False,
     plugin: Plugins = [],  # noqa: B006 - typer copies defaults
     as_json: Json = False,
 ) -> None:
-    """Which algorithms and surfaces are there?"""
+    """Which algorithms and surfaces are there?
+
+    `list surfaces` also tells the counts of the stand-ins for the paper's models, whether they meet
+    their rows of its Table 2, how unevenly they are scaled when CEM flattens them, and where their
+    thumbnails lie: of those that were measured before, or, with --measure, of all.
+    """
     from cembench.registry import load_registry
-    from cembench.reporting.terminal import algorithms_table, surfaces_table
+    from cembench.reporting.terminal import algorithms_table, facts_table, surfaces_table
 
     registry = load_registry(plugin)
+    if measure and kind is not Kind.surfaces:
+        raise ParameterError("--measure goes with surfaces: cembench list surfaces --measure.")
+    facts = _facts(registry, measure=measure) if kind is Kind.surfaces else {}
     if as_json:
-        print_json(_registry_as_json(registry, kind))
+        print_json(_registry_as_json(registry, kind, facts))
         return
     if kind in (None, Kind.algorithms):
         out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
@@ -105,6 +118,18 @@ def list_(
         out.print()
     if kind in (None, Kind.surfaces):
         out.print(surfaces_table(list(registry.surfaces.values()), verbose=verbose))
+    if facts:
+        known = {name: found for name, found in facts.items() if found}
+        if known:
+            out.print()
+            out.print(facts_table(known))
+        missing = len(facts) - len(known)
+        if missing:
+            out.print(
+                f"\n{missing} of {len(facts)} stand-ins are not measured yet: "
+                "`cembench list surfaces --measure` does it, in minutes.",
+                style="dim",
+            )
 
 
 @app.command(
@@ -509,7 +534,27 @@ def _installed(backend: Backend) -> str:
         return backend.value
 
 
-def _registry_as_json(registry: Registry, kind: Kind | None) -> dict[str, Any]:
+def _facts(registry: Registry, *, measure: bool) -> dict[str, SurfaceFacts | None]:
+    """What is known of the surfaces that are kept on disk; found where it is not, if asked to."""
+    from cembench.reporting.surface_facts import find_facts, kept_facts
+
+    families = [family for family in registry.surfaces.values() if family.kept]
+    facts = {family.name: kept_facts(registry, family) for family in families}
+    todo = [family for family in families if measure and facts[family.name] is None]
+    for k, family in enumerate(todo, start=1):
+        words = f"[{k}/{len(todo)}] {family.name}"
+        if not err.is_terminal:
+            err.print(words, markup=False)
+        with err.status(escape(f"{words}: making, mapping, drawing"), spinner="line"):
+            facts[family.name] = find_facts(registry, family)
+    return facts
+
+
+def _registry_as_json(
+    registry: Registry, kind: Kind | None, facts: Mapping[str, SurfaceFacts | None]
+) -> dict[str, Any]:
+    from cembench.reporting.surface_facts import row_check
+
     def about(registered: Any) -> dict[str, Any]:
         return {
             "name": registered.name,
@@ -523,11 +568,19 @@ def _registry_as_json(registry: Registry, kind: Kind | None) -> dict[str, Any]:
     def about_algorithm(a: Algorithm) -> dict[str, Any]:
         return about(a) | {"target": a.target, "takes": a.mesh_type.__name__}
 
+    def about_surface(s: Surface) -> dict[str, Any]:
+        known = facts.get(s.name)
+        more = {"paper_row": s.paper_row or None, "landmarks": s.landmarks is not None}
+        if known is None:
+            return about(s) | more | {"facts": None}
+        flat = known.mesh.model_dump() | known.model_dump(exclude={"mesh"})
+        return about(s) | more | {"facts": flat | {"table2": row_check(known.mesh)}}
+
     listed: dict[str, Any] = {}
     if kind in (None, Kind.algorithms):
         listed["algorithms"] = [about_algorithm(a) for a in registry.algorithms.values()]
     if kind in (None, Kind.surfaces):
-        listed["surfaces"] = [about(s) for s in registry.surfaces.values()]
+        listed["surfaces"] = [about_surface(s) for s in registry.surfaces.values()]
     return listed
 
 

@@ -112,6 +112,7 @@ class Surface(_Registered):
     source: str = ""
     paper_row: str = ""
     landmarks: Landmarks | None = None
+    kept: Callable[..., Path] | None = None
 
 
 def algorithm(
@@ -182,12 +183,15 @@ def surface(
     notes: str = "",
     paper_row: str = "",
     landmarks: Landmarks | None = None,
+    kept: Callable[..., Path] | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
     `faces` is the number of triangles asked for; it has a default. `paper_row` is the model of the
     paper's Table 1 that the surface stands for, if any: the profiles are made of those. `landmarks`
     finds named vertices, such as the tip of a nose, on a mesh that the function made, of any size.
+    `kept` takes the same arguments and tells the file in which the surface lies once it has been
+    made; where the surface would be another one, so is the file.
 
     Raises
     ------
@@ -208,6 +212,7 @@ def surface(
             source=source,
             paper_row=paper_row,
             landmarks=landmarks,
+            kept=kept,
         )
         setattr(function, _MARK, spec)
         return function

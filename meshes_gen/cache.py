@@ -49,6 +49,11 @@ def content_key(name: str, parameters: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+def place_of(name: str, parameters: Mapping[str, Any]) -> Path:
+    """The file in which the surface of this name and parameters lies once it has been made."""
+    return cache_directory() / "surfaces" / f"{name}-{content_key(name, parameters)}.npz"
+
+
 def cached(
     mesh_type: type[M], name: str, parameters: Mapping[str, Any], make: Callable[[], M]
 ) -> M:
@@ -56,7 +61,7 @@ def cached(
 
     A cache that cannot be written to is done without.
     """
-    path = cache_directory() / "surfaces" / f"{name}-{content_key(name, parameters)}.npz"
+    path = place_of(name, parameters)
     mesh = read(mesh_type, path)
     if mesh is None:
         mesh = make()

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
+from pathlib import Path
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -25,6 +26,7 @@ from cembench.datasets import Dataset
 from cembench.estimate import Estimate
 from cembench.records import Cell, Record
 from cembench.registry import Algorithm, Surface
+from cembench.reporting.surface_facts import SurfaceFacts, row_check
 
 _STYLES = {"ok": "green", "skipped": "yellow"}
 
@@ -280,6 +282,30 @@ def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableT
         row = [s.name, s.title, _parameters(s)]
         table.add_row(*row, *([_flowing(s.notes)] if verbose else []))
     return table
+
+
+def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
+    """Counts of surfaces, do they meet the paper's Table 2, and how hard are they to flatten?"""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", no_wrap=True)
+    for heading in ("vertices", "faces", "boundary", "not Delaunay", "span"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("Table 2", no_wrap=True)
+    for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
+        mesh, check = facts.mesh, row_check(facts.mesh)
+        verdict = "-" if check is None else "ok" if check["ok"] else "off"
+        table.add_row(
+            name,
+            f"{mesh.vertices:,}",
+            f"{mesh.faces:,}",
+            f"{mesh.boundary_vertices:,}",
+            f"{mesh.non_delaunay_share:.1%}",
+            f"{facts.conformal_factor_span:.2g}",
+            Text(verdict, style="bold red" if verdict == "off" else ""),
+        )
+    folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
+    words = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
+    return Group(table, Text(f"{words}\nthumbnails: {', '.join(folders)}", style="dim"))
 
 
 def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:

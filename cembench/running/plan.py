@@ -91,7 +91,7 @@ def plan_cells(
             cell = Cell(
                 algorithm=taker.name,
                 parameters=arguments[taker.name],
-                code_hash=_code_hash(taker),
+                code_hash=code_hash(taker),
                 mesh=mesh.name,
                 mesh_hash=mesh.hash,
                 solves=how.solves,
@@ -193,6 +193,7 @@ def standing_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> Stan
     return Standing(row, "model") if row else Standing()
 
 
-def _code_hash(algorithm: Algorithm) -> str:
+def code_hash(algorithm: Algorithm) -> str:
+    """SHA-256 of the source file that declares an algorithm."""
     source = Path(algorithm.function.__code__.co_filename)
     return hashlib.sha256(source.read_bytes()).hexdigest()
