@@ -1,0 +1,103 @@
+"""What is called and on which surfaces: for asv and for pytest-benchmark alike.
+
+`CEMBENCH_TRACK=all` adds the larger sizes and more kinds of surface to the quick ones.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from cembench.geometry.beltrami import (
+    beltrami_coefficients,
+    linear_beltrami_solver,
+    weights_of_map,
+)
+from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.metrics import all_metrics
+from cembench.registry import load_registry
+from cembench.running.plan import generate_surface
+
+VARIABLE = "CEMBENCH_TRACK"
+
+#: A round surface, a steep one whose map shrinks its middle, a long one, one with corners.
+QUICK_DISKS = ("spherical-cap", "hemi-ellipsoid")
+DISKS = (*QUICK_DISKS, "swiss-roll", "catenoid-sheet")
+QUICK_HOLED = ("catenoid-ring",)
+HOLED = (*QUICK_HOLED, "holed-cap")
+
+QUICK_FACES = (2_000, 20_000)
+FACES = (*QUICK_FACES, 80_000, 320_000)
+
+
+def is_asked_for(surface: str, faces: int) -> bool:
+    """Does this run hold the surface at this size? All of them with `CEMBENCH_TRACK=all`."""
+    if os.environ.get(VARIABLE, "quick") == "all":
+        return True
+    return surface in QUICK_DISKS + QUICK_HOLED and faces in QUICK_FACES
+
+
+@lru_cache(maxsize=4)
+def surface(name: str, faces: int) -> TriangleMesh:
+    """The surface of this name with about this many triangles; the same one at every call."""
+    return generate_surface(load_registry(), name, faces)
+
+
+def algorithm_names(mesh_type: type[TriangleMesh]) -> list[str]:
+    """The registered algorithms that take this kind of surface."""
+    found = load_registry().algorithms.values()
+    return sorted(a.name for a in found if issubclass(mesh_type, a.mesh_type))
+
+
+def mapping(algorithm: str, mesh: TriangleMesh) -> Callable[[], Any]:
+    """A call of the algorithm with its defaults, from arrays in memory to the map."""
+    spec = load_registry().algorithm(algorithm)
+    arguments = spec.arguments({})
+    return lambda: spec.function(mesh.fresh(), **arguments)
+
+
+def kernels(mesh: DiskMesh) -> dict[str, Callable[[], Any]]:
+    """The steps that the algorithms share, each ready to be called on this surface."""
+    L = laplacian(mesh)
+    interior = mesh.interior
+    L_ii = L[interior][:, interior]
+    factor = Cholesky(L_ii)
+    right = np.random.default_rng(0).standard_normal((len(interior), 2)) @ [1, 1j]
+    f_b = arc_length_circle(mesh)
+    uv = harmonic_extension(L, mesh.boundary, f_b)
+    weights = weights_of_map(uv, mesh.F, beltrami_coefficients(uv, mesh.F, mesh.V), mesh.V)
+    return {
+        "boundary_loops": lambda: mesh.fresh().loops,
+        "laplacian": lambda: laplacian(mesh),
+        "factorisation": lambda: Cholesky(L_ii),
+        "solve": lambda: factor.solve(right),
+        "beltrami_coefficients": lambda: beltrami_coefficients(uv, mesh.F, mesh.V),
+        "linear_beltrami_solver": lambda: linear_beltrami_solver(
+            mesh.F, weights, mesh.boundary, f_b
+        ),
+        "metrics": lambda: all_metrics(mesh, uv),
+    }
+
+
+#: Names of the kernels, in the order of a run.
+KERNELS = tuple(kernels(surface("spherical-cap", 100)))
+
+__all__ = [
+    "DISKS",
+    "FACES",
+    "HOLED",
+    "KERNELS",
+    "DiskMesh",
+    "HoledMesh",
+    "algorithm_names",
+    "is_asked_for",
+    "kernels",
+    "mapping",
+    "surface",
+]
