@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cembench.geometry.mesh import DiskMesh, HoledMesh
 from cembench.metrics import all_metrics
 
 from . import cases
@@ -18,8 +19,6 @@ class _Algorithms:
     timeout = 300.0
 
     def setup(self, algorithm: str, surface: str, faces: int) -> None:
-        if not cases.is_asked_for(surface, faces):
-            raise NotImplementedError(f"{surface} at {faces}: set {cases.VARIABLE}=all")
         self.mesh = cases.surface(surface, faces)
         self.call = cases.mapping(algorithm, self.mesh)
 
@@ -42,13 +41,31 @@ class _Algorithms:
     track_folds.unit = "triangles"  # type: ignore[attr-defined]
 
 
+class _OnlyOnRequest(_Algorithms):
+    def setup(self, algorithm: str, surface: str, faces: int) -> None:
+        cases.check_asked_for()
+        super().setup(algorithm, surface, faces)
+
+
 class Disks(_Algorithms):
     """Algorithms that take a disk."""
 
-    params = (cases.algorithm_names(cases.DiskMesh), cases.DISKS, cases.FACES)
+    params = (cases.algorithm_names(DiskMesh), cases.DISKS, cases.FACES)
+
+
+class MoreDisks(_OnlyOnRequest):
+    """The same over more kinds of surface and up to larger ones."""
+
+    params = (cases.algorithm_names(DiskMesh), cases.MORE_DISKS, cases.MORE_FACES)
 
 
 class Holed(_Algorithms):
     """Algorithms that take a disk with holes."""
 
-    params = (cases.algorithm_names(cases.HoledMesh), cases.HOLED, cases.FACES)
+    params = (cases.algorithm_names(HoledMesh), cases.HOLED, cases.FACES)
+
+
+class MoreHoled(_OnlyOnRequest):
+    """The same over more kinds of surface and up to larger ones."""
+
+    params = (cases.algorithm_names(HoledMesh), cases.MORE_HOLED, cases.MORE_FACES)

@@ -15,9 +15,17 @@ class Kernels:
     repeat = (5, 15, 3.0)
 
     def setup(self, kernel: str, faces: int) -> None:
-        if not cases.is_asked_for("spherical-cap", faces):
-            raise NotImplementedError(f"{faces} triangles: set {cases.VARIABLE}=all")
         self.call = cases.kernels(cases.surface("spherical-cap", faces))[kernel]
 
     def time_kernel(self, kernel: str, faces: int) -> None:
         self.call()
+
+
+class MoreKernels(Kernels):
+    """The same up to larger surfaces."""
+
+    params = (cases.KERNELS, cases.MORE_FACES)
+
+    def setup(self, kernel: str, faces: int) -> None:
+        cases.check_asked_for()
+        super().setup(kernel, faces)
