@@ -41,22 +41,10 @@ class _Algorithms:
     track_folds.unit = "triangles"  # type: ignore[attr-defined]
 
 
-class _OnlyOnRequest(_Algorithms):
-    def setup(self, algorithm: str, surface: str, faces: int) -> None:
-        cases.check_asked_for()
-        super().setup(algorithm, surface, faces)
-
-
 class Disks(_Algorithms):
     """Algorithms that take a disk."""
 
     params = (cases.algorithm_names(DiskMesh), cases.DISKS, cases.FACES)
-
-
-class MoreDisks(_OnlyOnRequest):
-    """The same over more kinds of surface and up to larger ones."""
-
-    params = (cases.algorithm_names(DiskMesh), cases.MORE_DISKS, cases.MORE_FACES)
 
 
 class Holed(_Algorithms):
@@ -65,7 +53,14 @@ class Holed(_Algorithms):
     params = (cases.algorithm_names(HoledMesh), cases.HOLED, cases.FACES)
 
 
-class MoreHoled(_OnlyOnRequest):
-    """The same over more kinds of surface and up to larger ones."""
+if cases.everything_is_asked_for():
 
-    params = (cases.algorithm_names(HoledMesh), cases.MORE_HOLED, cases.MORE_FACES)
+    class MoreDisks(_Algorithms):
+        """More kinds of surface, up to larger ones."""
+
+        params = (cases.algorithm_names(DiskMesh), cases.MORE_DISKS, cases.MORE_FACES)
+
+    class MoreHoled(_Algorithms):
+        """More kinds of surface, up to larger ones."""
+
+        params = (cases.algorithm_names(HoledMesh), cases.MORE_HOLED, cases.MORE_FACES)

@@ -21,11 +21,9 @@ class Kernels:
         self.call()
 
 
-class MoreKernels(Kernels):
-    """The same up to larger surfaces."""
+if cases.everything_is_asked_for():
 
-    params = (cases.KERNELS, cases.MORE_FACES)
+    class MoreKernels(Kernels):
+        """The same up to larger surfaces."""
 
-    def setup(self, kernel: str, faces: int) -> None:
-        cases.check_asked_for()
-        super().setup(kernel, faces)
+        params = (cases.KERNELS, cases.MORE_FACES)

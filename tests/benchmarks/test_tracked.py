@@ -1,4 +1,5 @@
 import json
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -12,16 +13,12 @@ from cembench.geometry.mesh import DiskMesh
 ROOT = Path(__file__).parents[2]
 
 
-def test_what_takes_long_is_left_out_and_says_how_to_have_it(monkeypatch):
-    monkeypatch.delenv(cases.VARIABLE, raising=False)
-    with pytest.raises(NotImplementedError, match="CEMBENCH_TRACK=all"):
-        algorithms.MoreDisks().setup("cem", "spherical-cap", 2_000)
-    with pytest.raises(NotImplementedError, match="CEMBENCH_TRACK=all"):
-        kernels_module.MoreKernels().setup("laplacian", 2_000)
-    monkeypatch.setenv(cases.VARIABLE, "all")
-    more = algorithms.MoreDisks()
-    more.setup("cem", "spherical-cap", 2_000)
-    assert more.track_folds("cem", "spherical-cap", 2_000) == 0
+@pytest.mark.parametrize(("wanted", "there"), [("quick", False), ("all", True)])
+def test_what_takes_long_is_there_only_on_request(monkeypatch, wanted, there):
+    monkeypatch.setenv(cases.VARIABLE, wanted)
+    found = runpy.run_module("benchmarks.tracked.algorithms")
+    assert ("MoreDisks" in found) == there
+    assert "Disks" in found
 
 
 @pytest.mark.parametrize("algorithm", cases.algorithm_names(DiskMesh))
