@@ -6,6 +6,7 @@ that they are there at once the next time.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from pydantic import BaseModel
 
 from cembench import paper
 from cembench.atomic import read_model, write_model
+from cembench.datasets import CACHE_VARIABLE
 from cembench.errors import RecordError, RegistryError
 from cembench.geometry.mesh import TriangleMesh
 from cembench.geometry.planar import signed_areas
@@ -56,7 +58,7 @@ def kept_facts(registry: Registry, surface: Surface) -> SurfaceFacts | None:
         return None
     try:
         facts = read_model(place, SurfaceFacts)
-    except RecordError:  # damaged, or of another version: found anew
+    except (RecordError, OSError):  # damaged, of another version or another user: found anew
         return None
     held = facts.code_hash == code_hash(_mapper(registry)) and Path(facts.thumbnail).is_file()
     return facts if held else None
@@ -69,6 +71,8 @@ def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
     ------
     RegistryError
         A surface that is not kept on disk.
+    RecordError
+        The place where it is kept cannot be written to.
     MeshError, AlgorithmFailed, RenderError
         It cannot be made, mapped, or drawn.
 
@@ -80,10 +84,10 @@ def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
     from cembench.reporting.preview import write_thumbnail  # slow to import, and seldom needed
 
     place, mapper = _place(surface), _mapper(registry)
+    _check_writable(place.parent)
     mesh = generate_surface(registry, surface.name)
     found = mapper.function(mesh, **mapper.arguments({}))
     thumbnail = place.with_suffix(".png")
-    thumbnail.parent.mkdir(parents=True, exist_ok=True)
     write_thumbnail(mesh, found.uv, thumbnail)
     facts = SurfaceFacts(
         mesh=mesh_facts(mesh, **_standing(registry, surface)),
@@ -143,6 +147,20 @@ def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
 def _place(surface: Surface) -> Path:
     assert surface.kept is not None
     return surface.kept(**surface.arguments({})).with_suffix(".json")
+
+
+def _check_writable(folder: Path) -> None:
+    """Raise before minutes are spent on what could not be kept."""
+    reason = "" if os.access(folder, os.W_OK) or not folder.exists() else "no permission"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+    if reason:
+        raise RecordError(
+            f"the cache {folder} cannot be written to: {reason}. Set {CACHE_VARIABLE} to another "
+            "folder."
+        )
 
 
 def _mapper(registry: Registry) -> Algorithm:

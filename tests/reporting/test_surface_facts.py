@@ -1,9 +1,11 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from cembench import DiskMesh, RegistryError, registry, surface
+from cembench.errors import RecordError
 from cembench.geometry.files import write_mesh
 from cembench.records import MeshFacts
 from cembench.registry import Registry, load_registry
@@ -61,6 +63,18 @@ def test_a_surface_that_is_not_kept_has_no_facts():
     assert kept_facts(load_registry(), cap) is None
     with pytest.raises(RegistryError, match="'spherical-cap' is not kept on disk"):
         find_facts(load_registry(), cap)
+
+
+def test_a_cache_that_cannot_be_written_to_is_named_before_anything_is_made(known, count_calls):
+    bowl = known.surface("bowl")
+    bowl.kept(562).parent.joinpath("file").write_text("in the way")
+    blocked = replace(bowl, kept=lambda faces: bowl.kept(faces).parent / "file/cache/bowl.ply")
+    made = count_calls(surface_facts, "generate_surface")
+    with pytest.raises(
+        RecordError, match=r"file/cache cannot be written to: .* Set CEMBENCH_CACHE"
+    ):
+        find_facts(known, blocked)
+    assert not made
 
 
 def test_the_span_is_a_ratio_of_lengths():
