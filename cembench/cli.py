@@ -98,9 +98,9 @@ def list_(
 ) -> None:
     """Which algorithms and surfaces are there?
 
-    `list surfaces` also tells the counts of the stand-ins for the paper's models, whether they meet
-    their rows of its Table 2, how unevenly they are scaled when CEM flattens them, and where their
-    thumbnails lie: of those that were measured before, or, with --measure, of all.
+    `list surfaces` also tells of the stand-ins for the paper's models: counts,
+    whether they meet their rows of its Table 2, how unevenly CEM scales them,
+    where thumbnails lie. Of all of them with --measure, else of those measured.
     """
     from cembench.registry import load_registry
     from cembench.reporting.terminal import algorithms_table, facts_table, surfaces_table

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 def fetch(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[NAME]...", help="Which; none: list them all.")
+        list[str] | None, typer.Argument(metavar="NAME", help="Which; none: list them all.")
     ] = None,
     *,
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds a server may be silent.")] = 60.0,
@@ -29,9 +29,9 @@ def fetch(
 ) -> None:
     """Fetch public surfaces, check them, and say where they lie.
 
-    Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its SHA-256 must be the known
-    one. $CEMBENCH_DATA_URL points to a mirror. `map NAME` and `run --dataset NAME` fetch by
-    themselves.
+    Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its
+    SHA-256 must be the known one. $CEMBENCH_DATA_URL points to a mirror.
+    `map NAME` and `run --dataset NAME` fetch by themselves.
     """
     from cembench.errors import DatasetError
     from cembench.registry import load_registry

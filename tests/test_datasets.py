@@ -5,15 +5,17 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import re
 import threading
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import numpy as np
 import pytest
+from rich.console import Console
 from scipy.io import savemat
 
-from cembench import registry
+from cembench import fetch_verbs, registry
 from cembench.datasets import Dataset, fetch, is_fetched
 from cembench.errors import DatasetError, RegistryError
 from cembench.geometry.files import read_mesh, write_mesh
@@ -209,6 +211,16 @@ def test_fetch_says_where_the_file_is(cli, known, tiny):
     assert about["path"] == str(tiny.path)
     assert about["size"] == tiny.path.stat().st_size
     assert about["paper_row"] == "Nefertiti"
+
+
+def test_a_bar_shows_on_a_terminal(known, tiny, monkeypatch):
+    terminal = Console(force_terminal=True, width=80, file=io.StringIO())
+    monkeypatch.setattr(fetch_verbs, "err", terminal)
+    fetch_verbs.fetched(tiny)
+    assert is_fetched(tiny)
+    shown = terminal.file.getvalue()
+    assert "fetching tiny" in shown
+    assert re.search(r"[\d.]+/[\d.]+ kB", shown)
 
 
 def test_fetch_goes_on_after_a_failure_and_exits_with_1(cli, known):
