@@ -100,12 +100,7 @@ class Dataset:
 
 def is_fetched(dataset: Dataset) -> bool:
     """Does the file lie in the cache, whole? Nothing is fetched."""
-    return is_copy(dataset, dataset.path)
-
-
-def is_copy(dataset: Dataset, path: Path) -> bool:
-    """Is this file the dataset's, byte for byte?"""
-    return path.is_file() and pooch.file_hash(str(path)) == dataset.sha256
+    return dataset.path.is_file() and pooch.file_hash(str(dataset.path)) == dataset.sha256
 
 
 def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None = None) -> Path:
@@ -150,7 +145,8 @@ def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None 
 
 def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:
     """Which dataset is it that was read from this file? Known by its bytes, or by its mesh."""
+    checksum = pooch.file_hash(str(path))
     for dataset in datasets:
-        if mesh_hash == dataset.mesh_hash or is_copy(dataset, path):
+        if mesh_hash == dataset.mesh_hash or checksum == dataset.sha256:
             return dataset
     return None
