@@ -17,6 +17,7 @@ import sys
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
 from contextlib import closing
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -131,7 +132,8 @@ class _Run:
     records: dict[str, Record] = field(default_factory=dict)
 
     def measure(self, tasks: Sequence[Task]) -> None:
-        pending = [task for task in tasks if not self._is_kept(task)]
+        asked = {task.cell.label for task in tasks}
+        pending = [task for task in tasks if not self._is_kept(task, asked)]
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         for task in pending:
             self._check(task)
@@ -141,13 +143,18 @@ class _Run:
             for task in in_random_order(open_, self.options.seed, number):
                 self._time(task, number)
 
-    def _is_kept(self, task: Task) -> bool:
-        """Is there a record that stands? Samples of what is measured anew are forgotten."""
+    def _is_kept(self, task: Task, asked: AbstractSet[str]) -> bool:
+        """Is there a record that stands? Samples of what is measured anew are forgotten.
+
+        A record follows its mesh to another name, unless the old one is `asked` for too.
+        """
         kept = self.store.find(task.cell)
         if kept is not None or self.options.fresh:
             self.store.forget_samples(task.cell)
         if kept is None or self.options.measures_again(kept):
             return False
+        if kept.cell.label != task.cell.label:
+            kept = self.store.rename(kept, task.cell, keep=kept.cell.label in asked)
         self._finish(task, kept, kept=True)
         return True
 
