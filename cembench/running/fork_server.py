@@ -202,6 +202,7 @@ def _main(parent: int, backend: str) -> None:
     order = _serve()
     _become(order)
     worker.main(Path(order.job))
+    worker.end()
 
 
 if __name__ == "__main__":
