@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from enum import StrEnum
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from cembench import run_verbs
+from cembench import fetch_verbs, run_verbs
 from cembench.console import Json, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
 from cembench.paper.profiles import Profile
@@ -22,8 +22,9 @@ from cembench.records import DEFAULT_ROUNDS
 if TYPE_CHECKING:
     from cembench.geometry.mesh import TriangleMesh
     from cembench.records import Record
-    from cembench.registry import Algorithm, Registry
+    from cembench.registry import Algorithm, Registry, Surface
     from cembench.reporting.progress import PlainProgress
+    from cembench.reporting.surface_facts import SurfaceFacts
     from cembench.running.local import Options
     from cembench.running.plan import Task
     from cembench.store import Store
@@ -82,22 +83,34 @@ BackendOption = Annotated[Backend, typer.Option(help="The library that factors m
 @app.command(
     "list",
     epilog="Examples:  cembench list  ·  cembench list algorithms --verbose  ·  "
-    "cembench list --plugin mine.py",
+    "cembench list surfaces --measure  ·  cembench list --plugin mine.py",
 )
 def list_(
     kind: Annotated[Kind | None, typer.Argument(help="Only these.")] = None,
     *,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say all about each.")] = False,
+    measure: Annotated[
+        bool,
+        typer.Option("--measure", help="Measure the stand-ins that were not: minutes."),
+    ] = False,
     plugin: Plugins = [],  # noqa: B006 - typer copies defaults
     as_json: Json = False,
 ) -> None:
-    """Which algorithms and surfaces are there?"""
+    """Which algorithms and surfaces are there?
+
+    `list surfaces` also tells of the stand-ins for the paper's models: counts,
+    whether they meet their rows of its Table 2, how unevenly CEM scales them,
+    where thumbnails lie. Of all of them with --measure, else of those measured.
+    """
     from cembench.registry import load_registry
-    from cembench.reporting.terminal import algorithms_table, surfaces_table
+    from cembench.reporting.terminal import algorithms_table, facts_table, surfaces_table
 
     registry = load_registry(plugin)
+    if measure and kind is not Kind.surfaces:
+        raise ParameterError("--measure goes with surfaces: cembench list surfaces --measure.")
+    facts = _facts(registry, measure=measure) if kind is Kind.surfaces else {}
     if as_json:
-        print_json(_registry_as_json(registry, kind))
+        print_json(_registry_as_json(registry, kind, facts))
         return
     if kind in (None, Kind.algorithms):
         out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
@@ -105,15 +118,29 @@ def list_(
         out.print()
     if kind in (None, Kind.surfaces):
         out.print(surfaces_table(list(registry.surfaces.values()), verbose=verbose))
+    if facts:
+        known = {name: found for name, found in facts.items() if found}
+        if known:
+            out.print()
+            out.print(facts_table(known))
+        missing = len(facts) - len(known)
+        if missing:
+            out.print(
+                f"\n{missing} of {len(facts)} stand-ins are not measured yet: "
+                "`cembench list surfaces --measure` does it, in minutes.",
+                style="dim",
+            )
 
 
 @app.command(
     "map",
     epilog="Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
-    "cembench map face.ply -a cem -p max_iterations=13 --json",
+    "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand",
 )
 def map_(
-    mesh: Annotated[Path, typer.Argument(help="Surface: OBJ, OFF, PLY or STL.")],
+    mesh: Annotated[
+        Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`.")
+    ],
     *,
     algorithm: Annotated[str, typer.Option("-a", "--algorithm", help="See `list`.")] = "cem",
     parameter: Parameters = [],  # noqa: B006
@@ -140,16 +167,20 @@ def map_(
     from cembench.reporting.frame import row
     from cembench.reporting.terminal import figures_table
     from cembench.running.local import Options, map_once
-    from cembench.running.plan import How, plan_cells, read_mesh_for
+    from cembench.running.plan import How, plan_cells, read_mesh_for, standing_of_file
 
     options = Options(timeout=timeout, memory_bytes=_memory_bytes(memory))
-    chosen = load_registry(plugin).algorithm(algorithm)
+    registry = load_registry(plugin)
+    chosen = registry.algorithm(algorithm)
     if output is not None:
         check_writable_format(output, with_uv=True)
+    if not mesh.exists() and str(mesh) in registry.datasets:
+        mesh = fetch_verbs.fetched(registry.dataset(str(mesh)))
     with err.status("reading", spinner="line"):
         surface = read_mesh_for(mesh, [chosen])
+        standing = {surface.name: standing_of_file(registry, mesh, surface)}
     how = How(solves.value, _installed(backend), threads, repeats=1)
-    tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin)
+    tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin, standing)
     with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
         record, uv = map_once(tasks[0], options)
     ok = record.outcome.status == "ok"
@@ -191,6 +222,9 @@ def run(
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
     mesh_dir: Annotated[
         list[Path], typer.Option("--mesh-dir", help="All mesh files of a folder. Repeatable.")
+    ] = [],  # noqa: B006
+    dataset: Annotated[
+        list[str], typer.Option("--dataset", help="Fetched surfaces (see `fetch`), with commas.")
     ] = [],  # noqa: B006
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
@@ -243,6 +277,7 @@ def run(
         plan_cells,
         read_mesh_for,
         standing_of,
+        standing_of_file,
     )
     from cembench.store import Store
 
@@ -252,16 +287,21 @@ def run(
     names = split(algorithms) or list(registry.algorithms)
     chosen = [registry.algorithm(name) for name in names]
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
+    files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
     generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
     if not files and not generated:
         raise ParameterError(
-            "nothing to run on: name a --profile, or at least one --mesh FILE or --surfaces NAME "
-            "(see `cembench list surfaces`)."
+            "nothing to run on: name a --profile, or at least one --mesh FILE, --dataset NAME (see "
+            "`cembench fetch`) or --surfaces NAME (see `cembench list surfaces`)."
         )
     with err.status("reading surfaces", spinner="line"):
         found = [read_mesh_for(path, chosen) for path in files]
+        standing = {
+            mesh.name: standing_of_file(registry, path, mesh)
+            for path, mesh in zip(files, found, strict=True)
+        }
         found += [generate_surface(registry, name, faces) for name in dict.fromkeys(generated)]
-    standing = standing_of(registry, generated)
+    standing |= standing_of(registry, generated)
     tasks = []
     for policy in policies:
         how = How(policy, _installed(backend), threads, repeats)
@@ -344,7 +384,7 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 #: Modules whose verbs are not written in this one.
-_MORE = (run_verbs,)
+_MORE = (run_verbs, fetch_verbs)
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 
@@ -494,7 +534,27 @@ def _installed(backend: Backend) -> str:
         return backend.value
 
 
-def _registry_as_json(registry: Registry, kind: Kind | None) -> dict[str, Any]:
+def _facts(registry: Registry, *, measure: bool) -> dict[str, SurfaceFacts | None]:
+    """What is known of the surfaces that are kept on disk; found where it is not, if asked to."""
+    from cembench.reporting.surface_facts import find_facts, kept_facts
+
+    families = [family for family in registry.surfaces.values() if family.kept]
+    facts = {family.name: kept_facts(registry, family) for family in families}
+    todo = [family for family in families if measure and facts[family.name] is None]
+    for k, family in enumerate(todo, start=1):
+        words = f"[{k}/{len(todo)}] {family.name}"
+        if not err.is_terminal:
+            err.print(words, markup=False)
+        with err.status(escape(f"{words}: making, mapping, drawing"), spinner="line"):
+            facts[family.name] = find_facts(registry, family)
+    return facts
+
+
+def _registry_as_json(
+    registry: Registry, kind: Kind | None, facts: Mapping[str, SurfaceFacts | None]
+) -> dict[str, Any]:
+    from cembench.reporting.surface_facts import row_check
+
     def about(registered: Any) -> dict[str, Any]:
         return {
             "name": registered.name,
@@ -508,11 +568,19 @@ def _registry_as_json(registry: Registry, kind: Kind | None) -> dict[str, Any]:
     def about_algorithm(a: Algorithm) -> dict[str, Any]:
         return about(a) | {"target": a.target, "takes": a.mesh_type.__name__}
 
+    def about_surface(s: Surface) -> dict[str, Any]:
+        known = facts.get(s.name)
+        more = {"paper_row": s.paper_row or None, "landmarks": s.landmarks is not None}
+        if known is None:
+            return about(s) | more | {"facts": None}
+        flat = known.mesh.model_dump() | known.model_dump(exclude={"mesh"})
+        return about(s) | more | {"facts": flat | {"table2": row_check(known.mesh)}}
+
     listed: dict[str, Any] = {}
     if kind in (None, Kind.algorithms):
         listed["algorithms"] = [about_algorithm(a) for a in registry.algorithms.values()]
     if kind in (None, Kind.surfaces):
-        listed["surfaces"] = [about(s) for s in registry.surfaces.values()]
+        listed["surfaces"] = [about_surface(s) for s in registry.surfaces.values()]
     return listed
 
 

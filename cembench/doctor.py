@@ -1,12 +1,17 @@
-"""Is everything there that cembench needs, and what does an extra bring?"""
+"""Is everything there that cembench needs, and what does an extra bring?
+
+A package that has something of its own to look at offers it through the entry points
+``cembench.checks``: functions without arguments that return a :class:`Finding`.
+"""
 
 from __future__ import annotations
 
 import importlib
 import sys
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib.metadata import EntryPoint, entry_points, version
 
+from cembench.datasets import cache_directory, is_fetched
 from cembench.errors import CembenchError
 from cembench.geometry.cholesky import available_backends
 from cembench.registry import load_registry
@@ -21,6 +26,10 @@ _REQUIRED = {
     "trimesh": "trimesh",
     "matplotlib": "matplotlib",
 }
+
+
+#: Where packages offer checks of their own.
+CHECKS = "cembench.checks"
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,8 @@ def examine() -> list[Finding]:
         _backends(),
         _plugins(),
         _renderer(),
+        *(_offered(entry) for entry in sorted(entry_points(group=CHECKS), key=lambda e: e.name)),
+        *_datasets(),
         _machine(),
     ]
 
@@ -92,6 +103,30 @@ def _renderer() -> Finding:
         required=False,
         remedy="Previews are drawn by matplotlib instead, less finely.",
     )
+
+
+def _offered(entry: EntryPoint) -> Finding:
+    """What an installed package's own check finds; one that breaks is a finding itself."""
+    try:
+        found = entry.load()()
+    except Exception as error:  # it is not ours and may raise anything
+        detail = f"{entry.value} failed: {type(error).__name__}: {error}"
+        remedy = "Repair or uninstall the package that declares it."
+        return Finding(entry.name, False, detail, required=False, remedy=remedy)
+    assert isinstance(found, Finding)
+    return found
+
+
+def _datasets() -> list[Finding]:
+    try:
+        known = load_registry().datasets
+    except CembenchError:  # said in the plug-ins' own line
+        return []
+    here = [name for name, dataset in known.items() if is_fetched(dataset)]
+    detail = f"{len(here)} of {len(known)} fetched{': ' if here else ''}{', '.join(here)}"
+    detail += f"; kept in {cache_directory()}"
+    remedy = "For the paper's public models run `cembench fetch NAME`; stand-ins do without."
+    return [Finding("datasets", len(here) == len(known), detail, required=False, remedy=remedy)]
 
 
 def _machine() -> Finding:

@@ -1,9 +1,10 @@
-"""Which algorithms and surfaces are there, and what do they promise?
+"""Which algorithms, surfaces and datasets are there, and what do they promise?
 
 A decorator only marks a function with its :class:`Algorithm` or :class:`Surface`; nothing happens
 at import. A :class:`Registry` is then collected from entry points (``cembench.algorithms``,
-``cembench.surfaces``: the built-in ones are found no differently from anybody's) and from plug-ins
-named by the user, a file or ``module:name``.
+``cembench.surfaces``, ``cembench.datasets``: the built-in ones are found no differently from
+anybody's) and from plug-ins named by the user, a file or ``module:name``. A dataset needs no mark:
+it is a :class:`cembench.datasets.Dataset`, an object at module level.
 """
 
 from __future__ import annotations
@@ -23,11 +24,15 @@ from typing import Any, Literal, TypeVar, get_args
 
 from pydantic import TypeAdapter, ValidationError
 
+from cembench.datasets import Dataset
 from cembench.errors import ParameterError, RegistryError
 from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
 
 #: What an algorithm maps to; tables never mix these without saying so.
 Target = Literal["disk", "free boundary", "circular holes"]
+
+#: Finds named places on a mesh of a surface family: name -> vertex, counted from 0.
+Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
 
 _MARK = "__cembench__"
 C = TypeVar("C", bound=Callable[..., Any])
@@ -106,6 +111,8 @@ class Surface(_Registered):
 
     source: str = ""
     paper_row: str = ""
+    landmarks: Landmarks | None = None
+    kept: Callable[..., Path] | None = None
 
 
 def algorithm(
@@ -169,12 +176,22 @@ def algorithm(
 
 
 def surface(
-    name: str, *, title: str, source: str = "", notes: str = "", paper_row: str = ""
+    name: str,
+    *,
+    title: str,
+    source: str = "",
+    notes: str = "",
+    paper_row: str = "",
+    landmarks: Landmarks | None = None,
+    kept: Callable[..., Path] | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
     `faces` is the number of triangles asked for; it has a default. `paper_row` is the model of the
-    paper's Table 1 that the surface stands for, if any: the profiles are made of those.
+    paper's Table 1 that the surface stands for, if any: the profiles are made of those. `landmarks`
+    finds named vertices, such as the tip of a nose, on a mesh that the function made, of any size.
+    `kept` takes the same arguments and tells the file in which the surface lies once it has been
+    made; where the surface would be another one, so is the file.
 
     Raises
     ------
@@ -194,6 +211,8 @@ def surface(
             notes=notes or _notes(function),
             source=source,
             paper_row=paper_row,
+            landmarks=landmarks,
+            kept=kept,
         )
         setattr(function, _MARK, spec)
         return function
@@ -228,10 +247,11 @@ def _notes(function: Callable[..., Any]) -> str:
 
 @dataclass(frozen=True)
 class Registry:
-    """The algorithms and surfaces that can be named."""
+    """The algorithms, surfaces and datasets that can be named."""
 
     algorithms: Mapping[str, Algorithm] = field(default_factory=dict)
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
+    datasets: Mapping[str, Dataset] = field(default_factory=dict)
 
     def algorithm(self, name: str) -> Algorithm:
         """The algorithm of this name; :class:`RegistryError` lists the known ones."""
@@ -241,10 +261,18 @@ class Registry:
         """The surface of this name; :class:`RegistryError` lists the known ones."""
         return _look_up("surface", self.surfaces, name)
 
+    def dataset(self, name: str) -> Dataset:
+        """The dataset of this name; :class:`RegistryError` lists the known ones."""
+        return _look_up("dataset", self.datasets, name)
 
-R = TypeVar("R", bound=_Registered)
 
-_GROUPS = {Algorithm: "cembench.algorithms", Surface: "cembench.surfaces"}
+R = TypeVar("R", Algorithm, Surface, Dataset)
+
+_GROUPS: Mapping[type, str] = {
+    Algorithm: "cembench.algorithms",
+    Surface: "cembench.surfaces",
+    Dataset: "cembench.datasets",
+}
 
 
 def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
@@ -275,17 +303,19 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     for plugin in plugins:
         for spec in _declared_by(plugin):
             _add(algorithms if isinstance(spec, Algorithm) else surfaces, spec)
-    return Registry(algorithms, surfaces)
+    return Registry(algorithms, surfaces, installed.datasets)
 
 
 @lru_cache(maxsize=1)
 def _installed() -> Registry:
-    algorithms: dict[str, Algorithm] = {}
-    surfaces: dict[str, Surface] = {}
-    for kind, known in ((Algorithm, algorithms), (Surface, surfaces)):
-        for entry in sorted(entry_points(group=_GROUPS[kind]), key=lambda entry: entry.name):
-            _add(known, _declared_at(entry, kind))
-    return Registry(algorithms, surfaces)
+    return Registry(_all_declared(Algorithm), _all_declared(Surface), _all_declared(Dataset))
+
+
+def _all_declared(kind: type[R]) -> dict[str, R]:
+    known: dict[str, R] = {}
+    for entry in sorted(entry_points(group=_GROUPS[kind]), key=lambda entry: entry.name):
+        _add(known, _declared_at(entry, kind))
+    return known
 
 
 def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
@@ -303,12 +333,18 @@ def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
 
 
 def _declared_at(entry: Any, kind: type[R]) -> R:
-    spec = getattr(_load_entry(entry), _MARK, None)
+    loaded = _load_entry(entry)
+    spec = getattr(loaded, _MARK, loaded)
     if not isinstance(spec, kind) or spec.name != entry.name:
+        noun = kind.__name__.lower()
+        remedy = (
+            f"make it a Dataset({entry.name!r}, ...)"
+            if kind is Dataset
+            else f"decorate it with @{noun}({entry.name!r}, ...)"
+        )
         raise RegistryError(
-            f"entry point {entry.name} = {entry.value!r} of group {entry.group!r} is no "
-            f"{kind.__name__.lower()} of that name; decorate it with "
-            f"@{kind.__name__.lower()}({entry.name!r}, ...)."
+            f"entry point {entry.name} = {entry.value!r} of group {entry.group!r} is no {noun} of "
+            f"that name; {remedy}."
         )
     return spec
 
@@ -323,7 +359,7 @@ def _load_entry(entry: Any) -> Any:
         ) from error
 
 
-def _add(known: dict[str, Any], spec: _Registered) -> None:
+def _add(known: dict[str, Any], spec: _Registered | Dataset) -> None:
     if spec.name in known:
         raise RegistryError(
             f"the name {spec.name!r} is declared twice: by {known[spec.name].origin} and by "

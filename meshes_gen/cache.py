@@ -18,23 +18,15 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import pooch
 
+from cembench.datasets import cache_directory
 from cembench.errors import MeshError
 from cembench.geometry.mesh import TriangleMesh
 
 #: Raise this when a generator's result changes: every cached surface is then made anew.
 GENERATOR_VERSION = 1
 
-#: Overrides the directory of the cache.
-VARIABLE = "CEMBENCH_CACHE"
-
 M = TypeVar("M", bound=TriangleMesh)
-
-
-def cache_directory() -> Path:
-    """Where are surfaces and downloads kept? `CEMBENCH_CACHE`, or the user's cache directory."""
-    return Path(os.environ.get(VARIABLE) or pooch.os_cache("cembench"))
 
 
 def _version(package: str) -> str | None:
@@ -57,6 +49,11 @@ def content_key(name: str, parameters: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+def place_of(name: str, parameters: Mapping[str, Any]) -> Path:
+    """The file in which the surface of this name and parameters lies once it has been made."""
+    return cache_directory() / "surfaces" / f"{name}-{content_key(name, parameters)}.npz"
+
+
 def cached(
     mesh_type: type[M], name: str, parameters: Mapping[str, Any], make: Callable[[], M]
 ) -> M:
@@ -64,7 +61,7 @@ def cached(
 
     A cache that cannot be written to is done without.
     """
-    path = cache_directory() / "surfaces" / f"{name}-{content_key(name, parameters)}.npz"
+    path = place_of(name, parameters)
     mesh = read(mesh_type, path)
     if mesh is None:
         mesh = make()

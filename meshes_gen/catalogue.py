@@ -7,20 +7,20 @@ result comes from the cache (:mod:`meshes_gen.cache`) once it has been made.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.errors import RegistryError
-from cembench.geometry.laplacian import non_delaunay_share
 from cembench.geometry.mesh import DiskMesh, TriangleMesh
 from cembench.registry import surface
 from meshes_gen.brain import human_brain_body
 from meshes_gen.bunny import stanford_bunny_body
 from meshes_gen.busts import bimba_statue_body, david_head_body, knit_cap_man_body, nefertiti_body
-from meshes_gen.cache import cached
+from meshes_gen.cache import cached, place_of
 from meshes_gen.cowboy_hat import cowboy_hat_body
 from meshes_gen.faces import EXPRESSIONS, HO, LIU, face_body
 from meshes_gen.foot import foot_body
@@ -61,6 +61,9 @@ BODIES: Mapping[str, Callable[[int], Body]] = {
     "knit-cap-man": knit_cap_man_body,
 }
 
+#: How often a solid was changed, where it was: its surfaces are then made anew, the others not.
+REVISIONS = {"ho-pouting-face": 1, "liu-pouting-face": 1}
+
 
 def stand_in(
     name: str, faces: int | None = None, *, seed: int = 0, delaunay: bool = True
@@ -81,52 +84,23 @@ def stand_in(
     if name not in ROWS:
         raise RegistryError(f"unknown stand-in {name!r}; known: {', '.join(ROWS)}.")
     count = ROWS[name].faces if faces is None else faces
-    parameters = {
-        "faces": count,
-        "seed": seed,
-        "delaunay": delaunay,
-        "remeshing_filter": has_remeshing_filter(),
-    }
 
     def make() -> DiskMesh:
         body, boundary = BODIES[name](seed), ROWS[name].boundary_at(count)
         return mesh_of(DiskMesh, body, count, boundary, name=name, delaunay=delaunay, seed=seed)
 
-    return cached(DiskMesh, name, parameters, make)
+    return cached(DiskMesh, name, _content(name, count, seed, delaunay), make)
 
 
-def _registered(name: str) -> Callable[..., DiskMesh]:
-    row = ROWS[name]
-
-    def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:
-        return stand_in(name, faces, seed=seed, delaunay=delaunay)
-
-    make.__name__ = make.__qualname__ = name.replace("-", "_")
-    make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."
-    declare = surface(name, title=row.model, source="procedural stand-in", paper_row=row.model)
-    return declare(make)
-
-
-nefertiti = _registered("nefertiti")
-cowboy_hat = _registered("cowboy-hat")
-chinese_vase = _registered("chinese-vase")
-bourbon_bottle = _registered("bourbon-bottle")
-foot = _registered("foot")
-chinese_lion = _registered("chinese-lion")
-david_head = _registered("david-head")
-stanford_bunny = _registered("stanford-bunny")
-human_brain = _registered("human-brain")
-ho_pouting_face = _registered("ho-pouting-face")
-ho_neutral_face = _registered("ho-neutral-face")
-left_hand = _registered("left-hand")
-statue_of_liberty = _registered("statue-of-liberty")
-liu_neutral_face = _registered("liu-neutral-face")
-liu_smile_face = _registered("liu-smile-face")
-liu_pouting_face = _registered("liu-pouting-face")
-liu_wry_face = _registered("liu-wry-face")
-isis_statue = _registered("isis-statue")
-bimba_statue = _registered("bimba-statue")
-knit_cap_man = _registered("knit-cap-man")
+def _content(name: str, faces: int, seed: int, delaunay: bool) -> dict[str, Any]:
+    """All that decides what a stand-in looks like."""
+    content = {
+        "faces": faces,
+        "seed": seed,
+        "delaunay": delaunay,
+        "remeshing_filter": has_remeshing_filter(),
+    }
+    return content | {"revision": REVISIONS[name]} if name in REVISIONS else content
 
 
 #: Which person makes which expression in the stand-ins that are faces.
@@ -161,54 +135,45 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
     }
 
 
-def surface_facts(mesh: TriangleMesh, uv: NDArray[np.complex128] | None = None) -> dict[str, Any]:
-    """What does `cembench list surfaces` tell about a mesh?
-
-    Keys: vertices, faces, boundary_vertices (of the longest loop), loops, non_delaunay_share (of
-    the interior edges), notices; and, where a conformal map `uv` (n,) of the mesh is given, the
-    figures of :func:`conformal_factor_span`.
-    """
-    facts = {
-        "vertices": mesh.n,
-        "faces": mesh.m,
-        "boundary_vertices": max(len(loop) for loop in mesh.loops),
-        "loops": len(mesh.loops),
-        "non_delaunay_share": non_delaunay_share(mesh),
-        "notices": list(mesh.notices),
-    }
-    return facts if uv is None else facts | conformal_factor_span(mesh, uv)
-
-
-def conformal_factor_span(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, float]:
-    """How unevenly does a map scale lengths: largest over smallest factor of a triangle?
-
-    The factor is the root of image area over surface area, a ratio of lengths.
-    `conformal_factor_span` is the ratio of the extremes, `conformal_factor_span_99_8` that of the
-    99.9 and 0.1 percentiles over the triangles.
-    """
-    a, b, c = (uv[mesh.F[:, k]] for k in range(3))
-    image = np.abs(((b - a).conj() * (c - a)).imag)
-    p, q, r = (mesh.V[mesh.F[:, k]] for k in range(3))
-    flat = np.linalg.norm(np.cross(q - p, r - p), axis=1)
-    factor = np.sqrt(np.maximum(image, 1e-300) / flat)
-    low, high = np.percentile(factor, [0.1, 99.9])
-    return {
-        "conformal_factor_span": float(factor.max() / factor.min()),
-        "conformal_factor_span_99_8": float(high / low),
-    }
-
-
-def row_check(name: str, mesh: DiskMesh) -> dict[str, Any]:
-    """How near does a stand-in come to its row? Deviations relative to the printed counts."""
+def _registered(name: str) -> Callable[..., DiskMesh]:
     row = ROWS[name]
-    boundary = len(mesh.boundary)
-    return {
-        "row_faces": row.faces,
-        "row_vertices": row.vertices,
-        "row_boundary": row.boundary,
-        "faces_off": mesh.m / row.faces - 1,
-        "boundary_off": boundary / row.boundary - 1,
-        "ok": abs(mesh.m / row.faces - 1) <= 0.01
-        and abs(boundary / row.boundary - 1) <= 0.10
-        and not any(notice.startswith("Definition 1") for notice in mesh.notices),
-    }
+
+    def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:
+        return stand_in(name, faces, seed=seed, delaunay=delaunay)
+
+    def kept(faces: int, *, seed: int, delaunay: bool) -> Path:
+        return place_of(name, _content(name, faces, seed, delaunay))
+
+    make.__name__ = make.__qualname__ = name.replace("-", "_")
+    make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."
+    declare = surface(
+        name,
+        title=row.model,
+        source="procedural stand-in",
+        paper_row=row.model,
+        landmarks=partial(landmarks, name) if name in FACES else None,
+        kept=kept,
+    )
+    return declare(make)
+
+
+nefertiti = _registered("nefertiti")
+cowboy_hat = _registered("cowboy-hat")
+chinese_vase = _registered("chinese-vase")
+bourbon_bottle = _registered("bourbon-bottle")
+foot = _registered("foot")
+chinese_lion = _registered("chinese-lion")
+david_head = _registered("david-head")
+stanford_bunny = _registered("stanford-bunny")
+human_brain = _registered("human-brain")
+ho_pouting_face = _registered("ho-pouting-face")
+ho_neutral_face = _registered("ho-neutral-face")
+left_hand = _registered("left-hand")
+statue_of_liberty = _registered("statue-of-liberty")
+liu_neutral_face = _registered("liu-neutral-face")
+liu_smile_face = _registered("liu-smile-face")
+liu_pouting_face = _registered("liu-pouting-face")
+liu_wry_face = _registered("liu-wry-face")
+isis_statue = _registered("isis-statue")
+bimba_statue = _registered("bimba-statue")
+knit_cap_man = _registered("knit-cap-man")

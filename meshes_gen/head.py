@@ -66,6 +66,10 @@ WRY = Expression(
 )
 
 
+#: How much of its outermost part the groove between pouting lips keeps.
+SHORTENED = 0.5
+
+
 @dataclass(frozen=True)
 class Head:
     """The field of a head, and where its landmarks are."""
@@ -182,8 +186,20 @@ class Head:
         d = join(d, tube(p, upper, radii, 0.03), 0.04)
         d = join(d, tube(p, lower, 1.1 * radii, 0.03), 0.04)
         depth = 0.017 + 0.12 * self.expression.pout
-        groove = tube(p, line - inwards * 0.6, np.array([0.6, 1, 1, 1, 0.6]) * depth, 0.01)
+        between = self._between_lips() - inwards * 0.6
+        groove = tube(p, between, np.array([0.6, 1, 1, 1, 0.6]) * depth, 0.01)
         return carve(d, groove, 0.025)
+
+    def _between_lips(self) -> Real:
+        """Five points along the groove between the lips, right corner to left; (5, 3).
+
+        Where the lips are pushed forward their ends close over the mouth's line: the groove stops
+        before, or it would run on below them as a tunnel.
+        """
+        line = self._points["mouth"].copy()
+        if self.expression.pout > 0:
+            line[[0, 4]] = line[[1, 3]] + SHORTENED * (line[[0, 4]] - line[[1, 3]])
+        return line
 
     def _ear(self, p: Real, s: int) -> Real:
         turn = rotation("z", -s * 25.0) @ rotation("x", -10.0)
@@ -194,11 +210,11 @@ class Head:
 
     def landmarks(self) -> dict[str, NDArray[np.float64]]:
         """Points near the surface: nose tip, eye corners, mouth corners; (3,) each."""
-        c, P = self._points, self.person
+        c, P, mouth = self._points, self.person, self._between_lips()
         found = {
             "nose_tip": c["tip"] + (0, -0.085 * P.nose_width, 0),
-            "mouth_corner_right": c["mouth"][0],
-            "mouth_corner_left": c["mouth"][4],
+            "mouth_corner_right": mouth[0],
+            "mouth_corner_left": mouth[4],
         }
         for s, side in ((-1, "right"), (1, "left")):
             eye = c[f"eye_{side}"]

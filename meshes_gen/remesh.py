@@ -67,17 +67,6 @@ def has_remeshing_filter() -> bool:
     )
 
 
-def remeshing_advice() -> str | None:
-    """What should be installed so that surfaces are remeshed the usual way? None: nothing."""
-    if has_remeshing_filter():
-        return None
-    return (
-        "pymeshlab's filter meshing_isotropic_explicit_remeshing is missing; surfaces are remeshed "
-        "by local operations instead, which gives other meshes. Install pymeshlab and the system "
-        "library libOpenGL (Debian, Ubuntu: apt-get install libopengl0)."
-    )
-
-
 # ---- a first mesh ---------------------------------------------------------------------------
 
 

@@ -99,9 +99,9 @@ def test_run_needs_something_to_run_on(cli):
     assert (code, "nothing to run on" in err) == (2, True)
 
 
-def test_two_files_of_one_name(cli, tmp_path):
-    for folder in ("a", "b"):
+def test_two_surfaces_of_one_name(cli, tmp_path):
+    for folder, size in (("a", 1), ("b", 2)):
         (tmp_path / folder).mkdir()
-        (tmp_path / folder / "same.obj").write_text(obj(V, F))
+        (tmp_path / folder / "same.obj").write_text(obj(size * np.asarray(V), F))
     code, _, err = cli("run", "--mesh", tmp_path / "a/same.obj", "--mesh", tmp_path / "b/same.obj")
     assert (code, "two surfaces are called 'same'" in err) == (2, True)

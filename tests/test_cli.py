@@ -125,7 +125,33 @@ def test_doctor_says_what_is_missing(cli, monkeypatch):
     assert "pip install libigl" in out
 
 
-VERBS = ["status", "show", "compare", "merge", "export"]
+def test_doctor_tells_of_remeshing_and_of_what_was_fetched(cli, monkeypatch, tmp_path):
+    monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
+    monkeypatch.setattr("meshes_gen.remesh.has_remeshing_filter", lambda: False)
+    code, out, _ = cli("doctor")
+    assert code == 0
+    assert "-- remeshing pymeshlab's filter" in " ".join(out.split())
+    assert "apt-get install libopengl0" in out
+    assert "0 of 4 fetched; kept in" in out
+    assert "cembench fetch NAME" in out
+
+
+def test_a_check_that_breaks_is_a_finding(monkeypatch):
+    from importlib.metadata import EntryPoint
+
+    from cembench.doctor import CHECKS, examine
+
+    broken = EntryPoint("mine", "cembench.clock:nothing", CHECKS)
+    monkeypatch.setattr(
+        "cembench.doctor.entry_points", lambda group: [broken] if group == CHECKS else []
+    )
+    (found,) = [finding for finding in examine() if finding.name == "mine"]
+    assert not found.ok
+    assert not found.required
+    assert "AttributeError" in found.detail
+
+
+VERBS = ["status", "show", "compare", "merge", "export", "fetch"]
 
 
 @pytest.mark.parametrize("verb", ["", "list", "map", "run", "reproduce", "doctor", *VERBS])

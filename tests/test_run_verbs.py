@@ -98,7 +98,7 @@ def test_export_writes_a_row_a_cell(runs, form):
         (("run", "--surfaces", "flat-disk", "--memory", "much"), "--memory 'much' is no size"),
         (("run", "--surfaces", "flat-disk", "--solves", "twice"), "--solves 'twice' is unknown"),
         (("run", "--mesh-dir", "nowhere"), "--mesh-dir nowhere is no folder"),
-        (("run", "--mesh-dir", "one"), "holds no OBJ, OFF, PLY or STL file"),
+        (("run", "--mesh-dir", "one"), "holds no OBJ, OFF, PLY, STL or MAT file"),
         (("run",), "nothing to run on: name a --profile"),
     ],
 )
@@ -172,3 +172,13 @@ def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
 
     found = standing_of(load_registry(), ["foot", "flat-disk"])
     assert found == {"foot": Standing("Foot", "stand-in")}
+
+
+def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):
+    from cembench.geometry.files import write_mesh
+    from meshes_gen.flat_disk import flat_disk
+
+    for name in ("a.obj", "a.ply"):
+        write_mesh(cli.folder / name, flat_disk(100))
+    found = json.loads(cli("run", "-a", "cem", "--mesh-dir", ".", "--dry-run", "--json")[1])
+    assert [cell["mesh"] for cell in found["cells"]] == ["a"]

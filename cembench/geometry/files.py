@@ -1,5 +1,7 @@
 """Mesh files: OBJ, OFF, PLY (ASCII and binary) and STL, read and written through libraries.
 
+MATLAB files (MAT, before version 7.3) are read too: variables v (n, 3), and f (m, 3) from 1.
+
 Reading keeps every vertex, in the file's order and in float64, and only the geometry: texture
 seams of an OBJ do not cut the surface. Polygons are cut into triangles by fans, with a notice.
 """
@@ -19,6 +21,7 @@ import meshio
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
+from scipy.io import loadmat
 
 from cembench.errors import MeshError
 from cembench.geometry.mesh import DiskMesh, TriangleMesh
@@ -121,7 +124,8 @@ def check_writable_format(path: Path, *, with_uv: bool) -> None:
     suffix = path.suffix.lower()
     allowed = _WITH_UV if with_uv else tuple(_WRITERS)
     if suffix not in allowed:
-        why = "cannot hold texture coordinates" if suffix in _WRITERS else "is unknown"
+        readable = "can be read but not written" if suffix in _READERS else "is unknown"
+        why = "cannot hold texture coordinates" if suffix in _WRITERS else readable
         raise MeshError(
             f"{path}: mesh format {suffix!r} {why}; allowed here: {', '.join(allowed)}."
         )
@@ -194,6 +198,27 @@ def _read_off(path: Path) -> Arrays:
     return np.asarray(found.vertices, float), np.asarray(found.faces, np.int64), notice
 
 
+def _read_mat(path: Path) -> Arrays:
+    try:
+        content = loadmat(path)
+    except NotImplementedError:
+        raise MeshError(
+            "MATLAB files of version 7.3 are not supported. In MATLAB, save it with "
+            "save(..., '-v7')."
+        ) from None
+    missing = [name for name in ("v", "f") if name not in content]
+    if missing:
+        present = ", ".join(name for name in content if not name.startswith("__")) or "none"
+        raise MeshError(
+            f"no variable {missing[0]!r}; it has: {present}. Needed are v (n, 3), the vertices, "
+            "and f (m, 3), the triangles counted from 1."
+        )
+    F = np.asarray(content["f"])
+    if not np.issubdtype(F.dtype, np.number) or (np.round(F) != F).any() or F.min(initial=1) < 1:
+        raise MeshError("variable 'f' must hold whole numbers from 1 on, the triangles' corners.")
+    return np.asarray(content["v"], dtype=np.float64), F.astype(np.int64) - 1, ()
+
+
 def _write_obj(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
     nothing, none = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     if UV is None:
@@ -221,6 +246,7 @@ _READERS: dict[str, Callable[[Path], Arrays]] = {
     ".off": _read_off,
     ".ply": _read_ply,
     ".stl": _read_stl,
+    ".mat": _read_mat,
 }
 _WRITERS: dict[str, Callable[[Path, TriangleMesh, ArrayLike | None], None]] = {
     ".obj": _write_obj,

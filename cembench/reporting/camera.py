@@ -9,8 +9,18 @@ from cembench.geometry.mesh import TriangleMesh
 
 Real = NDArray[np.float64]
 
-#: From +z unless another axis shows this many times its area: most scans and models face +z.
+X, Y, Z = np.eye(3)
+#: From where to look if y points up, and if z does: faces look along +z then, and along -y.
+Y_UP, Z_UP = np.stack([Z, X, -Z, -X]), np.stack([-Y, X, Y, -X])
+#: ... and if nothing tells what points up.
+ANY = np.stack([Z, Y, X, -Z, -Y, -X])
+#: From the first of these unless another one shows this many times its area.
 HABIT = 1.5
+#: Below this share of net to total area a surface is nearly closed: it stands on its cut, or hangs
+#: from it, if the cut's middle is this far (share of the size) from its own ...
+CLOSED, APART = 0.25, 0.08
+#: ... and does so along one of y and z if it is this many times farther there than along the other.
+LEANING = 1.5
 #: Above this share of net to total area a surface is a relief, seen obliquely from above ...
 RELIEF = 0.7
 #: ... and above this one it is flat, and seen straight on.
@@ -24,7 +34,8 @@ CELLS, SAMPLE = 48, 100_000
 def view_rotation(mesh: TriangleMesh) -> Real:
     """Which rotation brings the surface before the viewer?
 
-    The viewer stands on a coordinate axis that shows much of the surface, moved a little aside.
+    The viewer stands on a coordinate axis that shows much of the surface, moved a little aside. Up
+    is y, or z for what is cut along z: a bust that stands on its cut, a foot cut at the ankle.
 
     Returns
     -------
@@ -41,7 +52,8 @@ def view_rotation(mesh: TriangleMesh) -> Real:
         axis = np.zeros(3)
         axis[np.argmax(np.abs(net))] = np.sign(net[np.argmax(np.abs(net))])
         return _moved(_frame(axis), *OBLIQUE)
-    return _moved(_frame(_best_axis(middles, normals, areas)), *PORTRAIT)
+    axes, up = _views(mesh, middles, areas) if strength < CLOSED else (ANY, Y)
+    return _moved(_best_view(axes, up, middles, normals, areas), *PORTRAIT)
 
 
 def _samples(mesh: TriangleMesh) -> tuple[Real, Real, Real]:
@@ -52,12 +64,24 @@ def _samples(mesh: TriangleMesh) -> tuple[Real, Real, Real]:
     return corners.mean(axis=1), normals / doubled[:, None], doubled / 2
 
 
-def _best_axis(middles: Real, normals: Real, areas: Real) -> Real:
-    """Which of the six axis directions shows most, by custom rather +z?"""
-    axes = np.concatenate([np.eye(3)[::-1], -np.eye(3)[::-1]])  # +z first
-    shown = np.array([_area_shown(_frame(axis), middles, normals, areas) for axis in axes])
+def _views(mesh: TriangleMesh, middles: Real, areas: Real) -> tuple[Real, Real]:
+    """Axes to look along and what points up, by the way from the middle of the cut to its own."""
+    if mesh.loops:
+        cut = mesh.V[np.concatenate(mesh.loops)].mean(axis=0)
+        way = np.abs(areas @ middles / areas.sum() - cut) / np.ptp(middles, axis=0).max()
+        if way[2] > max(LEANING * way[1], APART):
+            return Z_UP, Z
+        if way[1] > max(LEANING * way[2], APART):
+            return Y_UP, Y
+    return ANY, Y
+
+
+def _best_view(axes: Real, up: Real, middles: Real, normals: Real, areas: Real) -> Real:
+    """Which of these axis directions shows most, by custom rather the first?"""
+    frames = [_frame(axis, up) for axis in axes]
+    shown = np.array([_area_shown(frame, middles, normals, areas) for frame in frames])
     best = int(np.argmax(shown))
-    return axes[0] if shown[best] < HABIT * shown[0] else axes[best]
+    return frames[0] if shown[best] < HABIT * shown[0] else frames[best]
 
 
 def _area_shown(frame: Real, middles: Real, normals: Real, areas: Real) -> float:
@@ -73,9 +97,8 @@ def _area_shown(frame: Real, middles: Real, normals: Real, areas: Real) -> float
     return float((areas * facing)[shown].sum())
 
 
-def _frame(toward: Real) -> Real:
-    """Right, up and towards the viewer; up is y, or for a view along y the direction of -z."""
-    up = np.array([0.0, 1.0, 0.0])
+def _frame(toward: Real, up: Real = Y) -> Real:
+    """Right, up and towards the viewer; for a view along y, up is the direction of -z or z."""
     if abs(toward @ up) > 0.99:
         up = np.array([0.0, 0.0, -np.sign(toward[1])])
     right = np.cross(up, toward)

@@ -74,6 +74,8 @@ def row(record: Record) -> dict[str, Any]:
         "boundary_vertices": record.mesh.boundary_vertices,
         "non_delaunay_share": record.mesh.non_delaunay_share,
         "notices": list(record.mesh.notices),
+        "origin": record.mesh.origin,
+        "paper_row": record.mesh.paper_row or None,
         "solves": cell.solves,
         "backend": cell.backend,
         "threads": cell.threads,

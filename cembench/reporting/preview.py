@@ -11,6 +11,7 @@ rasterizer in numpy draws, and matplotlib puts the page together in either case.
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import subprocess
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from matplotlib.image import imsave
 from numpy.typing import NDArray
 
 from cembench.errors import ParameterError, RenderError
@@ -35,6 +37,8 @@ Renderer = Literal["pyvista", "matplotlib"]
 
 #: Width and height in pixels, and the smallest that can hold two panels and words.
 SIZE, LEAST = (1600, 940), (240, 150)
+#: Side in pixels of a picture of the surface alone.
+THUMBNAIL = 480
 #: Seconds after which pyvista is given up.
 TIMEOUT = 90.0
 #: What a user can do where pyvista dies or draws nothing.
@@ -110,6 +114,19 @@ def write_preview(
     overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
     png = compose.page(surface, image, overlay, (title, caption, _note(scene)), size)
     _write(path, png)
+    return drawn
+
+
+def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> Drawn:
+    """Draw a surface under the checkerboard of its map into a PNG file; which renderer did it?
+
+    `side` in pixels; the rest, errors too, as in :func:`write_preview`.
+    """
+    _check(mesh, uv, SIZE)
+    (surface, _), drawn = _draw(Scene.of(mesh, uv), side, "pyvista")
+    file = io.BytesIO()
+    imsave(file, surface, format="png")
+    _write(path, file.getvalue())
     return drawn
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
+from pathlib import Path
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cembench import paper
 from cembench.comparison import (
     UNSTABLE_WIDTH,
     Change,
@@ -20,9 +22,11 @@ from cembench.comparison import (
     references,
     seconds_interval,
 )
+from cembench.datasets import Dataset
 from cembench.estimate import Estimate
 from cembench.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.registry import Algorithm, Surface
+from cembench.reporting.surface_facts import SurfaceFacts, row_check
 
 _STYLES = {"ok": "green", "skipped": "yellow"}
 
@@ -234,6 +238,8 @@ def figures_table(record: Record) -> Table:
         f"faces, {facts.boundary_vertices:,} on the boundary, "
         f"{facts.non_delaunay_share:.1%} of the edges not Delaunay",
     )
+    if facts.paper_row:
+        table.add_row("in the paper", _printed(record))
     table.add_row("algorithm", f"{record.title} ({record.target})" + _given(record))
     for label, name, form, unit in (
         ("conformal energy", "conformal_energy", ".6f", ""),
@@ -266,6 +272,17 @@ def figures_table(record: Record) -> Table:
     for note in outcome.notes:
         table.add_row("note", note)
     return table
+
+
+def _printed(record: Record) -> str:
+    """What the paper says of this surface, and of this algorithm on it; printed, not measured."""
+    row, name = record.mesh.paper_row, record.cell.algorithm
+    what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
+    figures = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
+    energy, mean, sd = (figures.get(name + end) for end in ("", "_mean", "_sd"))
+    if energy is None or mean is None or sd is None:
+        return what
+    return f"{what}; printed: E_C {energy:.4f}, angles {mean:.2f} in the mean, SD {sd:.2f}"
 
 
 def _given(record: Record) -> str:
@@ -303,6 +320,44 @@ def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableT
     for s in surfaces:
         row = [s.name, s.title, _parameters(s)]
         table.add_row(*row, *([_flowing(s.notes)] if verbose else []))
+    return table
+
+
+def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
+    """Counts of surfaces, do they meet the paper's Table 2, and how hard are they to flatten?"""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", no_wrap=True)
+    for heading in ("vertices", "faces", "boundary", "not Delaunay", "span"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("Table 2", no_wrap=True)
+    for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
+        mesh, check = facts.mesh, row_check(facts.mesh)
+        verdict = "-" if check is None else "ok" if check["ok"] else "off"
+        table.add_row(
+            name,
+            f"{mesh.vertices:,}",
+            f"{mesh.faces:,}",
+            f"{mesh.boundary_vertices:,}",
+            f"{mesh.non_delaunay_share:.1%}",
+            f"{facts.conformal_factor_span:.2g}",
+            Text(verdict, style="bold red" if verdict == "off" else ""),
+        )
+    folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
+    words = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
+    return Group(table, Text(f"{words}\nthumbnails: {', '.join(folders)}", style="dim"))
+
+
+def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
+    """What can be fetched, and is it there already?"""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("dataset", "title", "in the paper"):
+        table.add_column(heading)
+    table.add_column("size", justify="right")
+    table.add_column("licence")
+    table.add_column("here")
+    for d, here in datasets:
+        size = "-" if d.size is None else f"{d.size / 1e6:.1f} MB"
+        table.add_row(d.name, d.title, d.paper_row or "-", size, d.licence, "yes" if here else "no")
     return table
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from cembench.datasets import recognised
 from cembench.errors import MeshError, ParameterError
 from cembench.geometry.files import is_mesh_file, read_mesh
 from cembench.geometry.laplacian import non_delaunay_share
@@ -56,6 +57,8 @@ def plan_cells(
 ) -> list[Task]:
     """Every algorithm on every surface that it takes, surfaces outermost.
 
+    A surface that comes twice under one name, as from two files of one folder, counts once.
+
     In `parameters`, the key ``name`` goes to every algorithm that has such a parameter and
     ``algorithm.name`` to that one alone. `standing` is by the surfaces' names; a surface that is
     not in it is none of the paper's.
@@ -65,9 +68,10 @@ def plan_cells(
     ParameterError
         A parameter that none of the algorithms has, or a value that one refuses.
     MeshError
-        Two surfaces of one name, or one that no algorithm takes.
+        Two different surfaces of one name, or one that no algorithm takes.
 
     """
+    meshes = list({(mesh.name, mesh.hash): mesh for mesh in meshes}.values())
     names = [mesh.name for mesh in meshes]
     for name in names:
         if names.count(name) > 1:
@@ -87,7 +91,7 @@ def plan_cells(
             cell = Cell(
                 algorithm=taker.name,
                 parameters=arguments[taker.name],
-                code_hash=_code_hash(taker),
+                code_hash=code_hash(taker),
                 mesh=mesh.name,
                 mesh_hash=mesh.hash,
                 solves=how.solves,
@@ -163,7 +167,7 @@ def mesh_files(folder: Path) -> list[Path]:
     """
     found = sorted(path for path in folder.glob("*") if is_mesh_file(path))
     if not found:
-        why = "holds no OBJ, OFF, PLY or STL file" if folder.is_dir() else "is no folder"
+        why = "holds no OBJ, OFF, PLY, STL or MAT file" if folder.is_dir() else "is no folder"
         raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
     return found
 
@@ -182,6 +186,14 @@ def standing_of(registry: Registry, names: Iterable[str]) -> dict[str, Standing]
     return {name: Standing(row, "stand-in") for name, row in rows.items() if row}
 
 
-def _code_hash(algorithm: Algorithm) -> str:
+def standing_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> Standing:
+    """Is what was read from this file one of the paper's models?"""
+    dataset = recognised(registry.datasets.values(), path, mesh.hash)
+    row = dataset.paper_row if dataset else ""
+    return Standing(row, "model") if row else Standing()
+
+
+def code_hash(algorithm: Algorithm) -> str:
+    """SHA-256 of the source file that declares an algorithm."""
     source = Path(algorithm.function.__code__.co_filename)
     return hashlib.sha256(source.read_bytes()).hexdigest()

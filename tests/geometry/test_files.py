@@ -2,6 +2,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from cembench import MeshError, TriangleMesh
 from cembench.geometry.files import read_mesh, write_mesh
@@ -128,3 +129,49 @@ def test_nothing_is_half_written(surface, tmp_path, monkeypatch):
     assert not list(tmp_path.iterdir())
     with pytest.raises(MeshError, match="there is no folder"):
         write_mesh(tmp_path / "missing" / "a.obj", surface)
+
+
+def mat(path, **variables):
+    savemat(path, variables)
+    return path
+
+
+def test_matlab_files_count_triangles_from_1(surface, tmp_path):
+    path = mat(tmp_path / "a.mat", v=surface.V, f=(surface.F + 1).astype(float))
+    again = read_mesh(path, TriangleMesh)
+    assert again.hash == surface.hash
+    assert again.name == "a"
+
+
+@pytest.mark.parametrize(
+    ("variables", "words"),
+    [
+        ({"v": np.zeros((3, 3)), "x": 1}, "a.mat: no variable 'f'; it has: v, x"),
+        ({"v": np.eye(3), "f": [[0, 1, 2]]}, "'f' must hold whole numbers from 1 on"),
+        ({"v": np.eye(3), "f": [[1, 2, 2.5]]}, "'f' must hold whole numbers from 1 on"),
+        ({"v": np.eye(3), "f": "text"}, "'f' must hold whole numbers from 1 on"),
+        ({"v": np.eye(3), "f": [[1, 2, 4]]}, "index"),
+        ({"v": "text", "f": [[1, 2, 3]]}, "cannot be read as MAT"),
+    ],
+)
+def test_matlab_file_without_a_mesh(variables, words, tmp_path):
+    with pytest.raises(MeshError, match=re.escape(words)):
+        read_mesh(mat(tmp_path / "a.mat", **variables))
+
+
+def test_damaged_matlab_file(tmp_path):
+    (tmp_path / "a.mat").write_text("hello")
+    with pytest.raises(MeshError, match="cannot be read as MAT"):
+        read_mesh(tmp_path / "a.mat")
+
+
+def test_matlab_file_of_version_7_3_is_refused_with_the_remedy(tmp_path):
+    header = b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM"
+    (tmp_path / "a.mat").write_bytes(header + bytes(512))
+    with pytest.raises(MeshError, match=r"version 7\.3 are not supported.*'-v7'"):
+        read_mesh(tmp_path / "a.mat")
+
+
+def test_matlab_files_are_not_written(surface, tmp_path):
+    with pytest.raises(MeshError, match=r"'\.mat' can be read but not written"):
+        write_mesh(tmp_path / "a.mat", surface)

@@ -3,12 +3,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cembench.geometry.files import read_mesh
 from cembench.geometry.mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.reporting import scene as look
 from cembench.reporting.camera import view_rotation
 from cembench.reporting.rasterizer import rasterize
 from cembench.reporting.scene import Scene, doubled_areas
+from tests.real_meshes import real_mesh
 
 
 def relief(height, faces=800):
@@ -35,6 +37,24 @@ def test_relief_is_seen_obliquely_from_its_front():
     toward = view_rotation(relief(lambda x, y: 0.3 * np.sin(3 * x) * np.cos(3 * y)))[2]
     assert toward[2] > 0.5
     assert toward[1] < -0.3
+
+
+@pytest.mark.parametrize("name", ["nefertiti", "cowboy-hat", "bourbon-bottle"])
+def test_what_is_cut_along_z_is_seen_upright_as_if_y_were_up(name):
+    mesh = load_registry().surface(name).function(2_000)
+    right, up, toward = view_rotation(mesh)
+    assert up[2] > 0.9
+    assert toward[1] < -0.9  # a bust's face looks along -y
+    to_y_up = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    turned = DiskMesh.from_arrays(mesh.V @ to_y_up.T, mesh.F)
+    np.testing.assert_allclose(view_rotation(turned) @ to_y_up, [right, up, toward], atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["demosthenes.off", "max_planck_head.ply", "chinese_lion.obj"])
+def test_real_heads_stand_upright_and_look_at_the_viewer(name):
+    _, up, toward = view_rotation(read_mesh(real_mesh(name)))
+    assert up[1] > 0.9
+    assert toward[2] > 0.9
 
 
 def test_a_finer_board_covers_the_same_surface_with_smaller_squares():

@@ -1,0 +1,22 @@
+"""What `cembench doctor` should know of the generators."""
+
+from __future__ import annotations
+
+from cembench.doctor import Finding
+from meshes_gen import remesh
+
+
+def remeshing_finding() -> Finding:
+    """Are surfaces remeshed the usual way here, and if not, what should be installed?"""
+    filter_ = "pymeshlab's filter meshing_isotropic_explicit_remeshing"
+    if remesh.has_remeshing_filter():
+        return Finding("remeshing", True, filter_, required=False)
+    return Finding(
+        "remeshing",
+        False,
+        f"{filter_} is missing; surfaces are remeshed by local operations instead, which gives "
+        "other meshes",
+        required=False,
+        remedy="Install pymeshlab and the system library libOpenGL (Debian, Ubuntu: apt-get "
+        "install libopengl0).",
+    )
