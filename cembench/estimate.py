@@ -16,6 +16,7 @@ from typing import Literal
 from cembench import paper
 from cembench.records import Cell, Record
 from cembench.running.fork_server import can_fork
+from cembench.running.measure import LONG_CALL
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
@@ -23,7 +24,8 @@ Basis = Literal["recorded", "other sizes", "rough"]
 START_SECONDS = 0.5
 #: The same of a process that is forked from one that has loaded them, and to end it.
 FORK_SECONDS = 0.1
-#: Times as long as a call takes a process that times: the warm-up, and one call or more.
+#: Times as long as a call takes a process that times: the warm-up, and one call or more; a long
+#: call is made once.
 CALLS_A_ROUND = 2.5
 #: Seconds of the check beside its call: metrics, by triangle.
 CHECK_SECONDS_A_FACE = 2e-6
@@ -78,7 +80,8 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     )
     check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
     start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
-    rounds = cell.repeats * (start + CALLS_A_ROUND * call)
+    calls = CALLS_A_ROUND if call < LONG_CALL else 1
+    rounds = cell.repeats * (start + calls * call)
     return Estimate(call, check + rounds, memory, basis)
 
 
