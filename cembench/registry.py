@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, TypeVar, get_args
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from cembench.errors import ParameterError, RegistryError
@@ -28,6 +30,9 @@ from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
 
 #: What an algorithm maps to; tables never mix these without saying so.
 Target = Literal["disk", "free boundary", "circular holes"]
+
+#: From a surface's vertices (n, 3) to the image (n,) of each under its conformal map.
+ExactMap = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 _MARK = "__cembench__"
 C = TypeVar("C", bound=Callable[..., Any])
@@ -106,6 +111,7 @@ class Surface(_Registered):
 
     source: str = ""
     paper_row: str = ""
+    exact_map: ExactMap | None = None
 
 
 def algorithm(
@@ -169,12 +175,20 @@ def algorithm(
 
 
 def surface(
-    name: str, *, title: str, source: str = "", notes: str = "", paper_row: str = ""
+    name: str,
+    *,
+    title: str,
+    source: str = "",
+    notes: str = "",
+    paper_row: str = "",
+    exact_map: ExactMap | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
     `faces` is the number of triangles asked for; it has a default. `paper_row` is the model of the
-    paper's Table 1 that the surface stands for, if any: the profiles are made of those.
+    paper's Table 1 that the surface stands for, if any: the profiles are made of those. `exact_map`
+    is its conformal map to the unit disk, for holed surfaces with round holes, where that is known
+    in closed form for the default parameters; it is one of many, up to a Moebius map.
 
     Raises
     ------
@@ -194,6 +208,7 @@ def surface(
             notes=notes or _notes(function),
             source=source,
             paper_row=paper_row,
+            exact_map=exact_map,
         )
         setattr(function, _MARK, spec)
         return function

@@ -33,6 +33,9 @@ CIRCLE_TOLERANCE = 1e-9
 ENOUGH_SECONDS = 0.1
 ENOUGH_CALLS = 5
 
+#: The cause where the arrays V and F are not as they were before the call.
+MESH_CHANGED = "the algorithm changed the mesh it was given"
+
 Call = Callable[[], tuple[Any, Timing]]
 
 
@@ -59,7 +62,7 @@ def check_cell(
         return outcome.model_copy(update={"cause": unusable}), None
     problems = faults(algorithm, mesh, found.uv)
     if TriangleMesh(mesh.V, mesh.F).hash != before:
-        problems.append("the algorithm changed the mesh it was given")
+        problems.append(MESH_CHANGED)
     metrics = all_metrics(mesh, found.uv)
     described = {
         "status": "invalid" if problems else "ok",
