@@ -181,7 +181,7 @@ def _invariances(solver: Solver, uneven: Mapped) -> Iterator[Finding]:
     similarity = solver.algorithm.target == "free boundary"
     again = solver.map(renumbered)
     yield same_map(
-        "numbering",
+        "another numbering",
         uneven,
         again,
         None if again.uv is None else again.uv[number],
@@ -218,7 +218,7 @@ def same_map(
         stage="correctness",
         name=what,
         ok=ok,
-        measured=f"under another {what} {measured}",
+        measured=measured,
         allowed=f"the same figures or the same map, up to a Moebius map, within {SAME_FIGURES:g}",
         remedy=remedy,
     )
@@ -229,14 +229,14 @@ def same_under_backslash(reused: Mapped, anew: Mapped) -> Finding:
     apart = np.inf
     if anew.uv is not None:
         apart = float(np.abs(_uv(reused) - anew.uv).max())
-    measured = f"the maps differ by up to {apart:.1e}"
+    measured = f"reuse and backslash differ by up to {apart:.1e}"
     if anew.uv is None:
         measured = f"{anew.outcome.status}: {anew.outcome.cause}"
     return Finding(
         stage="correctness",
         name="both linear-algebra policies",
         ok=apart <= SAME_MAP,
-        measured=f"solves reuse and backslash: {measured}",
+        measured=measured,
         allowed=f"the same map within {SAME_MAP:g} however systems are solved",
         remedy="factor and solve only through cembench.geometry.cholesky.Cholesky, and call "
         "update() when the matrix changes.",

@@ -111,8 +111,11 @@ def _energy_words(against: Against) -> str:
         words = f"{energy} lower than {title} on {found.lower} of {_count(found.surfaces)}"
     else:
         words = f"{energy} higher than {title} on {found.higher} of {_count(found.surfaces)}"
-    if found.equal and found.equal < found.surfaces:
+    if 0 < found.equal < found.surfaces:
+        other = min(found.lower, found.higher)
+        side = "higher" if found.lower >= found.higher else "lower"
         words += f", equal within 1 % on {found.equal}"
+        words += f", {side} on {other}" if other else ""
     return f"{words} ({_ratio_words(found)})"
 
 
