@@ -207,6 +207,13 @@ def words(text: str) -> Value:
     return Value(text)
 
 
+def marked(value: Value, column: Column) -> str:
+    """The text with the mark of its origin; none where the column's heading says "printed"."""
+    mark = ORIGINS[value.origin][1] if value.origin else ""
+    says = value.origin == "printed" and column.title.startswith("printed")
+    return value.text if says or value.number is None else value.text + mark
+
+
 def csv_of(table: Table) -> PurePosixPath:
     """Where is a table's CSV, relative to the report's folder?"""
     return PurePosixPath("tables", f"{table.name}.csv")

@@ -15,7 +15,8 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from itertools import groupby
@@ -93,7 +94,7 @@ def render(report: Report, folder: Path) -> str:
     sections = [_section(section, anchors, None) for section in report.sections]
     everything = [s for top in sections for s in _all_sections(top)]
     figures = list(figures_of(report))
-    embed = _embedder(figures, folder)
+    pictures = _embed_all(figures, folder)
     script = (_TEMPLATES / "report.js").read_text()
     library = _plotly_source() if any(f.plot is not None for f in figures) else b""
     return (
@@ -106,7 +107,7 @@ def render(report: Report, folder: Path) -> str:
             records={key: _record(key, row) for key, row in report.records.items()},
             anchor=anchors.of,
             table=lambda table: _table(table, report.records, anchors.of(table)),
-            picture=embed,
+            picture=lambda figure: pictures[id(figure)],
             thumbnail=lambda section: _thumbnail(section, folder),
             plot=_plot,
             data=lambda figure: _data(folder, figure.data) if figure.data else "",
@@ -263,22 +264,25 @@ def _letters(place: int) -> str:
 # --- figures ---------------------------------------------------------------------------------
 
 
-def _embedder(figures: Sequence[Figure], folder: Path) -> Callable[[Figure], Embedded | None]:
-    """How is a figure's picture embedded? All pictures together keep within one budget."""
+def _embed_all(figures: Sequence[Figure], folder: Path) -> dict[int, Embedded | None]:
+    """The picture of each figure, by identity; all together keep within one budget."""
     rasters = [folder / file for f in figures if (file := _pixel_file(f)) is not None]
     cap = pixel_cap([size_of(path) for path in rasters])
+    with ThreadPoolExecutor() as pool:
+        pictures = pool.map(lambda figure: _embed(figure, folder, cap), figures)
+        return {id(f): picture for f, picture in zip(figures, pictures, strict=True)}
 
-    def embed(figure: Figure) -> Embedded | None:
-        vector = next((f for f in figure.files if f.suffix.lower() == ".svg"), None)
-        raster = _pixel_file(figure)
-        found = None
-        if vector is not None and (figure.plot is not None or raster is None):
-            found = embed_vector(folder / vector)
-        if found is None and raster is not None:
-            found = embed_pixels(folder / raster, cap, exact=figure.plot is not None)
-        return found
 
-    return embed
+def _embed(figure: Figure, folder: Path, cap: float) -> Embedded | None:
+    """A plot as its drawing, if that is small; anything else as pixels."""
+    vector = next((file for file in figure.files if file.suffix.lower() == ".svg"), None)
+    raster = _pixel_file(figure)
+    found = None
+    if vector is not None and (figure.plot is not None or raster is None):
+        found = embed_vector(folder / vector)
+    if found is None and raster is not None:
+        found = embed_pixels(folder / raster, cap, exact=figure.plot is not None)
+    return found
 
 
 def _pixel_file(figure: Figure) -> PurePosixPath | None:
