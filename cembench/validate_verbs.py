@@ -163,10 +163,13 @@ def _telling() -> Telling:
 def _write(found: Validation, folder: Path) -> dict[str, str]:
     """Lay the validation into the folder, as JSON and as a page; where is each?"""
     from cembench.atomic import write_model
+    from cembench.reporting.html import write_html
+    from cembench.validation.document import document_of
 
     path = folder / "validation.json"
     write_model(path, found)
-    return {"output": str(path)}
+    page = write_html(document_of(found, folder), folder)
+    return {"output": str(path), "page": str(page)}
 
 
 def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:

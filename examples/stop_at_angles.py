@@ -42,21 +42,22 @@ def stop_at_angles(
     uv[b] = arc_length_circle(mesh)
     uv[i] = inside.solve(-(L_ib @ uv[b]))  # Eq. 22
     error = np.abs(corner_angles(uv, mesh.F) - angles).mean()
-    for done in range(1, max_iterations + 1):
+    iterations = 0
+    while iterations < max_iterations:
         following = np.empty_like(uv)
         following[b] = on_circle(ring.solve(-(L_bi @ inverted(uv[i]))))
         following[i] = inside.solve(-(L_ib @ following[b]))
         before, error = error, np.abs(corner_angles(following, mesh.F) - angles).mean()
         if error > before:
             break
-        uv = following
+        uv, iterations = following, iterations + 1
         if before - error < least_gain * before:
             break
-    return Parameterization(uv, iterations=done)
+    return Parameterization(uv, iterations)
 
 
 def inverted(f: np.ndarray) -> np.ndarray:
-    """f / |f|^2 (Eq. 30)."""
+    """Each value over its modulus squared (Eq. 30)."""
     return f / np.maximum(np.abs(f) ** 2, np.finfo(float).tiny)
 
 

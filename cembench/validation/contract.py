@@ -19,11 +19,14 @@ SAME_ENERGY = 1e-6
 
 
 def examine_contract(solver: Solver, registry: Registry) -> list[Finding]:
-    """The findings; those on what the map holds are left out where there is none."""
+    """The findings; where defaults are out of range or there is no map, only that is told."""
+    findings = [parameters_fit(solver.algorithm)]
+    if not findings[0].ok:
+        return findings
     kind = surfaces.kind_of(solver.algorithm)
     uneven = surfaces.uneven(registry, kind)
     first = solver.map(uneven)
-    findings = [parameters_fit(solver.algorithm), returns_a_map(first)]
+    findings.append(returns_a_map(first))
     if not first.is_usable:
         return findings
     return [

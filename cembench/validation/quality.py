@@ -77,6 +77,8 @@ class Pair(BaseModel):
     baseline_seconds: float | None
     seconds_ratio: float | None
     speed: SpeedVerdict | None
+    #: Keys of our record and of the baseline's.
+    records: tuple[str, str]
 
 
 class Against(BaseModel):
@@ -213,6 +215,7 @@ def _pair(ours: Record, theirs: Record, *, relative: bool) -> Pair:
         baseline_seconds=theirs.outcome.median_seconds if theirs.outcome.status == "ok" else None,
         seconds_ratio=found.ratio if found else None,
         speed=found.verdict if found else None,
+        records=(ours.cell.key, theirs.cell.key),
     )
 
 

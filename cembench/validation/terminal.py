@@ -12,9 +12,7 @@ from rich.text import Text
 from cembench.validation.finding import Finding
 from cembench.validation.quality import Against, Pair, Sides
 from cembench.validation.scaling import Growth
-from cembench.validation.verdict import Validation, sentence
-
-STAGES = ("contract", "correctness", "quality", "scaling")
+from cembench.validation.verdict import STAGES, Validation, sentence
 
 
 def validation_text(validation: Validation) -> RenderableType:
@@ -22,7 +20,7 @@ def validation_text(validation: Validation) -> RenderableType:
     parts: list[RenderableType] = []
     for stage in STAGES:
         found = [finding for finding in validation.findings if finding.stage == stage]
-        why = validation.skipped.get(stage)  # type: ignore[call-overload]
+        why = validation.skipped.get(stage)
         if found or why:
             parts.append(Text(stage, style="bold"))
         parts += [part for finding in found for part in _finding_lines(finding)]

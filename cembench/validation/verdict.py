@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict
 
 from cembench.validation.finding import Finding, Stage
 from cembench.validation.quality import Against, Sides, Speed
 from cembench.validation.scaling import Growth
+
+STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 class Requirement(StrEnum):

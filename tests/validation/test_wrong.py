@@ -1,4 +1,4 @@
-"""Each wrong solver is caught by the check that is meant for it, and the verdict names the fault."""
+"""Each wrong solver is caught by the check that is meant for it."""
 
 import gc
 

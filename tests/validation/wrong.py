@@ -18,8 +18,8 @@ def right(mesh):
     return fdm(mesh).uv.copy()
 
 
-def harmonic(mesh, f_b, L=None):
-    return harmonic_extension(laplacian(mesh) if L is None else L, mesh.boundary, f_b)
+def harmonic(mesh, f_b):
+    return harmonic_extension(laplacian(mesh), mesh.boundary, f_b)
 
 
 @algorithm("right", title="Right", target="disk")
@@ -85,12 +85,10 @@ def remembers(mesh: DiskMesh) -> Parameterization:
 calls = []
 
 
-@algorithm("nan-sometimes", title="NaN where weights are negative", target="disk")
+@algorithm("nan-sometimes", title="NaN on small meshes", target="disk")
 def nan_sometimes(mesh: DiskMesh) -> Parameterization:
     uv = right(mesh)
-    weights = laplacian(mesh).copy()
-    weights.setdiag(0)
-    if weights.max() > 0.1:
+    if mesh.n < 20:
         uv[:] = np.nan
     return Parameterization(uv)
 
@@ -116,7 +114,7 @@ def fold(mesh: DiskMesh) -> Parameterization:
     """Moves the vertex nearest to the middle of the disk a little over the edge opposite."""
     uv = right(mesh)
     inner = mesh.interior[np.argmin(np.abs(uv[mesh.interior] - 0.3))]
-    star = mesh.F[(mesh.F == inner).any(axis=1)]
+    star = mesh.F[(inner == mesh.F).any(axis=1)]
     one = star[np.argmin(np.abs(uv[star].mean(axis=1)))]
     others = one[one != inner]
     step = uv[others].mean() - uv[inner]
@@ -130,7 +128,6 @@ def fold(mesh: DiskMesh) -> Parameterization:
 
 @algorithm("by-number", title="Bends the circle at vertex number 0", target="disk")
 def by_number(mesh: DiskMesh) -> Parameterization:
-    """As far from the right boundary as the first boundary vertex is from the first number."""
     uv = right(mesh)
     f_b = uv[mesh.boundary]
     apex = uv[0] / max(abs(uv[0]), 1e-3)
@@ -155,11 +152,10 @@ def wrong_under_backslash(mesh: DiskMesh) -> Parameterization:
 
 @algorithm("noise", title="Noise of a thousandth", target="disk")
 def noise(mesh: DiskMesh) -> Parameterization:
-    """Seeded by what neither numbering nor motion changes, so that only the rates tell."""
+    """Made of what neither numbering nor motion changes, so that only the rates tell."""
     uv = right(mesh)
-    inner = mesh.interior
-    wave = np.cos(1e4 * np.abs(uv[inner]) ** 2)
-    uv[inner] += 0.1 * wave * uv[inner] * (1 - np.abs(uv[inner]) ** 2) / np.sqrt(384)
+    radius = np.abs(uv[mesh.interior])
+    uv[mesh.interior] *= 1 + 0.005 * np.cos(1e4 * radius**2) * (1 - radius**2)
     return Parameterization(uv)
 
 
