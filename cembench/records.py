@@ -109,6 +109,8 @@ class Outcome(BaseModel):
     status: Status
     #: Why the status is not "ok"; None otherwise.
     cause: str | None = None
+    #: The algorithm itself said that it found no map (AlgorithmFailed).
+    gave_up: bool = False
     traceback: str | None = None
     #: In order; empty where no call was timed.
     rounds: tuple[Round, ...] = ()

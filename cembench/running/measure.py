@@ -100,7 +100,7 @@ def outcome_of_error(error: Exception, mesh: TriangleMesh) -> Outcome:
     """As what is a call on this mesh recorded that raised this?"""
     if isinstance(error, AlgorithmFailed):
         cause = "; ".join([str(error), *_broken_premises(mesh)])
-        return Outcome(status="failed", cause=cause)
+        return Outcome(status="failed", cause=cause, gave_up=True)
     if isinstance(error, CembenchError):
         return Outcome(status="failed", cause=str(error))
     told = "".join(traceback.format_exception(error))

@@ -10,24 +10,26 @@ from cembench.geometry.moebius import Moebius
 Complex = NDArray[np.complex128]
 
 
+#: Steps of the reweighting below; it settles in a few.
+_STEPS = 20
+
+
 def closest_moebius(z: Complex, w: Complex) -> Moebius:
     """Which Moebius map carries the points z (n,) nearest to the points w (n,)?
 
-    Least squares of ``a z + b - w (c z + 1)``, divided by the ``c z + 1`` of the step before, so
-    that what is minimised in the end is the distance of the images.
+    Least squares of ``a z + b - w (c z + d)`` with coefficients of unit norm, divided by the
+    ``c z + d`` of the step before, so that in the end the distance of the images is minimised.
     """
-    weight = np.ones(len(z), dtype=np.complex128)
-    a = b = c = 0j
-    for _ in range(20):
-        columns = np.stack([z, np.ones_like(z), -w * z], axis=1) / weight[:, None]
-        (a, b, c), *_ = np.linalg.lstsq(columns, w / weight, rcond=None)
-        following = c * z + 1
-        if not np.abs(following).min() > 1e-12:
+    columns = np.stack([z, np.ones_like(z), -w * z, -w], axis=1)
+    weight = np.ones(len(z))
+    found = np.zeros(4, dtype=np.complex128)
+    for _ in range(_STEPS):
+        before = found
+        found = np.linalg.svd(columns / weight[:, None], full_matrices=False)[2][-1].conj()
+        weight = np.abs(found[2] * z + found[3])
+        if abs(np.vdot(before, found)) > 1 - 1e-14 or not weight.min() > 0:
             break
-        if np.abs(following - weight).max() <= 1e-14 * np.abs(weight).max():
-            break
-        weight = following
-    return Moebius(complex(a), complex(b), complex(c), 1 + 0j)
+    return Moebius(*found.tolist())
 
 
 def closest_similarity(z: Complex, w: Complex) -> Moebius:

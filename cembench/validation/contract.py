@@ -138,9 +138,9 @@ def is_repeatable(first: Mapped, second: Mapped) -> Finding:
 
 def copes(mapped: list[Mapped]) -> Finding:
     """On meshes out of the ordinary: a map, or a cause?"""
-    bad = [m for m in mapped if not m.is_usable and not m.gave_up]
+    bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
     said = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
-    without = [m.mesh.name for m in mapped if m.gave_up]
+    without = [m.mesh.name for m in mapped if m.outcome.gave_up]
     right = f"{len(mapped) - len(without)} of {len(mapped)} mapped"
     if without:
         right += f", gave up on {', '.join(without)} with a cause"

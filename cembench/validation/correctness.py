@@ -9,7 +9,7 @@ import numpy as np
 
 from cembench.metrics import all_metrics, boundary_circularity, flipped_triangles, image_area
 from cembench.registry import Algorithm, Registry
-from cembench.running.measure import CIRCLE_TOLERANCE
+from cembench.running.measure import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
 from cembench.validation.finding import Finding
@@ -26,8 +26,6 @@ ENERGY_ORDER, ANGLE_ORDER = 1.5, 0.75
 ENERGY_ROUNDING, ANGLE_ROUNDING = 1e-12, 1e-6
 #: How far from the exact map, relative to its radius, on the finest triangulation.
 POSITION_ERROR = 0.01
-#: How far from circles the boundaries may be that a map to "circular holes" has.
-HOLE_TOLERANCE = 1e-3
 
 _INVARIANT = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg", "dilatation_mean")
 
@@ -99,7 +97,7 @@ def boundary_findings(algorithm: Algorithm, maps: Sequence[Mapped]) -> Iterator[
     disk = algorithm.target == "disk"
     off = [_off_circle(m) if disk else _off_circles(m) for m in maps]
     worst = int(np.argmax(off))
-    allowed = CIRCLE_TOLERANCE if disk else HOLE_TOLERANCE
+    allowed = CIRCLE_TOLERANCE if disk else CIRCULAR
     yield Finding(
         stage="correctness",
         name="boundary",
@@ -145,7 +143,7 @@ def angles_improve(series: Series) -> Finding:
 def _rate(
     series: Series, what: str, errors: list[float], order: float, least: float, rounding: float
 ) -> Finding:
-    shown = ", ".join(f"{error:.1e}" for error in errors)
+    shown = ", ".join(f"{error:.2g}" for error in errors)
     return Finding(
         stage="correctness",
         name=f"{what} under refinement",
@@ -168,7 +166,7 @@ def reaches_the_exact_map(series: Series) -> Finding:
         stage="correctness",
         name="exact map",
         ok=errors[-1] <= POSITION_ERROR,
-        measured=f"on {series.surface.name} {', '.join(f'{e:.1e}' for e in errors)} away: order "
+        measured=f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
         f"{_order(series, errors):.2f}",
         allowed=f"at most {POSITION_ERROR:g} of the radius on the finest triangulation, up to a "
         "Moebius map",

@@ -79,6 +79,8 @@ def examine(
     """
     started = monotonic()
     algorithm = solver.algorithm
+    if asked.up_to:
+        sizes(asked.up_to)  # complains now of what could not be fitted later
     work = _Work(
         solver,
         registry,

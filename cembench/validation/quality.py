@@ -23,7 +23,6 @@ from cembench.intervals import median_interval
 from cembench.records import Record
 from cembench.running.measure import MESH_CHANGED
 from cembench.validation.finding import Finding
-from cembench.validation.solver import gave_up
 
 #: Ratios this near to 1 are ties.
 TIE = 0.01
@@ -250,4 +249,4 @@ def _only_folds(record: Record) -> bool:
 
 
 def _has_none(record: Record) -> bool:
-    return record.outcome.status in ("timeout", "out_of_memory") or gave_up(record.outcome)
+    return record.outcome.status in ("timeout", "out_of_memory") or record.outcome.gave_up

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict
 
+from cembench.errors import ParameterError
 from cembench.estimate import fit_power_law
 from cembench.records import Record
 from cembench.validation.finding import Finding
@@ -13,6 +14,8 @@ from cembench.validation.finding import Finding
 #: The largest exponent that is allowed. Factoring the Laplacian of a planar mesh costs faces^1.5
 #: in theory; 0.2 are for the clock.
 MOST_EXPONENT = 1.7
+#: The fewest triangles of the largest mesh.
+LEAST_UP_TO = 900
 #: Phase whose growth is shown beside.
 _FACTORISATION = "factorisation"
 
@@ -35,7 +38,19 @@ class Growth(BaseModel):
 
 
 def sizes(up_to: int) -> tuple[int, ...]:
-    """The numbers of triangles: three, each three times the one before."""
+    """The numbers of triangles: three, each three times the one before.
+
+    Raises
+    ------
+    ParameterError
+        So few that the start of a call outweighs them.
+
+    """
+    if up_to < LEAST_UP_TO:
+        raise ParameterError(
+            f"--up-to {up_to} is too few to fit an exponent; allowed are {LEAST_UP_TO:,} triangles "
+            "and more, or 0 to leave that stage out."
+        )
     return up_to // 9, up_to // 3, up_to
 
 

@@ -30,19 +30,9 @@ class Mapped:
     uv: Complex | None
 
     @property
-    def gave_up(self) -> bool:
-        """Did the algorithm itself say that it found no map (:class:`AlgorithmFailed`)?"""
-        return gave_up(self.outcome)
-
-    @property
     def is_usable(self) -> bool:
         """Is there a map of the right shape and type, and finite?"""
         return self.uv is not None
-
-
-def gave_up(outcome: Outcome) -> bool:
-    """Did the algorithm itself say that it found no map, rather than crash?"""
-    return outcome.status == "failed" and outcome.traceback is None and bool(outcome.cause)
 
 
 def in_a_process(options: Options) -> Call:

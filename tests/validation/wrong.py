@@ -179,11 +179,11 @@ def quadratic(mesh: DiskMesh) -> Parameterization:
     return Parameterization(uv)
 
 
-@algorithm("folds-on-caps", title="Gives up on one surface, folds on another", target="disk")
-def folds_on_caps(mesh: DiskMesh) -> Parameterization:
+@algorithm("folds-sometimes", title="Gives up on one surface, folds on another", target="disk")
+def folds_sometimes(mesh: DiskMesh) -> Parameterization:
     if mesh.name == "cone":
         raise AlgorithmFailed("no cones")
-    return fold(mesh) if mesh.name == "cowboy-hat" else right_one(mesh)
+    return fold(mesh) if mesh.name == "flat-disk" else right_one(mesh)
 
 
 @algorithm("hangs", title="Never ends", target="disk")
