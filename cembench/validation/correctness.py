@@ -98,11 +98,13 @@ def boundary_findings(algorithm: Algorithm, maps: Sequence[Mapped]) -> Iterator[
     off = [_off_circle(m) if disk else _off_circles(m) for m in maps]
     worst = int(np.argmax(off))
     allowed = CIRCLE_TOLERANCE if disk else CIRCULAR
+    ok = off[worst] <= allowed
+    where = "" if ok else f", on {_named(maps[worst])}"
     yield Finding(
         stage="correctness",
         name="boundary",
-        ok=off[worst] <= allowed,
-        measured=f"up to {off[worst]:.1e} off the circle, on {_named(maps[worst])}",
+        ok=ok,
+        measured=f"up to {off[worst]:.1e} off the circle{where}",
         allowed=f"|uv| = 1 on the outer boundary{'' if disk else ', holes on circles'}, "
         f"within {allowed:g}",
         remedy="divide the boundary's images by their moduli before the last solve.",
