@@ -7,7 +7,7 @@ import pytest
 
 from tests.validation.in_this_process import LauncherHere, call_here
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples/stop_at_angles.py"
 GUIDE = (ROOT / "docs/write_a_solver.md").read_text()
 
