@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
 
-.PHONY: reproduce test test-slow lint types tests bench clean
+.PHONY: reproduce test test-slow lint types tests bench bench-kernels clean
 
 reproduce: $(READY)
 	$(BIN)/cembench reproduce
@@ -28,6 +28,9 @@ tests: $(READY)
 
 bench: $(READY)
 	$(BIN)/python benchmarks/cem_against_factorisation.py
+
+bench-kernels: $(READY)
+	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
 
 # Stale when the requirements change; the environment's own Python must still start.
 $(READY): pyproject.toml

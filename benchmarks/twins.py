@@ -6,9 +6,10 @@ What is measured of an algorithm and of its twin can differ by chance only: an "
 from __future__ import annotations
 
 import functools
+from importlib.metadata import entry_points
 from typing import Any
 
-from cembench.registry import Algorithm, algorithm, load_registry
+from cembench.registry import Algorithm, algorithm, load_algorithm
 
 
 def twin(of: Algorithm) -> Any:
@@ -23,5 +24,5 @@ def twin(of: Algorithm) -> Any:
     return declare(again)
 
 
-for _installed in load_registry().algorithms.values():
-    globals()[f"{_installed.name}-twin"] = twin(_installed)
+for _name in entry_points(group="cembench.algorithms").names:
+    globals()[f"{_name}-twin"] = twin(load_algorithm(_name))

@@ -388,12 +388,12 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
     from cembench.reporting.terminal import plan_table
 
     records = store.records() if (store.folder / "records").is_dir() else []
-    held = {r.cell.label: r.outcome.status for r in records if not options.measures_again(r)}
+    held = {r.cell.key: r.outcome.status for r in records if not options.measures_again(r)}
     lines = [
         (
             task.cell,
             task.facts.faces,
-            None if task.cell.label in held else estimate(task.cell, task.facts.faces, records),
+            None if task.cell.key in held else estimate(task.cell, task.facts.faces, records),
         )
         for task in tasks
     ]
@@ -408,7 +408,7 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
                 "algorithm": cell.algorithm,
                 "solves": cell.solves,
                 "faces": faces,
-                "held": held.get(cell.label),
+                "held": held.get(cell.key),
                 "estimate": None if cost is None else asdict(cost),
             }
             for cell, faces, cost in lines
@@ -416,7 +416,7 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
         print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest})
         return
     shown = [
-        (cell, faces, cost.basis if cost else f"there: {held[cell.label]}", cost)
+        (cell, faces, cost.basis if cost else f"there: {held[cell.key]}", cost)
         for cell, faces, cost in lines
     ]
     out.print(plan_table(shown))

@@ -15,11 +15,14 @@ from typing import Literal
 
 from cembench import paper
 from cembench.records import Cell, Record
+from cembench.running.fork_server import can_fork
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
 #: Seconds to start a process, load the libraries and read the mesh.
 START_SECONDS = 0.5
+#: The same of a process that is forked from one that has loaded them, and to end it.
+FORK_SECONDS = 0.1
 #: Times as long as a call takes a process that times: the warm-up, and one call or more.
 CALLS_A_ROUND = 2.5
 #: Seconds of the check beside its call: metrics, by triangle.
@@ -74,7 +77,8 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
         else ROUGH_BYTES + ROUGH_BYTES_A_FACE * faces
     )
     check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
-    rounds = cell.repeats * (START_SECONDS + CALLS_A_ROUND * call)
+    start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
+    rounds = cell.repeats * (start + CALLS_A_ROUND * call)
     return Estimate(call, check + rounds, memory, basis)
 
 

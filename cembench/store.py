@@ -45,9 +45,25 @@ class Store:
         self.folder = folder
 
     def find(self, cell: Cell) -> Record | None:
-        """What was recorded of this cell, if anything?"""
+        """What was recorded of this cell, if anything, under whatever name its mesh had?"""
         path = self._record_path(cell)
-        return _read_record(path) if path.exists() else None
+        if path.exists():
+            return _read_record(path)
+        others = sorted((self.folder / "records").glob(f"*--{cell.key[:12]}.json"))
+        return _read_record(others[0]) if others else None
+
+    def rename(self, record: Record, cell: Cell, *, keep: bool) -> Record:
+        """Record the same under the name that the cell's mesh has now; with `keep` also as it was.
+
+        `cell` has the record's key: nothing but the name differs.
+        """
+        renamed = record.model_copy(update={"cell": cell})
+        environment = self.environments().get(record.environment, {"id": record.environment})
+        self.save(renamed, self.uv(record.cell), environment)
+        if not keep:
+            self._record_path(record.cell).unlink(missing_ok=True)
+            self._map_path(record.cell).unlink(missing_ok=True)
+        return renamed
 
     def records(self) -> list[Record]:
         """All records, by name of their files.
@@ -199,9 +215,6 @@ class Store:
 
     def _mesh_path(self, mesh_hash: str) -> Path:
         return self.folder / "meshes" / f"{mesh_hash[:32]}.npz"
-
-    def _samples(self, cell: Cell) -> Path:
-        return self.folder / "samples" / cell.label
 
 
 def merge(runs: Iterable[Store], into: Store) -> int:

@@ -1,3 +1,4 @@
+import json
 import runpy
 import subprocess
 import sys
@@ -9,7 +10,10 @@ SCRIPT = Path(__file__).parents[1] / "benchmarks/repeatability.py"
 
 
 def test_the_table_tells_the_spread_and_the_false_alarms():
-    tell = runpy.run_path(str(SCRIPT))["tell"]
+    script = runpy.run_path(str(SCRIPT))
+
+    def told(runs):
+        return script["tell"](script["summarise"](runs, "fdm"))
 
     def run(other, twin):
         return [
@@ -22,10 +26,11 @@ def test_the_table_tells_the_spread_and_the_false_alarms():
             )
         ]
 
-    text = tell([run(3.0, 1.0), run(3.5, 1.0), run(4.0, 1.1)], "fdm")
+    text = told([run(3.0, 1.0), run(3.5, 1.0), run(4.0, 1.1)])
     assert "| hat | 1 | 2.50 | 2.00 | 3.00 | 28.6% |" in text
     assert "A/A: 1 of 6 comparisons of an algorithm with its twin (16.7%)" in text
-    assert "No A/A comparison" in tell([[record_of([1.0], algorithm="cem")]], "fdm")
+    assert "a probability of 0.26" in text  # 1 - 0.95^6
+    assert "No A/A comparison" in told([[record_of([1.0], algorithm="cem")]])
 
 
 def test_it_measures_twins_once_and_goes_on_when_called_again(tmp_path):
@@ -38,3 +43,6 @@ def test_it_measures_twins_once_and_goes_on_when_called_again(tmp_path):
     assert again.stdout == first.stdout == (tmp_path / "repeatability.md").read_text() + "\n"
     assert "4/4] flat-disk / " in first.stderr
     assert again.stderr.count("kept") == 4
+    assert "run 1 of 1 done" in first.stderr
+    summary = json.loads((tmp_path / "repeatability.json").read_text())
+    assert len(summary["surfaces"]["flat-disk"]["speedups"]) == 1

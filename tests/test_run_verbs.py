@@ -131,7 +131,7 @@ def test_both_policies_stand_in_tables_of_their_own(cli):
     )
     assert code == 0
     assert out.index("solves: reuse") < out.index("solves: backslash") < out.index("Speedup of cem")
-    assert "lscm (backslash)" in out
+    assert "flat-disk (backslash)" in out
     assert max(map(len, out[: out.index("Records and maps")].splitlines())) <= 80
 
 

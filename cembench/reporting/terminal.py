@@ -21,7 +21,7 @@ from cembench.comparison import (
     seconds_interval,
 )
 from cembench.estimate import Estimate
-from cembench.records import Cell, Record
+from cembench.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.registry import Algorithm, Surface
 
 _STYLES = {"ok": "green", "skipped": "yellow"}
@@ -105,34 +105,73 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
 def speedups_table(records: Sequence[Record], reference: str) -> RenderableType | None:
     """How much faster is the reference than the others (Eq. 33), and how sure is that?
 
+    Where no cell has rounds enough for an interval that is said once, and a surface has one line.
     None where there is nothing to compare.
     """
     known = references(records, reference)
-    several = len({record.cell.solves for record in records}) > 1
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=16)
-    table.add_column("algorithm", no_wrap=True)
-    for heading in ("speedup", "95 % interval"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column(f"than {reference}")
+    compared = []
     for record in records:
         base = known.get(circumstances(record.cell))
         if base is None or base.cell.algorithm == record.cell.algorithm:
             continue
         found = compare(record, base)
         if found is not None:
-            name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
-            table.add_row(record.cell.mesh, name, *_comparison_cells(found))
-    if not table.row_count:
+            compared.append((record, found))
+    if not compared:
         return None
-    title = f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)"
-    return Group(Text(title, style="bold"), table)
+    heading = Text(
+        f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)", style="bold"
+    )
+    if all(found.verdict == "too few rounds" for _, found in compared):
+        words = (
+            f"How sure these are is not known: that takes {DEFAULT_ROUNDS} rounds "
+            f"(cembench run --repeats {DEFAULT_ROUNDS})."
+        )
+        return Group(heading, _bare_speedups(compared), Text(words, style="dim"))
+    return Group(heading, _sure_speedups(compared, reference))
 
 
-def _comparison_cells(found: Comparison) -> tuple[str, str, str]:
-    i = found.speedup_interval
-    sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
-    return f"{found.speedup:.2f}", sure, found.verdict
+def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str) -> Table:
+    """A line a comparison."""
+    several = _several_policies(compared)
+    table = _surfaces_column(16)
+    table.add_column("algorithm", no_wrap=True)
+    for heading in ("speedup", "95 % interval"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column(f"than {reference}")
+    for record, found in compared:
+        i = found.speedup_interval
+        sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
+        name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
+        table.add_row(record.cell.mesh, name, f"{found.speedup:.2f}", sure, found.verdict)
+    return table
+
+
+def _bare_speedups(compared: Sequence[tuple[Record, Comparison]]) -> Table:
+    """A line a surface, a column an algorithm."""
+    several = _several_policies(compared)
+    names = list(dict.fromkeys(record.cell.algorithm for record, _ in compared))
+    table = _surfaces_column(28)
+    for name in names:
+        table.add_column(name, justify="right", overflow="fold")
+    lines: dict[tuple[str, str], dict[str, str]] = {}
+    for record, found in compared:
+        line = lines.setdefault((record.cell.mesh, record.cell.solves), {})
+        line[record.cell.algorithm] = f"{found.speedup:.2f}"
+    for (mesh, solves), line in lines.items():
+        label = f"{mesh} ({solves})" if several else mesh
+        table.add_row(label, *(line.get(name, "-") for name in names))
+    return table
+
+
+def _surfaces_column(width: int) -> Table:
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=width)
+    return table
+
+
+def _several_policies(compared: Sequence[tuple[Record, Comparison]]) -> bool:
+    return len({record.cell.solves for record, _ in compared}) > 1
 
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:

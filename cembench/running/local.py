@@ -1,19 +1,24 @@
 """Run cells on this machine: each process alone, in rounds, so that drift hits all alike.
 
 First every cell is checked: one call in a process of its own, whose map is verified and whose
-memory is measured. What ends ok is then timed in rounds. A round starts a fresh process for every
-cell, in a random order, so a machine that slows down slows them all, and what differs from process
-to process (addresses, hash seeds) is averaged over.
+memory is measured. What ends ok is then timed in rounds. A round has a fresh process for every
+cell, in a random order, so a machine that slows down slows them all. Where that is possible the
+processes of a round are forked from one that has loaded the libraries
+(:mod:`cembench.running.fork_server`), another one each round: what differs from one interpreter to
+the next (addresses, hash seeds) is the same for all cells of a round, and averaged over.
 """
 
 from __future__ import annotations
 
+import os
 import random
 import signal
 import sys
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
+from contextlib import closing
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -25,8 +30,9 @@ from numpy.typing import NDArray
 
 from cembench.records import Outcome, Record, Round
 from cembench.running.environment import describe_environment, with_threads
+from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.plan import Task
-from cembench.running.process import Ending, Limits, run_limited
+from cembench.running.process import Ending, Limits, run_limited, spawning
 from cembench.running.worker import Answer, Job
 from cembench.samples import Samples
 from cembench.store import Store
@@ -88,11 +94,11 @@ def run_tasks(
     """
     options, watcher = options or Options(), watcher or Watcher()
     launcher = launcher or Launcher
-    with store.locked(watcher.waits) as scratch:
+    with store.locked(watcher.waits) as scratch, closing(launcher(scratch, options)) as starting:
         store.save_plan([task.cell for task in tasks])
         for mesh in {task.cell.mesh_hash: task.mesh for task in tasks}.values():
             store.save_mesh(mesh)
-        run = _Run(store, launcher(scratch, options), options, watcher, describe_environment())
+        run = _Run(store, starting, options, watcher, describe_environment())
         run.measure(tasks)
     return [run.records[task.cell.label] for task in tasks]
 
@@ -128,22 +134,29 @@ class _Run:
     records: dict[str, Record] = field(default_factory=dict)
 
     def measure(self, tasks: Sequence[Task]) -> None:
-        pending = [task for task in tasks if not self._is_kept(task)]
+        asked = {task.cell.label for task in tasks}
+        pending = [task for task in tasks if not self._is_kept(task, asked)]
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         for task in pending:
             self._check(task)
         for number in range(max((task.cell.repeats for task in pending), default=0)):
             open_ = [task for task in pending if self._lacks(task, number)]
+            self.launcher.close()
             for task in in_random_order(open_, self.options.seed, number):
                 self._time(task, number)
 
-    def _is_kept(self, task: Task) -> bool:
-        """Is there a record that stands? Samples of what is measured anew are forgotten."""
+    def _is_kept(self, task: Task, asked: AbstractSet[str]) -> bool:
+        """Is there a record that stands? Samples of what is measured anew are forgotten.
+
+        A record follows its mesh to another name, unless the old one is `asked` for too.
+        """
         kept = self.store.find(task.cell)
         if kept is not None or self.options.fresh:
             self.store.forget_samples(task.cell)
         if kept is None or self.options.measures_again(kept):
             return False
+        if kept.cell.label != task.cell.label:
+            kept = self.store.rename(kept, task.cell, keep=kept.cell.label in asked)
         self._finish(task, kept, kept=True)
         return True
 
@@ -241,12 +254,24 @@ def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Rec
     )
 
 
-@dataclass(frozen=True)
+@dataclass
 class Launcher:
-    """Starts the processes; `scratch` is where they and it exchange files."""
+    """Starts the processes; `scratch` is where they and it exchange files.
+
+    Those that time are forked from a server where `forks` allows it and the system can. It stands
+    until :meth:`close`; the next process gets a new one.
+    """
 
     scratch: Path
     options: Options
+    forks: bool = True
+    _server: ForkServer | None = None
+
+    def close(self) -> None:
+        """End the server, if there is one."""
+        if self._server is not None:
+            self._server.close()
+            self._server = None
 
     def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
         """What one call comes to, and its map if that has the right shape and is finite."""
@@ -265,8 +290,8 @@ class Launcher:
         return found
 
     def _run(self, task: Task, what: Literal["check", "time"], seconds: float) -> Answer:
-        job_file, answer_file, uv_file, log = (
-            self.scratch / name for name in ("job.json", "answer.json", "uv.npy", "log.txt")
+        answer_file, uv_file, log = (
+            self.scratch / name for name in ("answer.json", "uv.npy", "log.txt")
         )
         for stale in (answer_file, uv_file, log):
             stale.unlink(missing_ok=True)
@@ -280,19 +305,43 @@ class Launcher:
             answer_file=answer_file,
             uv_file=uv_file,
             memory_bytes=self.options.memory_bytes,
+            parent=os.getpid(),
         )
-        job_file.write_text(job.model_dump_json())
-        ending = run_limited(
-            [sys.executable, "-m", "cembench.running.worker", str(job_file)],
-            with_threads(task.cell.threads),
-            Limits(seconds, self.options.memory_bytes),
-            log,
-        )
+        limits = Limits(seconds, self.options.memory_bytes)
+        ending = self._forked(job, limits, log) if what == "time" else None
+        ending = ending or self._started(job, limits, log)
         if ending.limit is None and ending.code == 0 and answer_file.exists():
             answer = Answer.model_validate_json(answer_file.read_bytes())
             return _with_note(answer, ending.left)
         uv_file.unlink(missing_ok=True)
         return Answer(outcome=_outcome_of(ending, seconds, self.options.memory_bytes))
+
+    def _started(self, job: Job, limits: Limits, log: Path) -> Ending:
+        command = [sys.executable, "-m", "cembench.running.worker", str(self._write(job))]
+        return run_limited(spawning(command, with_threads(job.cell.threads)), limits, log)
+
+    def _forked(self, job: Job, limits: Limits, log: Path) -> Ending | None:
+        """How a process ended that the server forked; None where it forks none."""
+        if not self.forks or not can_fork(job.cell.threads):
+            return None
+        if self._server is None or self._server.backend != job.cell.backend:
+            self.close()
+            try:
+                self._server = ForkServer(with_threads(job.cell.threads), job.cell.backend)
+            except ServerGoneError:
+                self.forks = False
+                return None
+        path = self._write(job.model_copy(update={"parent": self._server.pid}))
+        try:
+            return run_limited(self._server.forking(path), limits, log)
+        except ServerGoneError:
+            self.close()
+            return None
+
+    def _write(self, job: Job) -> Path:
+        path = self.scratch / "job.json"
+        path.write_text(job.model_dump_json())
+        return path
 
     def _mesh_files(self, task: Task) -> tuple[Path, Path]:
         """V and F on disk, written once for all cells of a surface."""

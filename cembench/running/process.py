@@ -13,11 +13,12 @@ import signal
 import subprocess
 import sys
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
+from typing import Protocol, TypeAlias
 
 import psutil
 
@@ -27,7 +28,8 @@ LOOK_EVERY = 0.1
 KEPT_OUTPUT_BYTES = 4000
 #: A file of output is emptied when it is larger than this.
 _LARGEST_LOG_BYTES = 2**20
-_MARK = "CEMBENCH_PROCESS"
+#: The variable that tells all processes of a command from others.
+MARK = "CEMBENCH_PROCESS"
 
 
 @dataclass(frozen=True)
@@ -55,54 +57,85 @@ class Ending:
     left: int = 0
 
 
-def run_limited(
-    command: Sequence[str], environment: Mapping[str, str], limits: Limits, log: Path
-) -> Ending:
-    """Run a command until it ends or reaches a limit; then end all that it has started.
+class Started(Protocol):
+    """A process, the first of its group: what is used here of `subprocess.Popen`."""
+
+    @property
+    def pid(self) -> int:
+        """Its number, and its group's."""
+
+    def poll(self) -> int | None:
+        """The code that it ended with; None while it runs."""
+
+    def wait(self, timeout: float | None = None) -> int:
+        """The same, when it has ended."""
+
+    def kill(self) -> None:
+        """End it, if it runs."""
+
+
+#: Starts a process, given its mark (32 characters) and the file that takes its output.
+Start: TypeAlias = Callable[[str, Path], Started]
+
+
+def spawning(command: Sequence[str], environment: Mapping[str, str]) -> Start:
+    """What starts a command in this environment."""
+
+    def start(mark: str, log: Path) -> Started:
+        with log.open("ab") as output:  # appending: what is cut off stays off
+            return subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env={**environment, MARK: mark},
+                start_new_session=True,
+            )
+
+    return start
+
+
+def run_limited(start: Start, limits: Limits, log: Path) -> Ending:
+    """Let a process run until it ends or reaches a limit; then end all that it has started.
 
     `log` is a file for its output; however much that is, little is kept.
     """
     mark = uuid.uuid4().hex
-    limit, seen = None, 0
-    with log.open("ab") as output:  # appending: what is cut off stays off
-        process = subprocess.Popen(
-            command,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            env={**environment, _MARK: mark},
-            start_new_session=True,
-        )
-        tree = {process.pid: psutil.Process(process.pid)}
-        said = b""
-        deadline = monotonic() + limits.seconds
-        try:
-            while not _ended_within(process, min(LOOK_EVERY, max(deadline - monotonic(), 0))):
-                _follow(tree, process.pid)
-                seen = max(seen, sum(map(_resident_bytes, tree.values())))
-                said = _drain(log, said)
-                if limits.memory_bytes is not None and seen > limits.memory_bytes:
-                    limit = "memory"
-                elif monotonic() >= deadline:
-                    limit = "time"
-                if limit:
-                    break
-        finally:
-            code, left = _end_all(process, tree, mark)
+    limit, seen, said = None, 0, b""
+    log.touch()
+    process = start(mark, log)
+    tree: dict[int, psutil.Process] = {}
+    with suppress(psutil.NoSuchProcess):
+        tree[process.pid] = psutil.Process(process.pid)
+    deadline = monotonic() + limits.seconds
+    try:
+        while not _ended_within(process, min(LOOK_EVERY, max(deadline - monotonic(), 0))):
+            _follow(tree, process.pid)
+            seen = max(seen, sum(map(_resident_bytes, tree.values())))
+            said = _drain(log, said)
+            if limits.memory_bytes is not None and seen > limits.memory_bytes:
+                limit = "memory"
+            elif monotonic() >= deadline:
+                limit = "time"
+            if limit:
+                break
+    finally:
+        code, left = _end_all(process, tree, mark)
     said = (said + log.read_bytes())[-KEPT_OUTPUT_BYTES:]
     return Ending(code, limit, seen, said.decode(errors="replace").strip(), left)
 
 
-def _ended_within(process: subprocess.Popen[bytes], seconds: float) -> bool:
+def _ended_within(process: Started, seconds: float) -> bool:
     """Wait at most so long; on Linux the end of the process wakes us at once."""
     if process.poll() is not None:
         return True
     if hasattr(os, "pidfd_open"):
-        handle = os.pidfd_open(process.pid)
-        try:
-            select.select([handle], [], [], seconds)
-        finally:
-            os.close(handle)
+        with suppress(ProcessLookupError):  # nobody asks for its code any more: it has ended
+            handle = os.pidfd_open(process.pid)
+            try:
+                select.select([handle], [], [], seconds)
+            finally:
+                os.close(handle)
         return process.poll() is not None
     with suppress(subprocess.TimeoutExpired):
         process.wait(seconds)
@@ -136,9 +169,7 @@ def _drain(log: Path, said: bytes) -> bytes:
     return said
 
 
-def _end_all(
-    process: subprocess.Popen[bytes], tree: dict[int, psutil.Process], mark: str
-) -> tuple[int, int]:
+def _end_all(process: Started, tree: dict[int, psutil.Process], mark: str) -> tuple[int, int]:
     """End the process and every descendant, twice: one may have started another meanwhile.
 
     Gives the code that the process ended with and the number of descendants that were there.
@@ -175,21 +206,23 @@ def _marked(mark: str) -> list[psutil.Process]:
     found = []
     for one in psutil.process_iter():
         with suppress(psutil.Error, OSError):
-            if one.environ().get(_MARK) == mark:
+            if one.environ().get(MARK) == mark:
                 found.append(one)
     return found
 
 
-def die_with_parent() -> None:
-    """Let the system end this process when its parent is killed (Linux; elsewhere nothing)."""
+def die_with_parent(parent: int) -> None:
+    """Let the system end this process when its parent is killed (Linux; elsewhere nothing).
+
+    `parent` is the parent's number: it may have been killed by now.
+    """
     if sys.platform != "linux":
         return
     import ctypes
 
     set_parent_death_signal = 1
-    parent = os.getppid()
     ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
-    if os.getppid() != parent:  # it was killed just before
+    if os.getppid() != parent:
         os._exit(1)
 
 

@@ -130,6 +130,12 @@ def leave_a_child(**how):
     return subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"], **how).pid
 
 
+def note_child(pid):
+    if file := os.environ.get("FAULTY_CHILDREN"):
+        with open(file, "a") as noted:  # noqa: PTH123
+            noted.write(f"{pid} ")
+
+
 @algorithm("forks", title="Leaves a child", target="disk")
 def forks(mesh: DiskMesh) -> Parameterization:
     return Parameterization(good_map(mesh), extras={"child": leave_a_child()})
@@ -149,6 +155,7 @@ def detaches_twice(mesh: DiskMesh) -> Parameterization:
         "start_new_session=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL).pid)"
     )
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    note_child(int(run.stdout))
     return Parameterization(good_map(mesh), extras={"child": int(run.stdout)})
 
 
@@ -174,3 +181,42 @@ def fails_later(mesh: DiskMesh) -> Parameterization:
 
 
 later = []
+
+
+@algorithm("daemonises", title="Leaves a copy of itself in a session of its own", target="disk")
+def daemonises(mesh: DiskMesh) -> Parameterization:
+    told, tell = os.pipe()
+    first = os.fork()
+    if not first:
+        os.setsid()
+        second = os.fork()
+        if not second:
+            time.sleep(600)
+        os.write(tell, str(second).encode())
+        os._exit(0)
+    os.waitpid(first, 0)
+    child = int(os.read(told, 20))
+    note_child(child)
+    return Parameterization(good_map(mesh), extras={"child": child})
+
+
+@algorithm("draws", title="Draws from the global generator", target="disk")
+def draws(mesh: DiskMesh) -> Parameterization:
+    turn = np.exp(1j * np.random.rand())  # noqa: NPY002
+    return Parameterization(turn * good_map(mesh))
+
+
+@algorithm("kills-its-parent", title="Kills what started it", target="disk")
+def kills_its_parent(mesh: DiskMesh) -> Parameterization:
+    if not sys.argv[0].endswith("worker.py"):
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(600)
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("tells-where", title="Tells of its process", target="disk")
+def tells_where(mesh: DiskMesh) -> Parameterization:
+    raise AlgorithmFailed(
+        f"{sys.argv[0]} {os.environ['OPENBLAS_NUM_THREADS']} {os.getpgid(0) == os.getpid()} "
+        f"{sorted(name for name in sys.modules if name.startswith('algorithms.'))} {len(later)}"
+    )

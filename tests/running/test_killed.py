@@ -7,7 +7,9 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 
+import psutil
 import pytest
 
 from cembench.samples import Samples
@@ -29,6 +31,24 @@ def started(folder):
     )
 
 
+def assert_server_gone(run):
+    """The processes of a run that was killed are forked by a server that ends with it."""
+    patience = time.monotonic() + 10
+    while servers_of(run):
+        assert time.monotonic() < patience
+        time.sleep(0.01)
+
+
+def servers_of(run):
+    found = []
+    for one in psutil.process_iter():
+        with suppress(psutil.Error):
+            command = one.cmdline()
+            if "cembench.running.fork_server" in command and str(run) in command:
+                found.append(one)
+    return found
+
+
 @pytest.mark.parametrize("kills", [3, pytest.param(20, marks=pytest.mark.slow)])
 def test_a_run_killed_at_random_moments_loses_nothing_that_was_finished(tmp_path, kills):
     moments = random.Random(kills)
@@ -39,6 +59,7 @@ def test_a_run_killed_at_random_moments_loses_nothing_that_was_finished(tmp_path
         time.sleep(moments.uniform(0.5, 2.0))
         os.kill(run.pid, signal.SIGKILL)
         run.communicate()
+        assert_server_gone(run.pid)
         found = {path.name: path.read_bytes() for path in folder.glob("records/*.json")}
         assert {name: found[name] for name in kept} == kept
         kept = found

@@ -1,3 +1,4 @@
+import dataclasses
 import re
 import time
 from pathlib import Path
@@ -61,6 +62,7 @@ def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
         "forks": ("ok", None),
         "detaches": ("ok", None),
         "detaches-twice": ("ok", None),
+        "daemonises": ("ok", None),
         "by-chance": ("ok", None),
         "fails-later": ("failed", "in round 1 of 1: ZeroDivisionError: by habit"),
         "good": ("ok", None),
@@ -77,7 +79,7 @@ def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
         assert cause is None or cause in outcomes[name].cause
         assert (outcomes[name].median_seconds is not None) == (status == "ok")
     assert MEMORY < outcomes["hoards"].peak_memory_bytes < 4 * MEMORY
-    for name in ("forks", "detaches", "detaches-twice"):
+    for name in ("forks", "detaches", "detaches-twice", "daemonises"):
         assert not psutil.pid_exists(outcomes[name].extras["child"]) or (
             psutil.Process(outcomes[name].extras["child"]).status() == psutil.STATUS_ZOMBIE
         )
@@ -202,3 +204,26 @@ def test_the_environment_says_what_a_figure_depends_on():
     assert environment["libraries"]["cvxopt"]
     assert environment["memory_bytes"] > 0
     assert environment == describe_environment()
+
+
+def test_a_renamed_mesh_is_not_measured_again(tmp_path):
+    def task_called(name):
+        chosen = load_registry([FAULTY]).algorithm("good")
+        mesh = dataclasses.replace(flat_disk(600), name=name)
+        return plan_cells([chosen], [mesh], {}, How(repeats=1), [FAULTY])[0]
+
+    def meshes():
+        return [record.cell.mesh for record in store.records()]
+
+    store = Store(tmp_path)
+    old, new = task_called("old"), task_called("new")
+    (first,) = run_tasks([old], store)
+    (kept,) = run_tasks([new], store)
+    assert kept.outcome == first.outcome
+    assert kept.cell == new.cell
+    assert meshes() == ["new"]
+    assert store.uv(new.cell) is not None
+    assert store.uv(old.cell) is None
+    both = run_tasks([old, new], store)
+    assert [r.outcome for r in both] == [first.outcome] * 2
+    assert meshes() == ["new", "old"]

@@ -1,0 +1,88 @@
+"""What is called and on which surfaces: for asv and for pytest-benchmark alike.
+
+The quick benchmarks always run; `CEMBENCH_TRACK=all` adds larger sizes and more kinds of surface.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from cembench.geometry.beltrami import (
+    beltrami_coefficients,
+    linear_beltrami_solver,
+    weights_of_map,
+)
+from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh, TriangleMesh
+from cembench.metrics import all_metrics
+from cembench.registry import load_registry
+from cembench.running.plan import generate_surface
+
+VARIABLE = "CEMBENCH_TRACK"
+
+#: A round surface, and a steep one whose map shrinks its middle.
+DISKS = ("spherical-cap", "hemi-ellipsoid")
+#: A long one, and one with corners.
+MORE_DISKS = (*DISKS, "swiss-roll", "catenoid-sheet")
+HOLED = ("catenoid-ring",)
+MORE_HOLED = (*HOLED, "holed-cap")
+
+FACES = (2_000, 20_000)
+MORE_FACES = (*FACES, 80_000, 320_000)
+
+
+def everything_is_asked_for() -> bool:
+    """Shall the long benchmarks be there? asv would list them line by line as n/a otherwise."""
+    return os.environ.get(VARIABLE) == "all"
+
+
+@lru_cache(maxsize=4)
+def surface(name: str, faces: int) -> TriangleMesh:
+    """The surface of this name with about this many triangles; the same one at every call."""
+    return generate_surface(load_registry(), name, faces)
+
+
+def algorithm_names(mesh_type: type[TriangleMesh]) -> list[str]:
+    """The registered algorithms that take this kind of surface."""
+    found = load_registry().algorithms.values()
+    return sorted(a.name for a in found if issubclass(mesh_type, a.mesh_type))
+
+
+def mapping(algorithm: str, mesh: TriangleMesh) -> Callable[[], Any]:
+    """A call of the algorithm with its defaults, from arrays in memory to the map."""
+    spec = load_registry().algorithm(algorithm)
+    arguments = spec.arguments({})
+    return lambda: spec.function(mesh.fresh(), **arguments)
+
+
+def kernels(mesh: DiskMesh) -> dict[str, Callable[[], Any]]:
+    """The steps that the algorithms share, each ready to be called on this surface."""
+    L = laplacian(mesh)
+    interior = mesh.interior
+    L_ii = L[interior][:, interior]
+    factor = Cholesky(L_ii)
+    right = np.random.default_rng(0).standard_normal((len(interior), 2)) @ [1, 1j]
+    f_b = arc_length_circle(mesh)
+    uv = harmonic_extension(L, mesh.boundary, f_b)
+    weights = weights_of_map(uv, mesh.F, beltrami_coefficients(uv, mesh.F, mesh.V), mesh.V)
+    return {
+        "boundary_loops": lambda: mesh.fresh().loops,
+        "laplacian": lambda: laplacian(mesh),
+        "factorisation": lambda: Cholesky(L_ii),
+        "solve": lambda: factor.solve(right),
+        "beltrami_coefficients": lambda: beltrami_coefficients(uv, mesh.F, mesh.V),
+        "linear_beltrami_solver": lambda: linear_beltrami_solver(
+            mesh.F, weights, mesh.boundary, f_b
+        ),
+        "metrics": lambda: all_metrics(mesh, uv),
+    }
+
+
+#: Names of the kernels, in the order of a run.
+KERNELS = tuple(kernels(surface("spherical-cap", 100)))

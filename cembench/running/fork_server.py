@@ -1,0 +1,209 @@
+"""Processes that start at once: forked from one that has loaded the libraries and nothing else.
+
+Loading them takes longer than most calls. A server loads them with its threads pinned, and waits;
+the processes of a round are forked from it, one after the other. It never sees a mesh, an algorithm
+or a plug-in, so what it hands down is what a fresh interpreter holds before its first job. Used on
+Linux and with one thread: a pool of threads does not survive a fork.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cembench.geometry.cholesky import linear_algebra
+from cembench.running import worker
+from cembench.running.process import MARK, Start, die_with_parent
+
+#: What stands in the server's environment where a forked process writes its mark, as long as that.
+_NO_MARK = "0" * 32
+
+
+class ServerGoneError(Exception):
+    """The server has ended, or was ended."""
+
+
+def can_fork(threads: int) -> bool:
+    """Are processes with so many threads forked here, rather than started?"""
+    return threads == 1 and sys.platform == "linux" and hasattr(os, "pidfd_open")
+
+
+class ForkServer:
+    """The server, seen from the process that starts it; it ends with that, or when closed.
+
+    Raises
+    ------
+    ServerGoneError
+        It could not load the libraries, or one of them starts threads.
+
+    """
+
+    def __init__(self, environment: Mapping[str, str], backend: str) -> None:
+        self.backend = backend
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "cembench.running.fork_server", str(os.getpid()), backend],
+            bufsize=0,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            env={**environment, MARK: _NO_MARK},
+            start_new_session=True,
+        )
+        self.pid = self._process.pid
+        try:
+            self._answer()
+        except ServerGoneError:
+            self.close()
+            raise
+
+    def forking(self, job_file: Path) -> Start:
+        """What starts, for `run_limited`, a process that does the job in this file."""
+
+        def start(mark: str, log: Path) -> _Forked:
+            pid = self.ask({"job": str(job_file), "log": str(log), "mark": mark})
+            assert pid is not None
+            return _Forked(self, pid)
+
+        return start
+
+    def ask(self, request: object) -> int | None:
+        """What does it answer? Raises :class:`ServerGoneError`."""
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(json.dumps(request).encode() + b"\n")
+        except BrokenPipeError:
+            raise ServerGoneError from None
+        return self._answer()
+
+    def _answer(self) -> int | None:
+        assert self._process.stdout is not None
+        line = self._process.stdout.readline()
+        if not line:
+            raise ServerGoneError
+        number: int | None = json.loads(line)
+        return number
+
+    def close(self) -> None:
+        """End it."""
+        self._process.kill()
+        self._process.wait()
+        for pipe in (self._process.stdin, self._process.stdout):
+            assert pipe is not None
+            pipe.close()
+
+
+@dataclass
+class _Forked:
+    """A child of the server, as `subprocess.Popen` would show one of ours."""
+
+    server: ForkServer
+    pid: int
+    code: int | None = None
+
+    def poll(self) -> int | None:
+        return self._ask("poll")
+
+    def wait(self, timeout: float | None = None) -> int:
+        code = self._ask("wait")
+        assert code is not None
+        return code
+
+    def kill(self) -> None:
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+
+    def _ask(self, what: str) -> int | None:
+        if self.code is None:
+            try:
+                self.code = self.server.ask(what)
+            except ServerGoneError:
+                self.code = -signal.SIGKILL  # its children are ended with it
+        return self.code
+
+
+@dataclass(frozen=True)
+class _Order:
+    """What a forked process is to do, and how it is to be known."""
+
+    job: str
+    log: str
+    mark: str
+
+
+def _serve() -> _Order:
+    """Answer the requests on standard input, a line each; returns in every forked process."""
+    requests = os.fdopen(0, "rb", buffering=0, closefd=False)
+    child = 0
+    _say(None)
+    while line := requests.readline():
+        request = json.loads(line)
+        if request in ("poll", "wait"):
+            pid, status = os.waitpid(child, os.WNOHANG if request == "poll" else 0)
+            _say(os.waitstatus_to_exitcode(status) if pid else None)
+            continue
+        child = os.fork()
+        if not child:
+            return _Order(**request)
+        with suppress(OSError):  # the child did it, or has ended
+            os.setpgid(child, child)
+        _say(child)
+    os._exit(0)
+
+
+def _say(number: int | None) -> None:
+    os.write(1, json.dumps(number).encode() + b"\n")
+
+
+def _become(order: _Order) -> None:
+    """Be in a group of our own, be marked, have no input, and write to the log."""
+    os.setpgid(0, 0)
+    for file, way, targets in (
+        (os.devnull, os.O_RDONLY, (0,)),
+        (order.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
+    ):
+        opened = os.open(file, way)
+        for target in targets:
+            os.dup2(opened, target)
+        os.close(opened)
+    # Over the old one, where the system reads the environment of a process.
+    getenv = ctypes.CDLL(None).getenv
+    getenv.restype = ctypes.c_void_p
+    ctypes.memmove(getenv(MARK.encode()), order.mark.encode(), len(_NO_MARK))
+    os.environ[MARK] = order.mark
+    np.random.seed()  # noqa: NPY002 - of the global generator; Python's own is seeded by the fork
+
+
+def _load(backend: str) -> None:
+    """Load what every process needs, and see that nothing has begun to run beside us."""
+    worker.load_libraries()
+    with linear_algebra(backend=backend):
+        """Entering it loads the library."""
+    if len(list(Path("/proc/self/task").iterdir())) > 1:
+        sys.exit("a library has started a thread")
+    gc.collect()
+    gc.freeze()  # what is loaded stays: no process has to look through it
+
+
+def _main(parent: int, backend: str) -> None:
+    """Load, serve, and in each forked process do its job."""
+    die_with_parent(parent)
+    _load(backend)
+    order = _serve()
+    _become(order)
+    worker.main(Path(order.job))
+    worker.end()
+
+
+if __name__ == "__main__":
+    _main(int(sys.argv[1]), sys.argv[2])

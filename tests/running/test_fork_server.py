@@ -1,0 +1,116 @@
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import psutil
+import pytest
+
+from cembench.records import Outcome, Round
+from cembench.running.environment import with_threads
+from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
+from cembench.running.local import Launcher, Options
+from tests.running.test_local import MEMORY, tasks_of
+
+pytestmark = pytest.mark.skipif(not can_fork(1), reason="processes are not forked here")
+
+
+@pytest.fixture
+def launcher(tmp_path):
+    made = Launcher(tmp_path, Options(timeout=20))
+    yield made
+    made.close()
+
+
+def timed(launcher, name, **how):
+    return launcher.time(tasks_of(name, **how)[0])
+
+
+def test_processes_of_a_round_are_forked_from_one_server_until_it_is_closed(launcher):
+    assert isinstance(timed(launcher, "good"), Round)
+    first = launcher._server.pid
+    assert isinstance(timed(launcher, "good"), Round)
+    assert launcher._server.pid == first
+    launcher.close()
+    assert not psutil.pid_exists(first)
+    assert isinstance(timed(launcher, "good"), Round)
+    assert launcher._server.pid != first
+
+
+def test_a_forked_process_finds_pinned_threads_its_own_group_and_no_algorithm_loaded(launcher):
+    timed(launcher, "harmonic-circle")
+    forked = timed(launcher, "tells-where").cause
+    assert forked.endswith("fork_server.py 1 True [] 0")
+    threaded = timed(launcher, "tells-where", threads=2).cause
+    assert threaded.endswith("worker.py 2 True [] 0")
+
+
+@pytest.mark.parametrize(
+    ("name", "status", "cause"),
+    [
+        ("segfaults", "failed", "ended by signal SIGSEGV"),
+        ("talks-and-dies", "failed", "ended with code 7: the last words"),
+        ("raises", "failed", "ZeroDivisionError: by nothing"),
+        ("hoards", "out_of_memory", "the limit is 500 MiB"),
+        ("spins", "timeout", "not finished after 2 s"),
+    ],
+)
+def test_a_fault_in_a_forked_process_is_a_status_and_the_next_is_measured(
+    launcher, name, status, cause
+):
+    launcher.options = Options(timeout=1 if name == "spins" else 20, memory_bytes=MEMORY)
+    found = timed(launcher, name)
+    assert (found.status, cause in found.cause) == (status, True), found.cause
+    server = launcher._server.pid
+    assert isinstance(timed(launcher, "good"), Round)
+    assert launcher._server.pid == server
+
+
+@pytest.mark.parametrize("name", ["daemonises", "detaches-twice"])
+def test_what_a_forked_process_leaves_is_ended(launcher, name, tmp_path, monkeypatch):
+    monkeypatch.setenv("FAULTY_CHILDREN", str(tmp_path / "children"))
+    assert isinstance(timed(launcher, name), Round)
+    children = (tmp_path / "children").read_text().split()
+    assert len(children) > 1  # a warm-up, and a call
+    for child in map(int, children):
+        assert not psutil.pid_exists(child) or (
+            psutil.Process(child).status() == psutil.STATUS_ZOMBIE
+        )
+
+
+def test_the_global_generator_differs_from_process_to_process(launcher):
+    assert timed(launcher, "draws").uv_hash != timed(launcher, "draws").uv_hash
+
+
+def test_without_its_server_a_process_has_failed_and_the_next_is_measured(launcher):
+    found = timed(launcher, "kills-its-parent")
+    assert isinstance(found, Outcome)
+    assert "ended by signal SIGKILL" in found.cause
+    assert isinstance(timed(launcher, "good"), Round)
+    assert launcher.forks
+
+
+def test_without_a_server_processes_are_started(launcher, monkeypatch):
+    monkeypatch.setattr("cembench.running.local.can_fork", lambda threads: False)
+    assert timed(launcher, "tells-where").cause.endswith("worker.py 1 True [] 0")
+    monkeypatch.undo()
+    monkeypatch.setattr("cembench.running.fork_server.sys.executable", "/bin/false")
+    with pytest.raises(ServerGoneError):
+        ForkServer(with_threads(1), "cvxopt")
+
+
+def test_the_server_ends_with_the_one_that_started_it():
+    script = (
+        "import os, time; from cembench.running.environment import with_threads;"
+        "from cembench.running.fork_server import ForkServer;"
+        "print(ForkServer(with_threads(1), 'cvxopt').pid, flush=True); time.sleep(600)"
+    )
+    run = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+    server = psutil.Process(int(run.stdout.readline()))
+    os.kill(run.pid, signal.SIGKILL)
+    run.communicate()
+    patience = time.monotonic() + 10
+    while server.is_running() and server.status() != psutil.STATUS_ZOMBIE:
+        assert time.monotonic() < patience
+        time.sleep(0.01)
