@@ -228,12 +228,21 @@ def _table(
         "groups": _groups(table.columns),
         "rows": rows[: len(body)],
         "footers": rows[len(body) :],
-        "remarks": [(letters[why], why) for why in remarks],
+        "notes": [note for note in table.notes if not _explained(note, remarks)],
+        "remarks": [
+            (letters[why], next((n for n in table.notes if n.startswith(why)), why))
+            for why in remarks
+        ],
         "legend": [
             (mark, words, o) for o, (words, mark) in ORIGINS.items() if o in origins and mark
         ],
         "linked": any(c.record for row in rows for c in row),
     }
+
+
+def _explained(note: str, remarks: Sequence[str]) -> bool:
+    """Does a note say one of the remarks, and where it holds? Then it stands among them."""
+    return any(note.startswith(why) for why in remarks)
 
 
 def _sortable(number: float | None) -> str:
@@ -358,7 +367,11 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"words": _prose, "address": lambda file: quote(str(file))}
+    environment.filters |= {
+        "words": _prose,
+        "stopped": lambda title: title if title.endswith((".", "?", "!")) else f"{title}.",
+        "address": lambda file: quote(str(file)),
+    }
     environment.globals |= {"ORIGINS": ORIGINS, "VERDICTS": VERDICTS, "Counter": Counter}
     return environment
 
