@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import rc_context
@@ -41,6 +41,20 @@ class Series:
     words: Sequence[str] = ()
     #: Shown in the legend; one of several series of one name is enough.
     named: bool = True
+
+
+class Point(NamedTuple):
+    """A point with what is told of it."""
+
+    x: float
+    y: float
+    words: str = ""
+
+
+def through(name: str, points: Sequence[Point], kind: Kind, look: Look = PLAIN) -> Series:
+    """A series of points that have words."""
+    x, y = [p.x for p in points], [p.y for p in points]
+    return Series(name, x, y, kind, look, [p.words for p in points])
 
 
 @dataclass(frozen=True)
