@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import rc_context
@@ -21,6 +21,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import LogLocator, NullFormatter
+from PIL import Image
 
 from cembench.reporting.document import Figure
 from cembench.reporting.palette import PLAIN, Look
@@ -41,6 +42,20 @@ class Series:
     words: Sequence[str] = ()
     #: Shown in the legend; one of several series of one name is enough.
     named: bool = True
+
+
+class Point(NamedTuple):
+    """A point with what is told of it."""
+
+    x: float
+    y: float
+    words: str = ""
+
+
+def through(name: str, points: Sequence[Point], kind: Kind, look: Look = PLAIN) -> Series:
+    """A series of points that have words."""
+    x, y = [p.x for p in points], [p.y for p in points]
+    return Series(name, x, y, kind, look, [p.words for p in points])
 
 
 @dataclass(frozen=True)
@@ -152,12 +167,23 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
         for k, panel in enumerate(plot.panels):
             _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
         _draw_legend(canvas)
+        canvas.draw_without_rendering()  # arranges the parts, once for all forms
+        canvas.set_layout_engine("none")
         contents = {}
         for form in ("png", "svg", "pdf"):
             buffer = io.BytesIO()
             canvas.savefig(buffer, format=form, metadata=_NO_DATE[form])
             contents[form] = buffer.getvalue()
-    return contents
+    return contents | {"png": _with_few_colours(contents["png"])}
+
+
+def _with_few_colours(png: bytes) -> bytes:
+    """The same picture with a table of colours: less than half as large."""
+    buffer = io.BytesIO()
+    with Image.open(io.BytesIO(png)) as picture:
+        few = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
+        few.save(buffer, "PNG", optimize=True, dpi=(DPI, DPI))
+    return buffer.getvalue()
 
 
 def _names_room(panel: Panel) -> float:
