@@ -377,8 +377,17 @@ def _environment() -> jinja2.Environment:
 
 
 def _prose(words: str) -> Markup:
-    """Words of a report: what stands between backticks is code, the rest is text."""
-    return Markup(re.sub(r"`([^`\n]+)`", r"<code>\1</code>", str(escape(words))))
+    """Words of a report as it writes them: `code` between backticks, symbols such as E_C."""
+    text, *rest = re.split(r"`([^`\n]+)`", words)
+    pairs = zip(rest[::2], rest[1::2], strict=True)
+    return _symbols(text) + Markup("").join(
+        Markup("<code>{}</code>").format(code) + _symbols(text) for code, text in pairs
+    )
+
+
+def _symbols(words: str) -> Markup:
+    symbol = re.compile(r"\b([A-Za-z])_([A-Z]+)\b")
+    return Markup(symbol.sub(r"<i>\1</i><sub>\2</sub>", str(escape(words))))
 
 
 def _policy(scripts: Sequence[bytes]) -> str:

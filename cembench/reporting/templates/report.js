@@ -293,8 +293,14 @@
     };
   }
 
-  // The legend goes below the lowest words of the axes, and the plot is as high as with none.
-  async function placeLegend(board) {
+  // What is known only of a plot that stands: a logarithmic axis of less than a decade or two gets
+  // marks within decades, and the legend goes below the lowest words of the axes.
+  async function settle(board) {
+    await window.Plotly.relayout(board, Object.fromEntries(
+      Object.entries(board._fullLayout)
+        .filter(([name, axis]) => /^[xy]axis/.test(name) && axis.type === "log")
+        .filter(([, { range }]) => Math.abs(range[1] - range[0]) < 1.6)
+        .map(([name]) => [`${name}.dtick`, "D2"])));
     const legend = board.querySelector(".legend");
     if (!legend) return;
     const { t, h } = board._fullLayout._size;
@@ -324,7 +330,7 @@
         responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"],
       });
       board.drawing = drawing;
-      await placeLegend(board);
+      await settle(board);
     } catch (error) {
       board.remove();
       figure.classList.remove("live");
@@ -392,7 +398,9 @@
       image.alt = source.alt;
       image.width = source.getAttribute("width");
       image.height = source.getAttribute("height");
-      caption.textContent = `${group[at].querySelector("figcaption b").textContent} · ${at + 1} of ${group.length}`;
+      const words = group[at].querySelector("figcaption").cloneNode(true);
+      words.querySelector(".files")?.remove();
+      caption.textContent = `${at + 1} of ${group.length}: ${words.textContent.trim()}`;
       if (!shift || Math.abs(image.width / image.height - last) > 0.01 * last) fit();
     };
     const open = (figure) => {
