@@ -20,7 +20,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from PIL import Image
 
 from cembench.reporting.document import Figure
@@ -93,6 +93,8 @@ class Plot:
 
 #: Inches of a panel; dots an inch of the PNG.
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
+#: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
+DECADES = 300
 #: The same bytes at any time on any machine: identifiers from a fixed salt, no date.
 _STYLE: Any = {
     "svg.hashsalt": "cembench",
@@ -228,14 +230,28 @@ def _draw_axes(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
         axes.set_xscale("log")
     if panel.y.log:
         axes.set_yscale("log")
-        axes.yaxis.set_minor_locator(LogLocator(subs=range(2, 10)))
-        axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(panel.x.low, panel.x.high)
     axes.set_ylim(panel.y.low, panel.y.high)
+    for scale, axis, ends in (
+        (panel.x, axes.xaxis, axes.get_xlim()),
+        (panel.y, axes.yaxis, axes.get_ylim()),
+    ):
+        if scale.log:
+            few = ends[1] < DECADES * ends[0]
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value)))
+            axis.set_minor_formatter(NullFormatter())
+    if not panel.x.log and all(isinstance(x, int) for s in panel.series for x in s.x):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if names:
         upright = len(names) > 4
         axes.set_xticks(range(len(names)), names, rotation=90 if upright else 0, fontsize=8)
         axes.grid(visible=False, axis="x")
+
+
+def _tick(value: float) -> str:
+    """A power of ten, or 2 or 5 times one, as a person writes it."""
+    return f"{value:,.0f}" if value >= 1 else f"{value:.8f}".rstrip("0")
 
 
 def _draw_legend(canvas: Canvas) -> None:
