@@ -299,14 +299,14 @@
     await window.Plotly.relayout(board, Object.fromEntries(
       Object.entries(board._fullLayout)
         .filter(([name, axis]) => /^[xy]axis/.test(name) && axis.type === "log")
-        .filter(([, { range }]) => Math.abs(range[1] - range[0]) < 1.6)
+        .filter(([, { range }]) => Math.abs(range[1] - range[0]) < 2.2)
         .map(([name]) => [`${name}.dtick`, "D2"])));
     const legend = board.querySelector(".legend");
     if (!legend) return;
     const { t, h } = board._fullLayout._size;
     const high = board.clientHeight - t - 60;
     const bottom = board.getBoundingClientRect().top + t + h;
-    const words = all(".xtick text, g[class^='g-x']", board).map((e) => e.getBoundingClientRect());
+    const words = all("[class^='x'][class$='tick'] text, g[class^='g-x']", board).map((e) => e.getBoundingClientRect());
     const under = Math.max(0, ...words.map((box) => box.bottom - bottom)) + 14;
     const below = under + legend.getBoundingClientRect().height + 6;
     board.style.height = `${t + high + below}px`;
@@ -331,6 +331,7 @@
       });
       board.drawing = drawing;
       await settle(board);
+      board.classList.add("settled");
     } catch (error) {
       board.remove();
       figure.classList.remove("live");
