@@ -32,7 +32,10 @@ Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
 
 @dataclass(frozen=True)
 class Series:
-    """Values of one thing; `x` are numbers or names, `words` what is told of each point."""
+    """Values of one thing; `x` are numbers or names, `words` what is told of each point.
+
+    What is stacked stands on names.
+    """
 
     name: str
     x: Sequence[float | str]
