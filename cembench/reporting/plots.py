@@ -32,7 +32,10 @@ Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
 
 @dataclass(frozen=True)
 class Series:
-    """Values of one thing; `x` are numbers or names, `words` what is told of each point."""
+    """Values of one thing; `x` are numbers or names, `words` what is told of each point.
+
+    What is stacked stands on names.
+    """
 
     name: str
     x: Sequence[float | str]
@@ -95,11 +98,11 @@ class Plot:
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
 #: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
 DECADES = 300
-#: The same bytes at any time on any machine: identifiers from a fixed salt, no date.
+#: The same bytes at any time: identifiers from a fixed salt, no date. Words in SVG stay words.
 _STYLE: Any = {
     "svg.hashsalt": "cembench",
-    "svg.fonttype": "path",
-    "font.family": "DejaVu Sans",
+    "svg.fonttype": "none",
+    "font.family": ["DejaVu Sans"],
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
