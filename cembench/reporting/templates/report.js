@@ -254,7 +254,7 @@
     const axis = {
       gridcolor: colour("--rule"), linecolor: colour("--soft"), zerolinecolor: colour("--rule"),
       tickcolor: colour("--soft"), ticks: "outside", ticklen: 4, automargin: true,
-      title: { font: { size: 13 } },
+      title: { font: { size: 13 }, standoff: 10 },
     };
     return {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
@@ -268,21 +268,27 @@
 
   // Where the window is narrow, panels that stand side by side stand one under the other.
   const BAR = 28;  // pixels of the buttons over a plot
+  const isAxis = (name) => /^[xy]axis/.test(name);
+  const typeset = (words) => words.replace(/\b([A-Za-z])_([A-Z]+)\b/g, "<i>$1</i><sub>$2</sub>");
   const isNarrow = () => innerWidth < 700;
-  const rowsOf = ({ grid }) => (grid?.rows ?? 1) * (isNarrow() ? grid?.columns ?? 1 : 1);
+  const rowsOf = (layout) => isNarrow()
+    ? Math.max(1, Object.keys(layout).filter((name) => name.startsWith("xaxis")).length)
+    : layout.grid?.rows ?? 1;
   const heightOf = ({ layout }) =>
     BAR + (isNarrow() ? 350 * rowsOf(layout) : layout.height ?? 460);
 
   function layoutOf(drawing) {
     const { width, height, title, ...layout } = drawing.layout;
-    const logarithmic = Object.entries(layout)
-      .filter(([name, axis]) => /^[xy]axis/.test(name) && axis.type === "log")
-      .map(([name, axis]) => [name, { dtick: 1, exponentformat: "power", tickfont: { size: 10 }, ...axis }]);
+    const decades = { dtick: 1, exponentformat: "power", tickfont: { size: 10 } };
+    const axes = Object.entries(layout).filter(([name]) => isAxis(name)).map(([name, axis]) => [name, {
+      ...(axis.type === "log" ? decades : {}), ...axis,
+      title: { ...axis.title, text: typeset(axis.title?.text ?? "") },
+    }]);
     const stacked = isNarrow() && layout.grid
-      ? { grid: { ...layout.grid, rows: rowsOf(layout), columns: 1, ygap: 0.5 } } : {};
+      ? { grid: { ...layout.grid, rows: rowsOf(layout), columns: 1, ygap: 0.45 } } : {};
     return {
       ...layout,
-      ...Object.fromEntries(logarithmic),
+      ...Object.fromEntries(axes),
       ...stacked,
       template: { layout: appearance() },
       autosize: true,
@@ -298,7 +304,7 @@
   async function settle(board) {
     await window.Plotly.relayout(board, Object.fromEntries(
       Object.entries(board._fullLayout)
-        .filter(([name, axis]) => /^[xy]axis/.test(name) && axis.type === "log")
+        .filter(([name, axis]) => isAxis(name) && axis.type === "log")
         .filter(([, { range }]) => Math.abs(range[1] - range[0]) < 2.2)
         .map(([name]) => [`${name}.dtick`, "D2"])));
     const legend = board.querySelector(".legend");
