@@ -228,12 +228,21 @@ def _table(
         "groups": _groups(table.columns),
         "rows": rows[: len(body)],
         "footers": rows[len(body) :],
-        "remarks": [(letters[why], why) for why in remarks],
+        "notes": [note for note in table.notes if not _explained(note, remarks)],
+        "remarks": [
+            (letters[why], next((n for n in table.notes if n.startswith(why)), why))
+            for why in remarks
+        ],
         "legend": [
             (mark, words, o) for o, (words, mark) in ORIGINS.items() if o in origins and mark
         ],
         "linked": any(c.record for row in rows for c in row),
     }
+
+
+def _explained(note: str, remarks: Sequence[str]) -> bool:
+    """Does a note say one of the remarks, and where it holds? Then it stands among them."""
+    return any(note.startswith(why) for why in remarks)
 
 
 def _sortable(number: float | None) -> str:
@@ -358,14 +367,27 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"words": _prose, "address": lambda file: quote(str(file))}
+    environment.filters |= {
+        "words": _prose,
+        "stopped": lambda title: title if title.endswith((".", "?", "!")) else f"{title}.",
+        "address": lambda file: quote(str(file)),
+    }
     environment.globals |= {"ORIGINS": ORIGINS, "VERDICTS": VERDICTS, "Counter": Counter}
     return environment
 
 
 def _prose(words: str) -> Markup:
-    """Words of a report: what stands between backticks is code, the rest is text."""
-    return Markup(re.sub(r"`([^`\n]+)`", r"<code>\1</code>", str(escape(words))))
+    """Words of a report as it writes them: `code` between backticks, symbols such as E_C."""
+    text, *rest = re.split(r"`([^`\n]+)`", words)
+    pairs = zip(rest[::2], rest[1::2], strict=True)
+    return _symbols(text) + Markup("").join(
+        Markup("<code>{}</code>").format(code) + _symbols(text) for code, text in pairs
+    )
+
+
+def _symbols(words: str) -> Markup:
+    symbol = re.compile(r"\b([A-Za-z])_([A-Z]+)\b")
+    return Markup(symbol.sub(r"<i>\1</i><sub>\2</sub>", str(escape(words))))
 
 
 def _policy(scripts: Sequence[bytes]) -> str:

@@ -40,8 +40,22 @@ _MORE = tuple(
 )
 #: What is not an algorithm: bounds, fits, the paper's own figures.
 PLAIN = Look("#6b7683", ("o", "circle"), (":", "dot"))
-#: Phases of a measured call and other parts of a whole, in the order in which they are stacked.
-PARTS = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#999999", "#4d4d4d")
+#: Phases of a measured call and other parts of a whole; what is left over.
+PARTS = (
+    "#0072B2",
+    "#E69F00",
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    "#D55E00",
+    "#F0E442",
+    "#8c564b",
+    "#5f6b9a",
+    "#3b7d7d",
+    "#a0405f",
+    "#7f5f00",
+)
+REST = "#b3b9c0"
 
 
 def looks(names: Sequence[str]) -> dict[str, Look]:

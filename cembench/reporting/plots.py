@@ -13,14 +13,15 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from PIL import Image
 
 from cembench.reporting.document import Figure
 from cembench.reporting.palette import PLAIN, Look
@@ -31,7 +32,10 @@ Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
 
 @dataclass(frozen=True)
 class Series:
-    """Values of one thing; `x` are numbers or names, `words` what is told of each point."""
+    """Values of one thing; `x` are numbers or names, `words` what is told of each point.
+
+    What is stacked stands on names.
+    """
 
     name: str
     x: Sequence[float | str]
@@ -41,6 +45,20 @@ class Series:
     words: Sequence[str] = ()
     #: Shown in the legend; one of several series of one name is enough.
     named: bool = True
+
+
+class Point(NamedTuple):
+    """A point with what is told of it."""
+
+    x: float
+    y: float
+    words: str = ""
+
+
+def through(name: str, points: Sequence[Point], kind: Kind, look: Look = PLAIN) -> Series:
+    """A series of points that have words."""
+    x, y = [p.x for p in points], [p.y for p in points]
+    return Series(name, x, y, kind, look, [p.words for p in points])
 
 
 @dataclass(frozen=True)
@@ -78,11 +96,13 @@ class Plot:
 
 #: Inches of a panel; dots an inch of the PNG.
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
-#: The same bytes at any time on any machine: identifiers from a fixed salt, no date.
+#: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
+DECADES = 300
+#: The same bytes at any time: identifiers from a fixed salt, no date. Words in SVG stay words.
 _STYLE: Any = {
     "svg.hashsalt": "cembench",
-    "svg.fonttype": "path",
-    "font.family": "DejaVu Sans",
+    "svg.fonttype": "none",
+    "font.family": ["DejaVu Sans"],
     "font.size": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
@@ -152,12 +172,23 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
         for k, panel in enumerate(plot.panels):
             _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
         _draw_legend(canvas)
+        canvas.draw_without_rendering()  # arranges the parts, once for all forms
+        canvas.set_layout_engine("none")
         contents = {}
         for form in ("png", "svg", "pdf"):
             buffer = io.BytesIO()
             canvas.savefig(buffer, format=form, metadata=_NO_DATE[form])
             contents[form] = buffer.getvalue()
-    return contents
+    return contents | {"png": _with_few_colours(contents["png"])}
+
+
+def _with_few_colours(png: bytes) -> bytes:
+    """The same picture with a table of colours: less than half as large."""
+    buffer = io.BytesIO()
+    with Image.open(io.BytesIO(png)) as picture:
+        few = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
+        few.save(buffer, "PNG", optimize=True, dpi=(DPI, DPI))
+    return buffer.getvalue()
 
 
 def _names_room(panel: Panel) -> float:
@@ -202,14 +233,28 @@ def _draw_axes(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
         axes.set_xscale("log")
     if panel.y.log:
         axes.set_yscale("log")
-        axes.yaxis.set_minor_locator(LogLocator(subs=range(2, 10)))
-        axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(panel.x.low, panel.x.high)
     axes.set_ylim(panel.y.low, panel.y.high)
+    for scale, axis, ends in (
+        (panel.x, axes.xaxis, axes.get_xlim()),
+        (panel.y, axes.yaxis, axes.get_ylim()),
+    ):
+        if scale.log:
+            few = ends[1] < DECADES * ends[0]
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value)))
+            axis.set_minor_formatter(NullFormatter())
+    if not panel.x.log and all(isinstance(x, int) for s in panel.series for x in s.x):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if names:
         upright = len(names) > 4
         axes.set_xticks(range(len(names)), names, rotation=90 if upright else 0, fontsize=8)
         axes.grid(visible=False, axis="x")
+
+
+def _tick(value: float) -> str:
+    """A power of ten, or 2 or 5 times one, as a person writes it."""
+    return f"{value:,.0f}" if value >= 1 else f"{value:.8f}".rstrip("0")
 
 
 def _draw_legend(canvas: Canvas) -> None:

@@ -141,10 +141,16 @@ def _plot(folder):
     )
     _picture(folder / "figures" / "cost.png", "#333333")
     plot = {
-        "data": [{"type": "scatter", "x": x, "y": y, "name": "CEM"}],
+        "data": [
+            {"type": "scatter", "x": x, "y": y, "name": "CEM"},
+            {"type": "bar", "x": [f"the {k}th of some bars" for k in range(6)], "y": [3.0] * 6}
+            | {"xaxis": "x2", "yaxis": "y2", "name": "Shares"},
+        ],
         "layout": {
             "title": {"text": "Cost"},
             "width": 900,
+            "height": 430,
+            "grid": {"rows": 1, "columns": 2, "pattern": "independent"},
             "xaxis": {"type": "log", "title": {"text": "faces"}},
             "yaxis": {"type": "log", "title": {"text": "seconds"}},
         },

@@ -128,6 +128,14 @@ def test_the_same_report_gives_the_same_bytes(tmp_path):
     assert write_html(sample_report(tmp_path), tmp_path).read_bytes() == first
 
 
+def test_symbols_of_the_paper_have_subscripts_and_code_does_not(tmp_path):
+    path = write_html(report_of(Text("E_C & <b>t_CEM</b>, `p E_C <i>`")), tmp_path)
+    assert (
+        "<p><i>E</i><sub>C</sub> &amp; &lt;b&gt;<i>t</i><sub>CEM</sub>&lt;/b&gt;, "
+        "<code>p E_C &lt;i&gt;</code></p>"
+    ) in path.read_text()
+
+
 def test_a_report_without_plots_is_small(tmp_path):
     path = write_html(report_of(Text("See `cembench show`.")), tmp_path)
     assert path == tmp_path / "index.html"

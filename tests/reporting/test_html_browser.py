@@ -13,6 +13,35 @@ from tests.browser import open_browser
 from tests.reporting.sample_report import ALGORITHMS, HOSTILE, SURFACES, sample_report
 
 DESKTOP, PHONE = (1280, 900), (390, 844)
+#: Every visible text whose contrast (WCAG 2.2, relative luminance) is below 4.5.
+CONTRASTS = """
+const shown = (colour) => {
+  const context = document.createElement('canvas').getContext('2d', {willReadFrequently: true});
+  context.fillStyle = colour; context.fillRect(0, 0, 1, 1);
+  return [...context.getImageData(0, 0, 1, 1).data];
+};
+const light = ([r, g, b]) => [r, g, b].map(v => v / 255)
+  .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+  .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+const behind = (node) => {
+  for (; node; node = node.parentElement) {
+    const colour = shown(getComputedStyle(node).backgroundColor);
+    if (colour[3] === 255) return colour;
+  }
+};
+const faint = {};
+for (const node of document.querySelectorAll('body *:not(script)')) {
+  const words = [...node.childNodes].filter(n => n.nodeType === 3).map(n => n.data.trim()).join('');
+  if (!words || !node.checkVisibility()) continue;
+  const style = getComputedStyle(node);
+  if (style.opacity === '0') continue;
+  const colour = node.closest('svg') ? style.fill : style.color;
+  const [a, b] = [light(shown(colour)), light(behind(node))].sort((x, y) => y - x);
+  const contrast = (a + 0.05) / (b + 0.05);
+  if (contrast < 4.5) faint[words.slice(0, 30)] = contrast;
+}
+return faint;
+"""
 
 
 @pytest.fixture(scope="module")
@@ -66,7 +95,17 @@ def page(browser, address):
 
         def plot(self):
             self.run("document.querySelector('figure.plot').scrollIntoView()")
-            return self.wait(lambda: self.all("figure.plot .drawn .scatterlayer .point"))
+            self.wait(lambda: self.run("return !!document.querySelector('.drawn.settled')"))
+            return self.all("figure.plot .drawn .scatterlayer .point")
+
+        def boxes(self, selector):
+            found = self.run(
+                "return [...document.querySelectorAll(arguments[0])]"
+                ".map(e => e.getBoundingClientRect()).map(b => [b.left, b.top, b.bottom])",
+                selector,
+            )
+            assert found, selector
+            return found
 
         def overflow(self):
             return self.run(
@@ -108,6 +147,22 @@ def test_a_plot_is_drawn_and_zooms(page):
     before = page.run(ticks)
     page.one("figure.plot .modebar-btn[data-title='Zoom in']").click()
     page.wait(lambda: page.run(ticks) != before)
+
+
+@pytest.mark.parametrize("size", [DESKTOP, PHONE])
+def test_the_panels_and_the_legend_of_a_plot_have_their_own_places(page, size):
+    page.open(size=size)
+    page.plot()
+    first, second = page.boxes("figure.plot .cartesianlayer > .subplot")
+    if size == PHONE:
+        assert second[1] > first[2]
+    else:
+        assert second[0] > first[0]
+        assert second[1] == pytest.approx(first[1], abs=60)
+    lowest = max(box[2] for box in page.boxes("figure.plot [class^='x'][class$='tick'] text"))
+    assert page.boxes("figure.plot .legend")[0][1] >= lowest
+    caption = page.boxes("figure.plot figcaption")[0]
+    assert page.boxes("figure.plot .legend")[0][2] <= caption[1]
 
 
 def test_tables_sort_by_value_with_gaps_last_and_footers_in_place(page):
@@ -231,41 +286,21 @@ def test_dark_follows_the_system_until_the_reader_chooses_which_is_remembered(pa
     page.run("localStorage.clear()")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_words_stand_out_from_what_is_behind_them(page, scheme):
-    page.open(scheme=scheme)
-    faint = page.run(CONTRASTS)
-    assert not faint
+def test_a_plot_takes_the_colours_of_the_page(page):
+    words = "return getComputedStyle(document.querySelector('.drawn .xtitle')).fill"
+    page.open()
+    page.plot()
+    before = page.run(words)
+    page.one(".theme").click()
+    page.wait(lambda: page.run(words) != before)
+    page.run("localStorage.clear()")
 
 
-#: Every visible text whose contrast (WCAG 2.2, relative luminance) is below 4.5.
-CONTRASTS = """
-const shown = (colour) => {
-  const context = document.createElement('canvas').getContext('2d', {willReadFrequently: true});
-  context.fillStyle = colour; context.fillRect(0, 0, 1, 1);
-  return [...context.getImageData(0, 0, 1, 1).data];
-};
-const light = ([r, g, b]) => [r, g, b].map(v => v / 255)
-  .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
-  .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
-const behind = (node) => {
-  for (; node; node = node.parentElement) {
-    const colour = shown(getComputedStyle(node).backgroundColor);
-    if (colour[3] === 255) return colour;
-  }
-};
-const faint = {};
-for (const node of document.querySelectorAll('body *:not(script)')) {
-  const words = [...node.childNodes].filter(n => n.nodeType === 3).map(n => n.data.trim()).join('');
-  if (!words || !node.checkVisibility()) continue;
-  const style = getComputedStyle(node);
-  if (style.opacity === '0') continue;
-  const [a, b] = [light(shown(style.color)), light(behind(node))].sort((x, y) => y - x);
-  const contrast = (a + 0.05) / (b + 0.05);
-  if (contrast < 4.5) faint[words.slice(0, 30)] = contrast;
-}
-return faint;
-"""
+def test_words_stand_out_from_what_is_behind_them(page):
+    for scheme in ("light", "dark"):
+        page.open(scheme=scheme)
+        page.plot()
+        assert not page.run(CONTRASTS)
 
 
 def test_it_prints_with_every_page_and_picture_and_no_navigation(page):

@@ -254,34 +254,71 @@
     const axis = {
       gridcolor: colour("--rule"), linecolor: colour("--soft"), zerolinecolor: colour("--rule"),
       tickcolor: colour("--soft"), ticks: "outside", ticklen: 4, automargin: true,
+      title: { font: { size: 13 }, standoff: 10 },
     };
     return {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
-      font: { family: getComputedStyle(root).getPropertyValue("--sans"), size: 13, color: colour("--ink") },
+      font: { family: getComputedStyle(root).getPropertyValue("--sans"), size: 12, color: colour("--ink") },
       xaxis: axis, yaxis: axis,
-      margin: { l: 56, r: 12, t: 34, b: 48 },
+      margin: { l: 56, r: 12, t: 10, b: 48 },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: colour("--soft"), activecolor: colour("--ink") },
       hoverlabel: { font: { family: getComputedStyle(root).getPropertyValue("--sans") } },
     };
   }
 
+  // Where the window is narrow, panels that stand side by side stand one under the other.
+  const BAR = 28;  // pixels of the buttons over a plot
+  const isAxis = (name) => /^[xy]axis/.test(name);
+  const typeset = (words) => words.replace(/\b([A-Za-z])_([A-Z]+)\b/g, "<i>$1</i><sub>$2</sub>");
   const isNarrow = () => innerWidth < 700;
-  const heightOf = (drawing) => isNarrow() ? 380 : Math.min(drawing.layout.height ?? 470, 760);
+  const rowsOf = (layout) => isNarrow()
+    ? Math.max(1, Object.keys(layout).filter((name) => name.startsWith("xaxis")).length)
+    : layout.grid?.rows ?? 1;
+  const heightOf = ({ layout }) =>
+    BAR + (isNarrow() ? 350 * rowsOf(layout) : layout.height ?? 460);
 
   function layoutOf(drawing) {
     const { width, height, title, ...layout } = drawing.layout;
-    const narrow = isNarrow();
-    const axes = Object.entries(layout).filter(([name, axis]) => /^[xy]axis/.test(name) && axis.type === "log");
-    const decades = axes.map(([name, axis]) => [name, { dtick: 1, exponentformat: "power", ...axis }]);
+    const decades = { dtick: 1, exponentformat: "power", tickfont: { size: 10 } };
+    const axes = Object.entries(layout).filter(([name]) => isAxis(name)).map(([name, axis]) => [name, {
+      ...(axis.type === "log" ? decades : {}), ...axis,
+      title: { ...axis.title, text: typeset(axis.title?.text ?? "") },
+    }]);
+    const stacked = isNarrow() && layout.grid
+      ? { grid: { ...layout.grid, rows: rowsOf(layout), columns: 1, ygap: 0.45 } } : {};
     return {
       ...layout,
-      ...Object.fromEntries(decades),
+      ...Object.fromEntries(axes),
+      ...stacked,
       template: { layout: appearance() },
       autosize: true,
-      ...(narrow ? { legend: { ...layout.legend, orientation: "h", x: 0, y: -0.22, xanchor: "left", yanchor: "top" } } : {}),
+      margin: { ...layout.margin, t: (layout.margin?.t ?? 10) + BAR },
+      legend: { ...layout.legend, orientation: "h", x: 0, xanchor: "left", yanchor: "top" },
       // A finger that moves over a plot scrolls the page; zooming is a button then.
       ...(matchMedia("(pointer: coarse)").matches ? { dragmode: false } : {}),
     };
+  }
+
+  // What is known only of a plot that stands: a logarithmic axis of less than a decade or two gets
+  // marks within decades, and the legend goes below the lowest words of the axes.
+  async function settle(board) {
+    await window.Plotly.relayout(board, Object.fromEntries(
+      Object.entries(board._fullLayout)
+        .filter(([name, axis]) => isAxis(name) && axis.type === "log")
+        .filter(([, { range }]) => Math.abs(range[1] - range[0]) < 2.2)
+        .map(([name]) => [`${name}.dtick`, "D2"])));
+    const legend = board.querySelector(".legend");
+    if (!legend) return;
+    const { t, h } = board._fullLayout._size;
+    const high = board.clientHeight - t - 60;
+    const bottom = board.getBoundingClientRect().top + t + h;
+    const words = all("[class^='x'][class$='tick'] text, g[class^='g-x']", board).map((e) => e.getBoundingClientRect());
+    const under = Math.max(0, ...words.map((box) => box.bottom - bottom)) + 14;
+    const below = under + legend.getBoundingClientRect().height + 6;
+    board.style.height = `${t + high + below}px`;
+    await window.Plotly.relayout(board, {
+      height: t + high + below, "margin.b": below, "legend.y": -under / high,
+    });
   }
 
   async function draw(figure) {
@@ -299,6 +336,8 @@
         responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"],
       });
       board.drawing = drawing;
+      await settle(board);
+      board.classList.add("settled");
     } catch (error) {
       board.remove();
       figure.classList.remove("live");
@@ -366,7 +405,9 @@
       image.alt = source.alt;
       image.width = source.getAttribute("width");
       image.height = source.getAttribute("height");
-      caption.textContent = `${group[at].querySelector("figcaption b").textContent} · ${at + 1} of ${group.length}`;
+      const words = group[at].querySelector("figcaption").cloneNode(true);
+      words.querySelector(".files")?.remove();
+      caption.textContent = `${at + 1} of ${group.length}: ${words.textContent.trim()}`;
       if (!shift || Math.abs(image.width / image.height - last) > 0.01 * last) fit();
     };
     const open = (figure) => {

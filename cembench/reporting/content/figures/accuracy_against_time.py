@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cembench.records import Record
 from cembench.reporting.content.evidence import Evidence
 from cembench.reporting.palette import looks
-from cembench.reporting.plots import Axis, Panel, Plot, Series
+from cembench.reporting.plots import Axis, Panel, Plot, Point, through
 
 METRIC = "angle_error_mean_deg"
 
@@ -30,41 +32,41 @@ def accuracy_against_time(evidence: Evidence) -> Plot | None:
 
 
 def _panel(evidence: Evidence, policy: str) -> Panel | None:
-    points: dict[str, list[tuple[float, float, str]]] = {s.label: [] for s in evidence.disk_series}
+    clouds: dict[str, list[Point]] = {s.label: [] for s in evidence.disk_series}
     for surface in evidence.surfaces:
         found = [(s, evidence.find(surface, s, policy)) for s in evidence.disk_series]
-        known = [(s.label, *figures) for s, r in found if r and (figures := _figures(r))]
+        known = {s.label: figures for s, r in found if r and (figures := _figures(r))}
         if len(known) < 2:
             continue
-        fastest, finest = (min(k[i] for k in known) for i in (1, 2))
-        for label, seconds, error in known:
-            points[label].append((seconds / fastest, error / finest, surface.title))
-    if not any(points.values()):
+        fastest, finest = (min(figures[k] for figures in known.values()) for k in (0, 1))
+        for label, (seconds, error) in known.items():
+            clouds[label].append(Point(seconds / fastest, error / finest, surface.title))
+    if not any(clouds.values()):
         return None
     style = looks([s.algorithm for s in evidence.disk_series])
-    drawn, middles = [], []
-    for series in evidence.disk_series:
-        if cloud := points[series.label]:
-            x, y, names = ([p[k] for p in cloud] for k in range(3))
-            look = style[series.algorithm]
-            label = f"{series.label}"
-            drawn.append(Series(label, x, y, "points", look, [str(n) for n in names]))  # type: ignore[arg-type]
-            centre = (*(float(np.exp(np.mean(np.log(v)))) for v in (x, y)), series.label)  # type: ignore[arg-type]
-            middles.append(centre)
-    front = sorted(m for m in middles if not any(_beats(o, m) for o in middles))
-    x, y, names = ([m[k] for m in front] for k in range(3))
-    drawn.append(Series("not beaten in the mean", x, y, "both", words=[str(n) for n in names]))  # type: ignore[arg-type]
+    drawn = [
+        through(s.label, clouds[s.label], "points", style[s.algorithm])
+        for s in evidence.disk_series
+        if clouds[s.label]
+    ]
+    middles = [_middle(label, cloud) for label, cloud in clouds.items() if cloud]
+    front = sorted(m for m in middles if not any(_beats(other, m) for other in middles))
     return Panel(
         Axis("time, times the fastest", log=True),
         Axis("mean angular distortion, times the smallest", log=True),
-        tuple(drawn),
+        (*drawn, through("not beaten in the mean", front, "both")),
         f"solves: {policy}",
     )
 
 
-def _beats(one: tuple[float, ...], other: tuple[float, ...]) -> bool:
-    better = one[0] <= other[0] and one[1] <= other[1]
-    return better and one[:2] != other[:2]
+def _middle(label: str, cloud: Sequence[Point]) -> Point:
+    """Geometric mean of a cloud."""
+    x, y = (float(np.exp(np.mean(np.log([p[k] for p in cloud])))) for k in (0, 1))
+    return Point(x, y, label)
+
+
+def _beats(one: Point, other: Point) -> bool:
+    return one.x <= other.x and one.y <= other.y and one[:2] != other[:2]
 
 
 def _figures(record: Record) -> tuple[float, float] | None:

@@ -11,11 +11,10 @@ from cembench import paper
 from cembench.reporting.content.evidence import PAPER_ALGORITHMS, Evidence
 from cembench.reporting.document import Column, Table, Value, missing, words
 from cembench.reporting.palette import looks
-from cembench.reporting.plots import Axis, Panel, Plot, Series
+from cembench.reporting.plots import Axis, Panel, Plot, Point, Series, through
 
 #: Fewer points determine no exponent that says anything.
 FEWEST = 3
-Points = list[tuple[float, float, str]]
 
 
 @dataclass(frozen=True)
@@ -28,9 +27,9 @@ class Fit:
     n: int
 
 
-def fit(points: Sequence[tuple[float, float, str]]) -> Fit | None:
+def fit(points: Sequence[Point]) -> Fit | None:
     """Which power law runs through these (faces, seconds)? None for too few or equal sizes."""
-    if len(points) < FEWEST or len({p[0] for p in points}) < FEWEST:
+    if len(points) < FEWEST or len({p.x for p in points}) < FEWEST:
         return None
     x, y = (np.log([p[k] for p in points]) for k in (0, 1))
     spread = float(((x - x.mean()) ** 2).sum())
@@ -40,21 +39,21 @@ def fit(points: Sequence[tuple[float, float, str]]) -> Fit | None:
     return Fit(exponent, float(np.exp(y.mean() - exponent * x.mean())), error, len(x))
 
 
-def measured_points(evidence: Evidence, label: str, policy: str) -> Points:
+def measured_points(evidence: Evidence, label: str, policy: str) -> list[Point]:
     """(faces, seconds, surface) of every cell of a series that has times."""
     series = next(s for s in evidence.series if s.label == label)
     found = []
     for surface in evidence.surfaces:
         record = evidence.find(surface, series, policy)
         if record and record.outcome.status == "ok" and record.outcome.median_seconds:
-            found.append((float(surface.faces), record.outcome.median_seconds, surface.title))
+            found.append(Point(surface.faces, record.outcome.median_seconds, surface.title))
     return found
 
 
-def printed_points(algorithm: str) -> Points:
+def printed_points(algorithm: str) -> list[Point]:
     """(faces, seconds, model) of the paper's Table 1."""
     return [
-        (float(row["faces"] or 0), seconds, model)
+        Point(paper.faces(model), seconds, model)
         for model, row in paper.table(1).items()
         if (seconds := row[algorithm]) is not None
     ]
@@ -78,22 +77,21 @@ def cost_by_faces(evidence: Evidence) -> Plot:
         "Seconds against triangles on logarithmic axes; straight lines are fitted powers, whose "
         "exponents stand in the table below. Here all surfaces of the run count, also those that "
         "are not in the paper; the printed seconds are of another machine.",
-        "Points along straight lines that rise from left to right, one for each algorithm.",
+        "list[Point] along straight lines that rise from left to right, one for each algorithm.",
         "Figure 10",
     )
 
 
-def _panel(groups: Sequence[tuple[str, str, Points]], title: str) -> Panel:
+def _panel(groups: Sequence[tuple[str, str, list[Point]]], title: str) -> Panel:
     style = looks([algorithm for _, algorithm, _ in groups])
     drawn = []
     for label, algorithm, points in groups:
         if not points:
             continue
-        x, y, names = ([p[k] for p in points] for k in range(3))
-        drawn.append(Series(label, x, y, "points", style[algorithm], [str(n) for n in names]))  # type: ignore[arg-type]
+        drawn.append(through(label, points, "points", style[algorithm]))
         law = fit(points)
         if law:
-            ends = [min(p[0] for p in points), max(p[0] for p in points)]
+            ends = [min(p.x for p in points), max(p.x for p in points)]
             line = [law.factor * e**law.exponent for e in ends]
             words = [f"{label}: exponent {law.exponent:.2f}"] * 2
             drawn.append(

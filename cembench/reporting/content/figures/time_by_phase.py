@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cembench.records import Record
 from cembench.reporting.content.evidence import Evidence, SurfaceFacts
-from cembench.reporting.palette import PARTS, Look
+from cembench.reporting.palette import PARTS, REST, Look
 from cembench.reporting.plots import Axis, Panel, Plot, Series
 
 
@@ -67,14 +67,23 @@ def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[Series, ...]
     )
 
 
-#: The phases that every algorithm shares have the same colour in every plot.
-_KNOWN = ("solves", "factorisation", "ordering", "laplacian", "boundary", "metrics", "other")
+#: A phase has the same colour in every plot.
+_KNOWN = (
+    "solves",
+    "factorisation",
+    "assembly",
+    "laplacian",
+    "ordering",
+    "symbolic",
+    "boundary",
+    "beltrami",
+    "boundary step",
+    "folds",
+    "energy",
+    "start",
+)
 
 
 def colour_of(phase: str) -> Look:
-    """The colour of a phase."""
-    if phase == "other":
-        return Look("#999999")
-    if phase in _KNOWN:
-        return Look(PARTS[_KNOWN.index(phase)])
-    return Look(PARTS[-1 - sum(map(ord, phase)) % 3])
+    """The colour of a phase; what is left over, and what no built-in algorithm books, is grey."""
+    return Look(PARTS[_KNOWN.index(phase)] if phase in _KNOWN else REST)
