@@ -22,6 +22,9 @@ class LauncherHere:
     def __init__(self, scratch, options):
         self.scratch, self.options = scratch, options
 
+    def close(self):
+        """There is nothing to end."""
+
     def check(self, task):
         return call_here(task)
 

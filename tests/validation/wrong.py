@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from algorithms.fdm import fdm
+from algorithms.cem import cem
 from cembench import AlgorithmFailed, DiskMesh, Parameterization, algorithm
 from cembench.geometry import cholesky
 from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
@@ -15,7 +15,7 @@ from cembench.geometry.planar import signed_areas
 
 
 def right(mesh):
-    return fdm(mesh).uv.copy()
+    return cem(mesh).uv.copy()
 
 
 def harmonic(mesh, f_b):
@@ -24,7 +24,7 @@ def harmonic(mesh, f_b):
 
 @algorithm("right", title="Right", target="disk")
 def right_one(mesh: DiskMesh) -> Parameterization:
-    return fdm(mesh)
+    return cem(mesh)
 
 
 @algorithm("parameters", title="Its default is out of range", target="disk")
@@ -60,14 +60,14 @@ def writes(mesh: DiskMesh) -> Parameterization:
 
 @algorithm("boasts", title="Reports half of its energy", target="disk")
 def boasts(mesh: DiskMesh) -> Parameterization:
-    found = fdm(mesh)
+    found = cem(mesh)
     half = tuple(energy / 2 for energy in found.energy_history)
     return Parameterization(found.uv, found.iterations, half)
 
 
 @algorithm("miscounts", title="Reports fewer iterations than energies", target="disk")
 def miscounts(mesh: DiskMesh) -> Parameterization:
-    found = fdm(mesh)
+    found = cem(mesh)
     return Parameterization(found.uv, 1, found.energy_history)
 
 
@@ -88,7 +88,7 @@ calls = []
 @algorithm("nan-sometimes", title="NaN on small meshes", target="disk")
 def nan_sometimes(mesh: DiskMesh) -> Parameterization:
     uv = right(mesh)
-    if mesh.n < 20:
+    if mesh.n < 500:
         uv[:] = np.nan
     return Parameterization(uv)
 
