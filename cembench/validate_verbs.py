@@ -55,7 +55,12 @@ def validate(
         typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set one. Repeatable."),
     ] = [],  # noqa: B006
     require: Annotated[
-        list[Requirement], typer.Option(help="Exit with 1 unless also this. Repeatable.")
+        list[Requirement],
+        typer.Option(
+            metavar="WHAT",
+            help="Exit with 1 unless also: faster, not-slower, better, not-worse, no-folds. "
+            "Repeatable.",
+        ),
     ] = [],  # noqa: B006
     checks_only: Annotated[
         bool, typer.Option("--checks-only", help="Contract and correctness, no timing.")
