@@ -79,7 +79,7 @@ def qiem(
         z,
         len(energies) - 1,
         tuple(energy / 2 - 2 * np.pi for energy in energies),
-        {"fold_repairs": repairs},
+        {"fold_repairs": repairs, "energy_of": "half of the sphere's, less 2 pi"},
     )
 
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from cembench import fetch_verbs, run_verbs
-from cembench.console import Json, complain, err, out, print_json, split
+from cembench import fetch_verbs, report_verbs, run_verbs, validate_verbs
+from cembench.console import Json, assignments, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
 from cembench.paper.profiles import Profile
 from cembench.records import DEFAULT_ROUNDS
@@ -180,7 +180,7 @@ def map_(
         surface = read_mesh_for(mesh, [chosen])
         standing = {surface.name: standing_of_file(registry, mesh, surface)}
     how = How(solves.value, _installed(backend), threads, repeats=1)
-    tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin, standing)
+    tasks = plan_cells([chosen], [surface], assignments(parameter), how, plugin, standing)
     with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
         record, uv = map_once(tasks[0], options)
     ok = record.outcome.status == "ok"
@@ -305,7 +305,7 @@ def run(
     tasks = []
     for policy in policies:
         how = How(policy, _installed(backend), threads, repeats)
-        tasks += plan_cells(chosen, found, _assignments(parameter), how, plugin, standing)
+        tasks += plan_cells(chosen, found, assignments(parameter), how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
         return
@@ -324,13 +324,14 @@ def reproduce(
     fresh: Fresh = False,
     as_json: Json = False,
 ) -> None:
-    """Measure every algorithm on the eight smallest stand-ins of the paper's models.
+    """Measure every algorithm on stand-ins for the paper's eight smallest models, and report.
 
-    CEM's maps are drawn. One round each, so that it takes minutes; `run --profile quick` has the
-    rounds that intervals need. What the folder already holds is not measured again.
+    One round each, so that it takes minutes; `run --profile quick` has the rounds that intervals
+    need. What the folder already holds is not measured again. The report lies in it too.
     """
-    from cembench.paper.profiles import Profile, surfaces_of
+    from cembench.paper.profiles import surfaces_of
     from cembench.registry import load_registry
+    from cembench.reporting.frame import rows
     from cembench.running.local import Options
     from cembench.running.plan import How, generate_surface, plan_cells, standing_of
     from cembench.store import Store
@@ -345,19 +346,19 @@ def reproduce(
     chosen = list(registry.algorithms.values())
     standing = standing_of(registry, names)
     tasks = plan_cells(chosen, surfaces, {}, How(repeats=1), standing=standing)
-    store = Store(output)
-    records = _measure(tasks, store, options)
-    pictures = output / "pictures"
-    pictures.mkdir(parents=True, exist_ok=True)
-    with err.status("drawing", spinner="line"):
-        for task, record in zip(tasks, records, strict=True):
-            uv = store.uv(task.cell)
-            picture = pictures / f"{task.cell.mesh}--{task.cell.algorithm}.png"
-            if task.cell.algorithm != "cem" or uv is None:
-                continue
-            if fresh or not picture.exists():
-                _draw(task.mesh, uv, picture, record)
-    _present(records, as_json=as_json, where=output)
+    records = _measure(tasks, Store(output), options)
+    command = f"cembench reproduce -o {output}"
+    report, folder = report_verbs.make_report(output, None, command)
+    if as_json:
+        print_json({"cells": rows(records), "report": report_verbs.summary(report, folder)})
+    else:
+        report_verbs.show_report(report, folder)
+        for record in records:
+            if record.outcome.status != "ok":
+                name = f"{record.cell.mesh} / {record.cell.algorithm}"
+                complain(f"{name}: {record.outcome.status}: {record.outcome.cause}")
+    if any(record.outcome.status != "ok" for record in records):
+        raise typer.Exit(1)
 
 
 @app.command(epilog="Example:  cembench doctor --json")
@@ -384,7 +385,7 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 #: Modules whose verbs are not written in this one.
-_MORE = (run_verbs, fetch_verbs)
+_MORE = (run_verbs, report_verbs, validate_verbs, fetch_verbs)
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 
@@ -490,16 +491,6 @@ def _print_notices(meshes: Sequence[TriangleMesh]) -> None:
     for mesh in meshes:
         for notice in mesh.notices:
             err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
-
-
-def _assignments(given: Sequence[str]) -> dict[str, str]:
-    pairs = {}
-    for assignment in given:
-        name, equals, value = assignment.partition("=")
-        if not equals or not name:
-            raise ParameterError(f"-p {assignment!r} is not of the form NAME=VALUE.")
-        pairs[name.strip()] = value.strip()
-    return pairs
 
 
 def _policies(given: list[str]) -> list[str]:

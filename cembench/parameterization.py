@@ -23,7 +23,8 @@ class Parameterization:
     energy_history : tuple of float
         E_C (Eq. 7) of the start and after each iteration; empty for a direct method.
     extras : dict
-        Whatever else the algorithm has to tell; values that JSON can hold.
+        Whatever else the algorithm has to tell; values that JSON can hold. Where the energies are
+        of another kind, ``energy_of`` says of which.
 
     """
 

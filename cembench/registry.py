@@ -22,6 +22,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal, TypeVar, get_args
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from cembench.datasets import Dataset
@@ -33,6 +35,8 @@ Target = Literal["disk", "free boundary", "circular holes"]
 
 #: Finds named places on a mesh of a surface family: name -> vertex, counted from 0.
 Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
+#: From a surface's vertices (n, 3) to the image (n,) of each under its conformal map.
+ExactMap = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 _MARK = "__cembench__"
 C = TypeVar("C", bound=Callable[..., Any])
@@ -113,6 +117,7 @@ class Surface(_Registered):
     paper_row: str = ""
     landmarks: Landmarks | None = None
     kept: Callable[..., Path] | None = None
+    exact_map: ExactMap | None = None
 
 
 def algorithm(
@@ -184,6 +189,7 @@ def surface(
     paper_row: str = "",
     landmarks: Landmarks | None = None,
     kept: Callable[..., Path] | None = None,
+    exact_map: ExactMap | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
@@ -191,7 +197,9 @@ def surface(
     paper's Table 1 that the surface stands for, if any: the profiles are made of those. `landmarks`
     finds named vertices, such as the tip of a nose, on a mesh that the function made, of any size.
     `kept` takes the same arguments and tells the file in which the surface lies once it has been
-    made; where the surface would be another one, so is the file.
+    made; where the surface would be another one, so is the file. `exact_map` is its conformal map
+    to the unit disk, for holed surfaces with round holes, where that is known in closed form for
+    the default parameters; it is one of many, up to a Moebius map.
 
     Raises
     ------
@@ -213,6 +221,7 @@ def surface(
             paper_row=paper_row,
             landmarks=landmarks,
             kept=kept,
+            exact_map=exact_map,
         )
         setattr(function, _MARK, spec)
         return function

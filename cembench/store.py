@@ -4,6 +4,7 @@
 
     RUN/records/<mesh>--<algorithm>--<key>.json
     RUN/maps/<mesh>--<algorithm>--<key>.npz       uv, complex128 (n,)
+    RUN/meshes/<hash>.npz                         V, F and name: what the maps are maps of
     RUN/environments/<id>.json
     RUN/plan.json                                 the cells that were last asked for
     RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
@@ -19,6 +20,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,6 +33,7 @@ from pydantic import TypeAdapter
 
 from cembench.atomic import DRAFT, flush_folder, read_model, unwritable, write, write_model
 from cembench.errors import RecordError
+from cembench.geometry.mesh import TriangleMesh
 from cembench.records import SCHEMA_VERSION, Cell, Record
 from cembench.samples import Samples, read_map
 
@@ -103,6 +106,36 @@ class Store:
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
         """The recorded map (n,), or None where there is none."""
         return read_map(self._map_path(cell))
+
+    def save_mesh(self, mesh: TriangleMesh) -> None:
+        """Keep a surface, once: with its map, every metric can be computed again."""
+        path = self._mesh_path(mesh.hash)
+        if not path.exists():
+            name = np.array(mesh.name)
+            write(path, lambda file: np.savez(file, V=mesh.V, F=mesh.F, name=name))
+
+    def mesh(self, cell: Cell) -> TriangleMesh | None:
+        """The surface that a cell was measured on, or None where it was not kept.
+
+        Raises
+        ------
+        RecordError
+            The file is damaged, or holds another surface.
+
+        """
+        path = self._mesh_path(cell.mesh_hash)
+        if not path.exists():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                mesh = TriangleMesh(data["V"], data["F"].astype(np.int64), str(data["name"]))
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise RecordError(
+                f"{path} cannot be read ({error}). Delete it and run again."
+            ) from error
+        if mesh.hash != cell.mesh_hash:
+            raise RecordError(f"{path} holds another surface than its name says; delete it.")
+        return mesh
 
     def samples(self, cell: Cell, environment: str) -> Samples:
         """What was measured so far of a cell in this environment, and goes on to be."""
@@ -180,6 +213,9 @@ class Store:
     def _map_path(self, cell: Cell) -> Path:
         return self.folder / "maps" / f"{cell.label}.npz"
 
+    def _mesh_path(self, mesh_hash: str) -> Path:
+        return self.folder / "meshes" / f"{mesh_hash[:32]}.npz"
+
 
 def merge(runs: Iterable[Store], into: Store) -> int:
     """Bring the records of several runs together; how many are there then?
@@ -197,6 +233,9 @@ def merge(runs: Iterable[Store], into: Store) -> int:
     for _, run, record in best.values():
         environment = run.environments().get(record.environment, {"id": record.environment})
         into.save(record, run.uv(record.cell), environment)
+        mesh = run.mesh(record.cell)
+        if mesh is not None:
+            into.save_mesh(mesh)
     return len(best)
 
 

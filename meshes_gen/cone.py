@@ -13,7 +13,14 @@ from cembench.registry import surface
 from meshes_gen.disk_grid import disk_grid
 
 
-@surface("cone", title="Cone", source="closed form")
+def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex128]:
+    """The cone's conformal map to the unit disk: the slant length to the power 1 / sin(angle)."""
+    slant = np.linalg.norm(V, axis=1)
+    around = np.arctan2(V[:, 1], V[:, 0])
+    return slant ** (1 / np.sin(np.deg2rad(angle))) * np.exp(1j * around)
+
+
+@surface("cone", title="Cone", source="closed form", exact_map=exact_map)
 def cone(
     faces: Annotated[int, Field(ge=24)] = 20_000,
     *,
@@ -27,10 +34,3 @@ def cone(
     tilt = np.deg2rad(angle)
     V = np.stack([np.sin(tilt) * z.real, np.sin(tilt) * z.imag, -np.cos(tilt) * np.abs(z)], axis=1)
     return DiskMesh.from_arrays(V, F, name="cone")
-
-
-def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex128]:
-    """The cone's conformal map to the unit disk: the slant length to the power 1 / sin(angle)."""
-    slant = np.linalg.norm(V, axis=1)
-    around = np.arctan2(V[:, 1], V[:, 0])
-    return slant ** (1 / np.sin(np.deg2rad(angle))) * np.exp(1j * around)

@@ -45,7 +45,12 @@ def holed_cap_body(holes: int) -> Body:
     )
 
 
-@surface("holed-cap", title="Spherical cap with holes", source="closed form")
+def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """The cap's map to the unit disk with round holes: stereographic, from the south pole."""
+    return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(CAP) / 2)
+
+
+@surface("holed-cap", title="Spherical cap with holes", source="closed form", exact_map=exact_map)
 def holed_cap(
     faces: Annotated[int, Field(ge=2_000, le=4_000_000)] = 20_000,
     *,
@@ -68,11 +73,6 @@ def holed_cap(
         parameters,
         lambda: mesh_of(HoledMesh, body, faces, boundary, name="holed-cap"),
     )
-
-
-def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """The cap's map to the unit disk with round holes: stereographic, from the south pole."""
-    return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(CAP) / 2)
 
 
 @surface(

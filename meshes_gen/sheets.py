@@ -82,7 +82,12 @@ def catenoid_sheet(
     return DiskMesh.from_arrays(V, F, name="catenoid-sheet")
 
 
-@surface("catenoid-ring", title="Catenoid", source="closed form")
+def ring_map(V: NDArray[np.float64]) -> Complex:
+    """The conformal map of the catenoid ring to an annulus, its waist to the unit circle."""
+    return np.exp(-V[:, 2] + 1j * np.arctan2(V[:, 1], V[:, 0]))
+
+
+@surface("catenoid-ring", title="Catenoid", source="closed form", exact_map=ring_map)
 def catenoid_ring(
     faces: Faces = 20_000, *, height: Annotated[float, Field(gt=0, le=6)] = 1.0
 ) -> HoledMesh:
@@ -97,11 +102,6 @@ def catenoid_ring(
     F = F % n
     V = np.stack([np.cosh(v) * np.cos(u), np.cosh(v) * np.sin(u), v], axis=1)[:n]
     return HoledMesh.from_arrays(V, F, name="catenoid-ring")
-
-
-def ring_map(V: NDArray[np.float64]) -> Complex:
-    """The conformal map of the catenoid ring to an annulus, its waist to the unit circle."""
-    return np.exp(-V[:, 2] + 1j * np.arctan2(V[:, 1], V[:, 0]))
 
 
 def exact_map(faces: int, aspect: float) -> Complex:

@@ -13,7 +13,12 @@ from cembench.registry import surface
 from meshes_gen.disk_grid import disk_grid
 
 
-@surface("spherical-cap", title="Spherical cap", source="closed form")
+def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:
+    """The cap's conformal map to the unit disk: stereographic projection from the south pole."""
+    return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(angle) / 2)
+
+
+@surface("spherical-cap", title="Spherical cap", source="closed form", exact_map=exact_map)
 def spherical_cap(
     faces: Annotated[int, Field(ge=24)] = 20_000,
     *,
@@ -30,8 +35,3 @@ def spherical_cap(
         [np.sin(polar) * direction.real, np.sin(polar) * direction.imag, np.cos(polar)], axis=1
     )
     return DiskMesh.from_arrays(V, F, name="spherical-cap")
-
-
-def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:
-    """The cap's conformal map to the unit disk: stereographic projection from the south pole."""
-    return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(angle) / 2)

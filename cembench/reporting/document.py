@@ -2,11 +2,14 @@
 
 A number is made once, as a :class:`Value` with its origin and the record it was read from;
 Markdown, LaTeX, CSV, HTML and the terminal only print it. Figures are files beside their data.
+
+What lies in a report's folder, whoever writes it: :func:`csv_of` and :func:`tex_of` say where a
+table is, a figure's paths are its own, and ``records.csv`` holds every record as a row.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any, Literal, TypeAlias
@@ -55,7 +58,10 @@ class Value:
 
 @dataclass(frozen=True)
 class Column:
-    """A column; neighbours of equal `group` stand under one heading."""
+    """A column; neighbours of equal `group` stand under one heading.
+
+    In a table of the paper, `group` is the algorithm and `title` is "printed" or "here".
+    """
 
     title: str
     group: str = ""
@@ -108,9 +114,35 @@ class Figure:
 
 
 @dataclass(frozen=True)
-class Claim:
-    """A claim of the paper's text, put to the test."""
+class Gallery:
+    """Figures that are looked at side by side: one surface, a picture for every algorithm."""
 
+    name: str
+    title: str
+    figures: tuple[Figure, ...]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper's text, put to the test.
+
+    Parameters
+    ----------
+    name : str
+        Anchor.
+    sentence, place : str
+        The paper's words, and where they stand.
+    test : str
+        How it is tested here.
+    figures : str
+        What came out, with n.
+    remark : str
+        What is to be known of the verdict: on what it was tested, and on what not.
+
+    """
+
+    name: str
     sentence: str
     place: str
     test: str
@@ -135,7 +167,7 @@ class Text:
     words: str
 
 
-Item: TypeAlias = "Table | Figure | Claim | Gap | Text"
+Item: TypeAlias = "Table | Figure | Gallery | Claim | Gap | Text"
 
 
 @dataclass(frozen=True)
@@ -163,3 +195,57 @@ class Report:
     sections: tuple[Section, ...]
     #: Records by key, as rows (cembench.reporting.frame), to which the values link.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def missing(why: str, text: str = "-") -> Value:
+    """A gap in a table; `why` says why there is no number."""
+    return Value(text, why=why)
+
+
+def words(text: str) -> Value:
+    """An entry that is no number."""
+    return Value(text)
+
+
+def marked(value: Value, column: Column) -> str:
+    """The text with the mark of its origin; none where the column's heading says "printed"."""
+    mark = ORIGINS[value.origin][1] if value.origin else ""
+    says = value.origin == "printed" and column.title.startswith("printed")
+    return value.text if says or value.number is None else value.text + mark
+
+
+def csv_of(table: Table) -> PurePosixPath:
+    """Where is a table's CSV, relative to the report's folder?"""
+    return PurePosixPath("tables", f"{table.name}.csv")
+
+
+def tex_of(table: Table) -> PurePosixPath:
+    """Where is a table's LaTeX, relative to the report's folder?"""
+    return PurePosixPath("tables", f"{table.name}.tex")
+
+
+def sections_of(report: Report) -> Iterator[tuple[int, Section]]:
+    """All sections in the order of reading, each with its depth from 1."""
+
+    def below(depth: int, sections: tuple[Section, ...]) -> Iterator[tuple[int, Section]]:
+        for section in sections:
+            yield depth, section
+            yield from below(depth + 1, section.sections)
+
+    return below(1, report.sections)
+
+
+def tables_of(report: Report) -> Iterator[Table]:
+    """All tables in the order of reading."""
+    for _, section in sections_of(report):
+        yield from (item for item in section.items if isinstance(item, Table))
+
+
+def figures_of(report: Report) -> Iterator[Figure]:
+    """All figures in the order of reading, also those of galleries."""
+    for _, section in sections_of(report):
+        for item in section.items:
+            if isinstance(item, Figure):
+                yield item
+            elif isinstance(item, Gallery):
+                yield from item.figures

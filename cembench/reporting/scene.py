@@ -96,11 +96,11 @@ class Scene:
     def of(cls, mesh: TriangleMesh, uv: Complex) -> Self:
         """Place the surface before the viewer and the image into its frame, and light both."""
         F = mesh.F
-        space = _framed(mesh.V @ view_rotation(mesh).T)
+        space = framed(mesh.V @ view_rotation(mesh).T)
         plane = image_in_window(uv)
         board = plane[:, :2] * (SQUARES / 2 / FILL)
-        fineness = _fineness(F, space, board)
-        table = np.column_stack([space, plane, board, _brightness(F, space), fineness])[F]
+        fineness = fineness_of(F, space, board)
+        table = np.column_stack([space, plane, board, brightness_of(F, space), fineness])[F]
         table, origin = _cut_at_whole_numbers(table)
         level = np.ceil(table[:, :, -1].mean(axis=1)).clip(0)
         table[:, :, 6:8] *= FINER ** level[:, None, None]
@@ -148,7 +148,7 @@ class Scene:
 
 def image_in_window(uv: Complex) -> Real:
     """Where do the images of the vertices lie in the panel? Window coordinates (n, 3), z = 0."""
-    return _framed(np.stack([uv.real, uv.imag, np.zeros(len(uv))], axis=1))
+    return framed(np.stack([uv.real, uv.imag, np.zeros(len(uv))], axis=1))
 
 
 def doubled_areas(corners: Real) -> Real:
@@ -158,7 +158,7 @@ def doubled_areas(corners: Real) -> Real:
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
-def _framed(points: Real) -> Real:
+def framed(points: Real) -> Real:
     """Move and scale so that x and y fill the panel; depth in the same units."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low)[:2].max()) or 1.0
@@ -179,7 +179,7 @@ def _to_vertices(F: Ints, values: Real, n: int) -> Real:
     return total
 
 
-def _brightness(F: Ints, points: Real) -> Real:
+def brightness_of(F: Ints, points: Real) -> Real:
     """Light that wraps round the surface: no part is black, so the board stays legible."""
     normals = _normals(F, points)
     smooth = np.stack([_to_vertices(F, normals[:, k], len(points)) for k in range(3)], axis=1)
@@ -188,7 +188,7 @@ def _brightness(F: Ints, points: Real) -> Real:
     return np.clip(SHADOW + LAMPLIGHT * ((1 + facing) / 2) ** FALL_OFF, 0.0, 1.0)
 
 
-def _fineness(F: Ints, space: Real, board: Real) -> Real:
+def fineness_of(F: Ints, space: Real, board: Real) -> Real:
     """How often must squares be divided at each vertex so that they are not too large in space?
 
     Shape (n,); not whole numbers: the next whole number above is the answer.

@@ -96,6 +96,8 @@ def run_tasks(
     launcher = launcher or Launcher
     with store.locked(watcher.waits) as scratch, closing(launcher(scratch, options)) as starting:
         store.save_plan([task.cell for task in tasks])
+        for mesh in {task.cell.mesh_hash: task.mesh for task in tasks}.values():
+            store.save_mesh(mesh)
         run = _Run(store, starting, options, watcher, describe_environment())
         run.measure(tasks)
     return [run.records[task.cell.label] for task in tasks]

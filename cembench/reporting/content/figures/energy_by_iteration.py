@@ -1,0 +1,68 @@
+"""Figure 8: the conformal energy after each iteration of CEM."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cembench.reporting.content.evidence import REFERENCE, Evidence, SurfaceFacts, model_surface
+from cembench.reporting.document import Gap
+from cembench.reporting.palette import looks
+from cembench.reporting.plots import Axis, Panel, Plot, Series
+
+#: The models of the paper's figure.
+MODELS = ("Chinese Vase", "Bourbon Bottle", "David Head", "Human Brain")
+
+
+def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
+    """The plot of the paper's models that the run has, and a gap for each of the others."""
+    panels = []
+    gaps = []
+    for model in MODELS:
+        surface = next((s for s in evidence.models if s.paper_row == model), None)
+        panel = surface and history_panel(evidence, surface, f"{model} ({surface.origin})")
+        if panel:
+            panels.append(panel)
+        else:
+            gaps.append(model_gap(evidence, model, "Figure 8"))
+    if not panels:
+        return None, gaps
+    plot = Plot(
+        "figure-8",
+        "Conformal energy against iterations of CEM",
+        tuple(panels),
+        "E_C of the start (0) and after each iteration. The last value need not be the smallest: "
+        "iteration ends after the first step that lowers E_C by less than the tolerance.",
+        "For each surface, a curve of the conformal energy that falls with the iterations.",
+        "Figure 8",
+    )
+    return plot, gaps
+
+
+def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Panel | None:
+    """The energies of CEM's iterations on a surface; None where there are none."""
+    series = evidence.series_of(REFERENCE)
+    record = series and evidence.find(surface, series)
+    if not series or not record or not record.outcome.energy_history:
+        return None
+    history = record.outcome.energy_history
+    steps = list(range(len(history)))
+    drawn = Series(series.title, steps, history, "both", looks([REFERENCE])[REFERENCE])
+    return Panel(Axis("iteration"), Axis("conformal energy E_C"), (drawn,), title)
+
+
+def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
+    """What is missing where a run does not have a model's map by CEM."""
+    surface = next((s for s in evidence.models if s.paper_row == model), None)
+    series = evidence.series_of(REFERENCE)
+    record = evidence.find(surface, series) if surface and series else None
+    why = evidence.why_not(record) if surface else "no surface of this run is or stands for it"
+    return Gap(
+        f"{figure}: {model}",
+        f"no map of {model} by CEM: {why}.",
+        f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
+    )
+
+
+def present(evidence: Evidence, models: Sequence[str]) -> list[SurfaceFacts]:
+    """The surfaces of the run that are or stand for these models."""
+    return [s for s in evidence.models if s.paper_row in models]

@@ -1,0 +1,64 @@
+"""One colour, marker and dash for each algorithm, the same in every plot of every report.
+
+The colours are those of Okabe and Ito, which stay apart for the colour-blind; markers and dashes
+keep them apart in print without colour.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Look:
+    """A colour; a marker and a dash, each in the words of matplotlib and of Plotly."""
+
+    colour: str
+    marker: tuple[str, str] = ("o", "circle")
+    dash: tuple[str, str] = ("-", "solid")
+
+
+_KNOWN = {
+    "cem": Look("#0072B2", ("o", "circle"), ("-", "solid")),
+    "qiem": Look("#D55E00", ("s", "square"), ("--", "dash")),
+    "fdm": Look("#009E73", ("^", "triangle-up"), ("-.", "dashdot")),
+    "ldm": Look("#CC79A7", ("D", "diamond"), (":", "dot")),
+    "harmonic-circle": Look("#E69F00", ("v", "triangle-down"), ("--", "longdash")),
+    "lscm": Look("#56B4E9", ("P", "cross"), ("-.", "longdashdot")),
+}
+_MORE = tuple(
+    Look(colour, marker, dash)
+    for colour, marker, dash in (
+        ("#7f5f00", ("X", "x"), ("-", "solid")),
+        ("#4d4d4d", ("<", "triangle-left"), ("--", "dash")),
+        ("#8c564b", (">", "triangle-right"), (":", "dot")),
+        ("#5f6b9a", ("p", "pentagon"), ("-.", "dashdot")),
+        ("#3b7d7d", ("h", "hexagon"), ("--", "longdash")),
+        ("#a0405f", ("*", "star"), ("-", "solid")),
+    )
+)
+#: What is not an algorithm: bounds, fits, the paper's own figures.
+PLAIN = Look("#6b7683", ("o", "circle"), (":", "dot"))
+#: Phases of a measured call and other parts of a whole; what is left over.
+PARTS = (
+    "#0072B2",
+    "#E69F00",
+    "#009E73",
+    "#CC79A7",
+    "#56B4E9",
+    "#D55E00",
+    "#F0E442",
+    "#8c564b",
+    "#5f6b9a",
+    "#3b7d7d",
+    "#a0405f",
+    "#7f5f00",
+)
+REST = "#b3b9c0"
+
+
+def looks(names: Sequence[str]) -> dict[str, Look]:
+    """A look for each name: the usual one for algorithms that are known, others in turn."""
+    others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
+    return _KNOWN | {name: _MORE[k % len(_MORE)] for k, name in enumerate(others)}

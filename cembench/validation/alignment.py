@@ -1,0 +1,49 @@
+"""Are two maps the same but for a Moebius map, which conformality cannot tell apart?"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.geometry.moebius import Moebius
+
+Complex = NDArray[np.complex128]
+
+
+#: Steps of the reweighting below; it settles in a few.
+_STEPS = 20
+
+
+def closest_moebius(z: Complex, w: Complex) -> Moebius:
+    """Which Moebius map carries the points z (n,) nearest to the points w (n,)?
+
+    Least squares of ``a z + b - w (c z + d)`` with coefficients of unit norm, divided by the
+    ``c z + d`` of the step before, so that in the end the distance of the images is minimised.
+    """
+    columns = np.stack([z, np.ones_like(z), -w * z, -w], axis=1)
+    weight = np.ones(len(z))
+    found = np.zeros(4, dtype=np.complex128)
+    for _ in range(_STEPS):
+        before = found
+        found = np.linalg.svd(columns / weight[:, None], full_matrices=False)[2][-1].conj()
+        weight = np.abs(found[2] * z + found[3])
+        if abs(np.vdot(before, found)) > 1 - 1e-14 or not weight.min() > 0:
+            break
+    return Moebius(*found.tolist())
+
+
+def closest_similarity(z: Complex, w: Complex) -> Moebius:
+    """Which turn, scale and shift carries z (n,) nearest to w (n,)?"""
+    columns = np.stack([z, np.ones_like(z)], axis=1)
+    (a, b), *_ = np.linalg.lstsq(columns, w, rcond=None)
+    return Moebius(complex(a), complex(b), 0j, 1 + 0j)
+
+
+def distance(z: Complex, w: Complex, *, moebius: bool) -> float:
+    """How far are the maps apart when laid on each other?
+
+    Root mean square, relative to the radius of w; infinite where they cannot be laid on.
+    """
+    onto = (closest_moebius if moebius else closest_similarity)(z, w)
+    radius = float(np.sqrt((np.abs(w - w.mean()) ** 2).mean()))
+    return float(np.sqrt((np.abs(onto(z) - w) ** 2).mean())) / radius

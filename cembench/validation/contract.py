@@ -1,0 +1,154 @@
+"""Does the algorithm keep to what it promised by being declared one?"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+
+from cembench.errors import ParameterError
+from cembench.registry import Algorithm, Registry
+from cembench.running.measure import MESH_CHANGED
+from cembench.validation import surfaces
+from cembench.validation.finding import Finding
+from cembench.validation.solver import Mapped, Solver
+
+#: How far the last entry of the energy history may be from E_C of the map, relative to its area.
+SAME_ENERGY = 1e-6
+
+
+def examine_contract(solver: Solver, registry: Registry) -> list[Finding]:
+    """The findings; where defaults are out of range or there is no map, only that is told."""
+    findings = [parameters_fit(solver.algorithm)]
+    if not findings[0].ok:
+        return findings
+    kind = surfaces.kind_of(solver.algorithm)
+    uneven = surfaces.uneven(registry, kind)
+    first = solver.map(uneven)
+    findings.append(returns_a_map(first))
+    if not first.is_usable:
+        return findings
+    return [
+        *findings,
+        leaves_the_mesh(first),
+        tells_its_energy(first),
+        is_repeatable(first, solver.map(uneven)),
+        copes([solver.map(mesh) for mesh in surfaces.awkward(registry, kind)]),
+    ]
+
+
+def parameters_fit(algorithm: Algorithm) -> Finding:
+    """Is each default within its own range, and can JSON hold it, so that a record can?"""
+    wrong = []
+    for parameter in algorithm.parameters:
+        try:
+            parameter.parse(parameter.default, algorithm.name)
+            json.dumps(parameter.default, allow_nan=False)
+        except (ParameterError, TypeError, ValueError) as error:
+            wrong.append(f"{parameter.name}={parameter.default!r}: {error}")
+    return Finding(
+        stage="contract",
+        name="parameters",
+        ok=not wrong,
+        measured="; ".join(wrong) or f"{len(algorithm.parameters)} with type and default",
+        allowed="every default lies within its declared range and can be written as JSON",
+        remedy="correct the default or the range in the function's signature.",
+    )
+
+
+def returns_a_map(mapped: Mapped) -> Finding:
+    """Does a call end with an array that is a map, whatever that map is worth?"""
+    outcome = mapped.outcome
+    measured = f"complex128 ({mapped.mesh.n},), finite"
+    if not mapped.is_usable:
+        measured = f"{outcome.status} on {mapped.mesh.name}: {outcome.cause}"
+    return Finding(
+        stage="contract",
+        name="returns a map",
+        ok=mapped.is_usable,
+        measured=measured,
+        allowed="Parameterization(uv) with uv complex128 of shape (mesh.n,), finite",
+        remedy="return Parameterization(uv), uv[k] = u + i v of vertex k; raise AlgorithmFailed "
+        "where there is no map.",
+    )
+
+
+def leaves_the_mesh(mapped: Mapped) -> Finding:
+    """Are V and F as they were after the call?"""
+    changed = MESH_CHANGED in (mapped.outcome.cause or "")
+    return Finding(
+        stage="contract",
+        name="mesh untouched",
+        ok=not changed,
+        measured=MESH_CHANGED if changed else "V and F as before",
+        allowed="mesh.V and mesh.F have the same bits after the call",
+        remedy="work on copies: V = mesh.V.copy().",
+    )
+
+
+def tells_its_energy(mapped: Mapped) -> Finding:
+    """Is what it reports of its iterations plausible, and its last energy that of the map?"""
+    outcome = mapped.outcome
+    history, iterations = outcome.energy_history, outcome.iterations or 0
+    energy, area = (outcome.metrics[name] or 0.0 for name in ("conformal_energy", "image_area"))
+    other = outcome.extras.get("energy_of")
+    off = abs(history[-1] - energy) / abs(area) if history else 0.0
+    wrong = ""
+    if iterations < 0:
+        wrong = f"{iterations} iterations"
+    elif history and len(history) != iterations + 1:
+        wrong = f"{len(history)} energies of {iterations} iterations"
+    elif history and not np.isfinite(history).all():
+        wrong = "energies that are NaN or infinite"
+    elif history and not other and not off <= SAME_ENERGY:
+        wrong = f"the last energy is {history[-1]:.6g}, but E_C of the map is {energy:.6g}"
+    right = f"{iterations} iterations, last energy off E_C by {off:.1e} of the area"
+    if not history:
+        right = f"{iterations} iterations, no energies"
+    elif other:
+        right = f"{iterations} iterations; energies are of another kind: {other}"
+    return Finding(
+        stage="contract",
+        name="energy history",
+        ok=not wrong,
+        measured=wrong or right,
+        allowed=f"empty, or E_C of the start and of each iteration, the last within "
+        f"{SAME_ENERGY:g} of the area",
+        remedy="report E_C (Eq. 7) of the map that is returned; leave the history empty for a "
+        'direct method, or say in extras["energy_of"] which other energy it is.',
+    )
+
+
+def is_repeatable(first: Mapped, second: Mapped) -> Finding:
+    """Does the same call in another process give the same bits?"""
+    same = first.outcome.uv_hash == second.outcome.uv_hash
+    apart = math.inf
+    if first.uv is not None and second.uv is not None:
+        apart = float(np.abs(first.uv - second.uv).max())
+    return Finding(
+        stage="contract",
+        name="repeatable",
+        ok=same,
+        measured="the same bits twice" if same else f"two calls differ by up to {apart:.2g}",
+        allowed="the same mesh and parameters give the same bits, in every process",
+        remedy="give random numbers a seed (np.random.default_rng(0)); iterate over no set.",
+    )
+
+
+def copes(mapped: list[Mapped]) -> Finding:
+    """On meshes out of the ordinary: a map, or a cause?"""
+    bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
+    said = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
+    without = [m.mesh.name for m in mapped if m.outcome.gave_up]
+    right = f"{len(mapped) - len(without)} of {len(mapped)} mapped"
+    if without:
+        right += f", gave up on {', '.join(without)} with a cause"
+    return Finding(
+        stage="contract",
+        name="awkward meshes",
+        ok=not bad,
+        measured="; ".join(said) or right,
+        allowed="a finite map, or AlgorithmFailed with the cause, on any mesh of its type",
+        remedy="raise cembench.AlgorithmFailed where the method does not apply.",
+    )

@@ -1,0 +1,294 @@
+"""Are the maps right: valid, conformal in the limit, and independent of what must not matter?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cembench.metrics import all_metrics, boundary_circularity, flipped_triangles, image_area
+from cembench.registry import Algorithm, Registry
+from cembench.running.measure import CIRCLE_TOLERANCE, CIRCULAR
+from cembench.validation import surfaces
+from cembench.validation.alignment import distance
+from cembench.validation.finding import Finding
+from cembench.validation.solver import Complex, Mapped, Solver
+
+#: How far figures may move, relatively, and maps, when the same surface is given another way.
+SAME_FIGURES = 1e-6
+#: How far a map may move when factors are not kept.
+SAME_MAP = 1e-9
+#: Least order of E_C and of the mean angle error in the size h of the triangles. Linear elements
+#: promise 2 and 1.
+ENERGY_ORDER, ANGLE_ORDER = 1.5, 0.75
+#: Below this, relative to the area and in degrees, an error has no order: it is rounding.
+ENERGY_ROUNDING, ANGLE_ROUNDING = 1e-12, 1e-6
+#: How far from the exact map, relative to its radius, on the finest triangulation.
+POSITION_ERROR = 0.01
+
+_INVARIANT = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg", "dilatation_mean")
+
+
+@dataclass(frozen=True)
+class Series:
+    """The maps of one surface, from coarse to fine."""
+
+    surface: surfaces.Refined
+    maps: tuple[Mapped, ...]
+
+    @property
+    def order_scale(self) -> list[float]:
+        """Relative sizes h of the triangles."""
+        return [float(m.mesh.m) ** -0.5 for m in self.maps]
+
+
+def examine_correctness(solver: Solver, registry: Registry) -> list[Finding]:
+    """The findings; where a surface has no map at all, only that is told."""
+    kind = surfaces.kind_of(solver.algorithm)
+    series = [
+        Series(refined, tuple(solver.map(mesh) for mesh in refined.meshes))
+        for refined in surfaces.refined(registry, kind)
+    ]
+    uneven = solver.map(surfaces.uneven(registry, kind))
+    maps = [*(m for one in series for m in one.maps), uneven]
+    findings = [maps_known_surfaces(maps)]
+    if not findings[0].ok:
+        return findings
+    findings += [keeps_orientation(maps), *boundary_findings(solver.algorithm, maps), folds(maps)]
+    findings += list(_invariances(solver, uneven))
+    for one in series:
+        findings += [energy_vanishes(one), angles_improve(one)]
+        if one.surface.exact_map is not None and solver.algorithm.target != "free boundary":
+            findings.append(reaches_the_exact_map(one))
+    return findings
+
+
+def maps_known_surfaces(maps: Sequence[Mapped]) -> Finding:
+    """Is there a map of each of the closed-form surfaces?"""
+    bad = [f"{_named(m)}: {m.outcome.status}: {m.outcome.cause}" for m in maps if m.uv is None]
+    return Finding(
+        stage="correctness",
+        name="maps known surfaces",
+        ok=not bad,
+        measured="; ".join(bad) or f"all {len(maps)}",
+        allowed="a finite map of every closed-form surface",
+        remedy="run `cembench map` on that surface and follow the cause.",
+    )
+
+
+def keeps_orientation(maps: Sequence[Mapped]) -> Finding:
+    """Are triangles that are counter-clockwise on the surface so in the plane?"""
+    mirrored = [_named(m) for m in maps if image_area(m.mesh, _uv(m)) <= 0]
+    return Finding(
+        stage="correctness",
+        name="orientation",
+        ok=not mirrored,
+        measured=f"the map is mirrored on {', '.join(mirrored)}" if mirrored else "kept",
+        allowed="positive image area: counter-clockwise triangles stay counter-clockwise",
+        remedy="return np.conj(uv), or go round the boundary as mesh.boundary does.",
+    )
+
+
+def boundary_findings(algorithm: Algorithm, maps: Sequence[Mapped]) -> Iterator[Finding]:
+    """Does the boundary lie where the target says? Nothing is asked of a free boundary."""
+    if algorithm.target == "free boundary":
+        return
+    disk = algorithm.target == "disk"
+    off = [_off_circle(m) if disk else _off_circles(m) for m in maps]
+    worst = int(np.argmax(off))
+    allowed = CIRCLE_TOLERANCE if disk else CIRCULAR
+    ok = off[worst] <= allowed
+    where = "" if ok else f", on {_named(maps[worst])}"
+    yield Finding(
+        stage="correctness",
+        name="boundary",
+        ok=ok,
+        measured=f"up to {off[worst]:.1e} off the circle{where}",
+        allowed=f"|uv| = 1 on the outer boundary{'' if disk else ', holes on circles'}, "
+        f"within {allowed:g}",
+        remedy="divide the boundary's images by their moduli before the last solve.",
+    )
+
+
+def folds(maps: Sequence[Mapped]) -> Finding:
+    """Are there folded triangles, on surfaces where there need not be any?"""
+    counts = [(flipped_triangles(m.mesh, _uv(m)), m) for m in maps]
+    bad = [f"{count} of {m.mesh.m} triangles folded on {_named(m)}" for count, m in counts if count]
+    return Finding(
+        stage="correctness",
+        name="folds",
+        ok=not bad,
+        measured="; ".join(bad[:2]) + (f" and {len(bad) - 2} more" if len(bad) > 2 else "")
+        if bad
+        else "none",
+        allowed="no triangle without positive area on a closed-form surface",
+        remedy="solve the interior harmonically for the final boundary; "
+        "cembench.geometry.folds.without_folds repairs what remains.",
+    )
+
+
+def energy_vanishes(series: Series) -> Finding:
+    """Does E_C, relative to the area, fall to zero as the triangles shrink?"""
+    energies = [_relative_energy(m) for m in series.maps]
+    order = _order(series, energies)
+    return _rate(series, "E_C", energies, order, ENERGY_ORDER, ENERGY_ROUNDING)
+
+
+def angles_improve(series: Series) -> Finding:
+    """Does the mean angle error fall as the triangles shrink?"""
+    errors = [_figure(m, "angle_error_mean_deg") for m in series.maps]
+    order = _order(series, errors)
+    return _rate(series, "angle error", errors, order, ANGLE_ORDER, ANGLE_ROUNDING)
+
+
+def _rate(
+    series: Series, what: str, errors: list[float], order: float, least: float, rounding: float
+) -> Finding:
+    shown = ", ".join(f"{error:.2g}" for error in errors)
+    return Finding(
+        stage="correctness",
+        name=f"{what} under refinement",
+        ok=order >= least or max(errors) <= rounding,
+        measured=f"on {series.surface.name} {shown}: order {order:.2f}",
+        allowed=f"it falls like h^{least:g} or faster, as that of a conformal map does "
+        f"(linear elements: {2 if what == 'E_C' else 1})",
+        remedy="the maps do not tend to a conformal one: look for noise, a tolerance that is too "
+        "coarse, or a boundary that is not the conformal one.",
+    )
+
+
+def reaches_the_exact_map(series: Series) -> Finding:
+    """How far is it from the closed-form map, after the best Moebius map?"""
+    exact = series.surface.exact_map
+    if exact is None:
+        raise ValueError(f"no closed-form map of {series.surface.name} is known")
+    errors = [distance(_uv(m), exact(m.mesh.V), moebius=True) for m in series.maps]
+    return Finding(
+        stage="correctness",
+        name="exact map",
+        ok=errors[-1] <= POSITION_ERROR,
+        measured=f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
+        f"{_order(series, errors):.2f}",
+        allowed=f"at most {POSITION_ERROR:g} of the radius on the finest triangulation, up to a "
+        "Moebius map",
+        remedy="the limit is not the conformal map of this surface: check the boundary's images.",
+    )
+
+
+def _invariances(solver: Solver, uneven: Mapped) -> Iterator[Finding]:
+    renumbered, number = surfaces.renumbered(uneven.mesh)
+    similarity = solver.algorithm.target == "free boundary"
+    again = solver.map(renumbered)
+    yield same_map(
+        "another numbering",
+        uneven,
+        again,
+        None if again.uv is None else again.uv[number],
+        moebius=not similarity,
+        remedy="let nothing hang on a vertex's number: choose start points by geometry.",
+    )
+    moved = solver.map(surfaces.moved(uneven.mesh))
+    yield same_map(
+        "rotation, shift, scale",
+        uneven,
+        moved,
+        moved.uv,
+        moebius=not similarity,
+        remedy="use lengths and angles of the surface, not its coordinates; scale tolerances.",
+    )
+    yield same_under_backslash(uneven, solver.map(uneven.mesh, solves="backslash"))
+
+
+def same_map(
+    what: str, first: Mapped, second: Mapped, uv: Complex | None, *, moebius: bool, remedy: str
+) -> Finding:
+    """Is the map the same, or are its figures, when the surface is given another way?
+
+    `uv` is the second map in the numbering of the first; equal is meant up to a Moebius map of
+    the disk, or a similarity for a free boundary.
+    """
+    measured, ok = f"{second.outcome.status}: {second.outcome.cause}", False
+    if uv is not None:
+        figures = _figures_apart(first, second)
+        apart = distance(uv, _uv(first), moebius=moebius)
+        ok = min(figures, apart) <= SAME_FIGURES
+        measured = f"figures differ by {figures:.1e}, maps by {apart:.1e}"
+    return Finding(
+        stage="correctness",
+        name=what,
+        ok=ok,
+        measured=measured,
+        allowed=f"the same figures or the same map, up to a Moebius map, within {SAME_FIGURES:g}",
+        remedy=remedy,
+    )
+
+
+def same_under_backslash(reused: Mapped, anew: Mapped) -> Finding:
+    """Is it the same map whether factors are kept or not?"""
+    apart = np.inf
+    if anew.uv is not None:
+        apart = float(np.abs(_uv(reused) - anew.uv).max())
+    measured = f"reuse and backslash differ by up to {apart:.1e}"
+    if anew.uv is None:
+        measured = f"{anew.outcome.status}: {anew.outcome.cause}"
+    return Finding(
+        stage="correctness",
+        name="both linear-algebra policies",
+        ok=apart <= SAME_MAP,
+        measured=measured,
+        allowed=f"the same map within {SAME_MAP:g} however systems are solved",
+        remedy="factor and solve only through cembench.geometry.cholesky.Cholesky, and call "
+        "update() when the matrix changes.",
+    )
+
+
+def _figures_apart(first: Mapped, second: Mapped) -> float:
+    """The largest relative difference of what neither motion, numbering nor scale changes."""
+    mine, other = all_metrics(first.mesh, _uv(first)), all_metrics(second.mesh, _uv(second))
+    apart = [
+        abs(mine[name] - other[name]) / max(abs(mine[name]), 1e-300) for name in _INVARIANT[1:]
+    ]
+    apart.append(
+        abs(
+            mine["conformal_energy"] / mine["image_area"]
+            - other["conformal_energy"] / other["image_area"]
+        )
+    )
+    apart.append(float(mine["flipped_triangles"] != other["flipped_triangles"]))
+    return float(max(apart))
+
+
+def _order(series: Series, errors: Sequence[float]) -> float:
+    """The slope of log(error) against log(h)."""
+    heights = np.log(np.maximum(errors, 1e-300))
+    return float(np.polyfit(np.log(series.order_scale), heights, 1)[0])
+
+
+def _relative_energy(mapped: Mapped) -> float:
+    return _figure(mapped, "conformal_energy") / abs(_figure(mapped, "image_area"))
+
+
+def _figure(mapped: Mapped, name: str) -> float:
+    return float(all_metrics(mapped.mesh, _uv(mapped))[name])
+
+
+def _off_circle(mapped: Mapped) -> float:
+    return float(np.abs(np.abs(_uv(mapped)[mapped.mesh.loops[0]]) - 1).max())
+
+
+def _off_circles(mapped: Mapped) -> float:
+    uv = _uv(mapped)
+    outer = max(mapped.mesh.loops, key=lambda loop: float(np.abs(uv[loop]).max()))
+    off = float(np.abs(np.abs(uv[outer]) - 1).max())
+    return max(off, boundary_circularity(mapped.mesh, uv))
+
+
+def _uv(mapped: Mapped) -> Complex:
+    if mapped.uv is None:
+        raise ValueError(f"there is no map of {mapped.mesh.name}")
+    return mapped.uv
+
+
+def _named(mapped: Mapped) -> str:
+    return f"{mapped.mesh.name} ({mapped.mesh.m:,} triangles)"

@@ -1,0 +1,250 @@
+"""A validation as a report's document: the verdict, the findings, the figures behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from cembench.records import Record
+from cembench.reporting.document import (
+    Column,
+    Gap,
+    Item,
+    Origin,
+    Report,
+    Section,
+    Table,
+    Text,
+    Value,
+    missing,
+    words,
+)
+from cembench.reporting.frame import row
+from cembench.reporting.palette import looks
+from cembench.reporting.plots import Axis, Panel, Plot, Series, write_plot
+from cembench.store import Store
+from cembench.validation.finding import Finding
+from cembench.validation.quality import Against, Pair, Sides
+from cembench.validation.scaling import Growth
+from cembench.validation.verdict import STAGES, Validation, sentence
+
+_TITLES = {
+    "contract": "Does it keep its contract?",
+    "correctness": "Are its maps right?",
+    "quality": "Is it better, is it faster?",
+    "scaling": "How do its seconds grow?",
+}
+
+
+def document_of(validation: Validation, folder: Path) -> Report:
+    """The report; records are read from the runs in the folder, and plots are drawn into it."""
+    sections = [
+        Section("verdict", "Verdict", (Text(f"{validation.title}: {sentence(validation)}."),))
+    ]
+    records: dict[str, Record] = {}
+    for stage in STAGES:
+        if stage not in validation.skipped and (folder / stage / "records").is_dir():
+            records |= {record.cell.key: record for record in Store(folder / stage).records()}
+    for stage in STAGES:
+        items = list(_items(validation, stage, folder, records))
+        sections.append(Section(stage, _TITLES[stage], tuple(items)))
+    asked = ", ".join(f"{name}={value}" for name, value in validation.parameters.items())
+    facts = (
+        ("algorithm", f"{validation.title} ({validation.algorithm})"),
+        ("maps to", validation.target),
+        ("declared in", validation.source),
+        ("parameters", asked or "none"),
+        ("environment", validation.environment),
+        ("examined in", f"{validation.seconds:.0f} s"),
+    )
+    used = {key for against in validation.against for p in against.pairs for key in p.records}
+    return Report(
+        title=f"Validation of {validation.title}",
+        command=validation.command,
+        facts=facts,
+        sections=tuple(sections),
+        records={key: row(record) for key, record in records.items() if key in used},
+    )
+
+
+def _items(
+    validation: Validation, stage: str, folder: Path, records: dict[str, Record]
+) -> Iterator[Item]:
+    for skipped, why in validation.skipped.items():
+        if skipped == stage:
+            yield Gap(_TITLES[stage], why, "" if "fault" in why else "cembench validate PLUGIN.py")
+    findings = [finding for finding in validation.findings if finding.stage == stage]
+    if findings:
+        yield _findings_table(stage, findings)
+    if stage == "quality" and validation.against:
+        yield _summary_table(validation.against)
+        for against in validation.against:
+            yield _pairs_table(against, validation.title, records)
+    if stage == "scaling" and validation.growths:
+        yield _growths_table(validation.growths)
+        yield write_plot(_growths_plot(validation.growths), folder)
+
+
+def _findings_table(stage: str, findings: Sequence[Finding]) -> Table:
+    columns = ("check", "found", "measured", "allowed")
+    return Table(
+        name=f"{stage}-findings",
+        title="Checks",
+        columns=tuple(Column(title, numeric=False) for title in columns),
+        rows=tuple(
+            (
+                words(finding.name),
+                words("ok" if finding.ok else "fault"),
+                words(finding.measured),
+                words(finding.allowed),
+            )
+            for finding in findings
+        ),
+        notes=tuple(f"{f.name}: {f.remedy}" for f in findings if not f.ok),
+    )
+
+
+def _summary_table(compared: Sequence[Against]) -> Table:
+    rows = []
+    for against in compared:
+        energy = "E_C by area" if against.relative else "E_C"
+        for what, found in ((energy, against.energy), ("mean angle error", against.angle)):
+            rows.append(_sides_row(f"{what} / {against.title}", found))
+        speed = against.speed
+        if speed is not None:
+            rows.append(
+                (
+                    words(f"seconds / {against.title}"),
+                    *(missing("of the rounds, not of the surfaces") for _ in range(3)),
+                    _ratio(speed.ratio),
+                    _ratio(speed.low),
+                    _ratio(speed.high),
+                )
+            )
+    return Table(
+        name="summary",
+        title="Beside the baselines",
+        columns=(
+            Column("figure", numeric=False),
+            Column("lower", "surfaces"),
+            Column("equal", "surfaces"),
+            Column("higher", "surfaces"),
+            Column("median ratio"),
+            Column("low", "95 % interval"),
+            Column("high", "95 % interval"),
+        ),
+        rows=tuple(rows),
+        caption="Ratios of this algorithm's figure to the baseline's: below 1 is better. Equal "
+        "means within 1 %. The interval of E_C and angles is over the surfaces, that of the "
+        "seconds over the rounds.",
+    )
+
+
+def _sides_row(what: str, found: Sides) -> tuple[Value, ...]:
+    counts = (found.lower, found.equal, found.higher)
+    return (
+        words(what),
+        *(Value(str(count), count, "derived") for count in counts),
+        _ratio(found.ratio),
+        _ratio(found.low),
+        _ratio(found.high),
+    )
+
+
+def _ratio(value: float | None) -> Value:
+    if value is None:
+        return missing("too few surfaces or rounds")
+    return Value(f"{value:.3f}", value, "derived")
+
+
+def _pairs_table(against: Against, title: str, records: dict[str, Record]) -> Table:
+    groups = (("E_C by area" if against.relative else "E_C"), "mean angle error, °", "seconds")
+    columns = [Column("surface", numeric=False), Column("faces")]
+    for group in groups:
+        columns += [Column(title, group), Column(against.title, group), Column("ratio", group)]
+    return Table(
+        name=f"against-{against.baseline}",
+        title=f"{title} and {against.title}, surface by surface",
+        columns=tuple(columns),
+        rows=tuple(_pair_row(pair, records) for pair in against.pairs),
+        notes=("a dash stands where there is no valid map, or no positive figure to divide by",),
+    )
+
+
+def _pair_row(pair: Pair, records: dict[str, Record]) -> tuple[Value, ...]:
+    ours, theirs = pair.records
+    known = records.get(ours)
+    origin: Origin = known.mesh.origin if known else "surface"
+
+    def both(mine: float | None, other: float | None, form: str) -> tuple[Value, ...]:
+        return (_measured(mine, form, origin, ours), _measured(other, form, origin, theirs))
+
+    return (
+        words(pair.surface),
+        Value(f"{pair.faces:,}", pair.faces),
+        *both(pair.energy, pair.baseline_energy, ".6f"),
+        _ratio(quotient(pair.energy, pair.baseline_energy)),
+        *both(pair.angle, pair.baseline_angle, ".3f"),
+        _ratio(quotient(pair.angle, pair.baseline_angle)),
+        *both(pair.seconds, pair.baseline_seconds, ".4f"),
+        _ratio(pair.seconds_ratio),
+    )
+
+
+def _measured(value: float | None, form: str, origin: Origin, record: str) -> Value:
+    if value is None:
+        return missing("no valid map")
+    return Value(format(value, form), value, origin, record)
+
+
+def quotient(ours: float | None, theirs: float | None) -> float | None:
+    """Ours over theirs; None where one is not there, or theirs is no positive figure."""
+    return None if ours is None or theirs is None or theirs <= 0 else ours / theirs
+
+
+def _growths_table(growths: Sequence[Growth]) -> Table:
+    sizes = dict.fromkeys(faces for growth in growths for faces in growth.faces)
+    rows = []
+    for growth in growths:
+        at = dict(zip(growth.faces, growth.seconds, strict=True))
+        cells = [
+            Value(f"{at[f]:.4f}", at[f], "surface") if f in at else missing("not timed")
+            for f in sizes
+        ]
+        exponents = (growth.exponent, growth.low, growth.high)
+        rows.append(
+            (
+                words(growth.what),
+                *cells,
+                *(Value(f"{value:.2f}", value, "derived") for value in exponents),
+            )
+        )
+    return Table(
+        name="growth",
+        title="Seconds by number of triangles",
+        columns=(
+            Column("what", numeric=False),
+            *(Column(f"{faces:,}", "faces") for faces in sizes),
+            Column("exponent"),
+            Column("smallest", "of the rounds"),
+            Column("largest", "of the rounds"),
+        ),
+        rows=tuple(rows),
+        caption="Exponent: slope of log(seconds) against log(faces), by least squares.",
+    )
+
+
+def _growths_plot(growths: Sequence[Growth]) -> Plot:
+    styles = looks([growth.what for growth in growths])
+    series = tuple(
+        Series(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])
+        for growth in growths
+    )
+    axes = Axis("triangles", log=True), Axis("seconds", log=True)
+    return Plot(
+        "growth-plot",
+        "Seconds against triangles",
+        (Panel(*axes, series),),
+        "Medians of the rounds, on logarithmic axes.",
+        "Lines that rise from left to right, one for each of the table's rows.",
+    )

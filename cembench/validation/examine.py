@@ -1,0 +1,234 @@
+"""The whole examination: four stages, each reached only if the ones before found no fault."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from cembench.errors import ParameterError
+from cembench.geometry.mesh import TriangleMesh
+from cembench.records import DEFAULT_ROUNDS, Record
+from cembench.registry import Algorithm, Registry
+from cembench.running.environment import describe_environment
+from cembench.running.local import Options, Watcher, run_tasks
+from cembench.running.plan import How, Standing, plan_cells
+from cembench.store import Store
+from cembench.validation import surfaces
+from cembench.validation.contract import examine_contract
+from cembench.validation.correctness import examine_correctness
+from cembench.validation.finding import Finding, Stage
+from cembench.validation.quality import (
+    comparison_with,
+    folds_on,
+    quality_findings,
+    without_map,
+)
+from cembench.validation.scaling import growths, scales, sizes
+from cembench.validation.solver import Solver
+from cembench.validation.verdict import Requirement, Validation, unmet
+
+#: Rounds of the scaling stage: an exponent is fitted to each.
+SCALING_ROUNDS = 2
+#: With what a solver is compared unless the user says otherwise.
+_USUAL_BASELINE = {"disk": "cem", "free boundary": "lscm", "circular holes": "koebe-cem"}
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What the user asked for."""
+
+    #: None: the usual one of the target.
+    against: Sequence[str] | None = None
+    #: What is compared on; empty: the usual six.
+    meshes: Sequence[TriangleMesh] = ()
+    standing: Mapping[str, Standing] = field(default_factory=dict)
+    faces: int = 5000
+    rounds: int = DEFAULT_ROUNDS
+    #: Triangles of the largest mesh of the scaling stage; 0: no such stage.
+    up_to: int = 30_000
+    require: Sequence[Requirement] = ()
+    #: Only the first two stages: no comparison, no timing.
+    checks_only: bool = False
+    options: Options = field(default_factory=Options)
+    command: str = ""
+
+
+@dataclass(frozen=True)
+class Telling:
+    """What hears how the examination goes on."""
+
+    stage: Callable[[str], None] = lambda _: None
+    watcher: Callable[[int], AbstractContextManager[Watcher]] = lambda _: nullcontext(Watcher())
+
+
+def examine(
+    solver: Solver, registry: Registry, folder: Path, asked: Asked, telling: Telling | None = None
+) -> Validation:
+    """Examine one algorithm; the runs that were timed are left in the folder.
+
+    Raises
+    ------
+    CembenchError
+        An unknown baseline or surface, or a surface that the algorithm does not take: before
+        anything is timed.
+
+    """
+    started = monotonic()
+    algorithm = solver.algorithm
+    if asked.up_to:
+        sizes(asked.up_to)  # complains now of what could not be fitted later
+    work = _Work(
+        solver,
+        registry,
+        folder,
+        asked,
+        telling or Telling(),
+        baselines(algorithm, registry, asked.against),
+    )
+    findings: list[Finding] = []
+    skipped: dict[Stage, str] = {}
+    parts: dict[str, Any] = {}
+    for stage, examined in _STAGES.items():
+        fault = next((finding.stage for finding in findings if not finding.ok), None)
+        if not _is_asked(stage, asked):
+            skipped[stage] = "not asked for"
+        elif fault is not None:
+            skipped[stage] = f"not examined, because of a fault in {fault}"
+        else:
+            work.telling.stage(stage)
+            found, figures = examined(work)
+            findings += found
+            parts |= figures
+    validation = Validation(
+        algorithm=algorithm.name,
+        title=algorithm.title,
+        target=algorithm.target,
+        source=solver.plugins[0] if solver.plugins else algorithm.origin,
+        parameters=algorithm.arguments(solver.parameters),
+        command=asked.command,
+        environment=describe_environment()["id"],
+        findings=tuple(findings),
+        skipped=skipped,
+        seconds=monotonic() - started,
+        **parts,
+    )
+    if not validation.valid:
+        return validation
+    return validation.model_copy(update={"unmet": unmet(asked.require, validation)})
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What every stage gets."""
+
+    solver: Solver
+    registry: Registry
+    folder: Path
+    asked: Asked
+    telling: Telling
+    baselines: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return self.solver.algorithm.name
+
+    @property
+    def kind(self) -> type[TriangleMesh]:
+        return surfaces.kind_of(self.solver.algorithm)
+
+    def measured(
+        self, stage: Stage, meshes: Sequence[TriangleMesh], beside: Sequence[str], rounds: int
+    ) -> list[Record]:
+        """Side by side, in one sitting: what the folder holds from before is not taken."""
+        chosen = [self.solver.algorithm, *(self.registry.algorithm(name) for name in beside)]
+        given = {f"{self.name}.{key}": value for key, value in self.solver.parameters.items()}
+        how = How(repeats=rounds)
+        plan = (how, self.solver.plugins, self.asked.standing)
+        tasks = plan_cells(chosen, meshes, given, *plan)
+        options = replace(self.asked.options, fresh=True)
+        with self.telling.watcher(len(tasks)) as watcher:
+            return run_tasks(tasks, Store(self.folder / stage), options, watcher)
+
+
+_Found = tuple[list[Finding], dict[str, Any]]
+
+
+def _contract(work: _Work) -> _Found:
+    return examine_contract(work.solver, work.registry), {}
+
+
+def _correctness(work: _Work) -> _Found:
+    return examine_correctness(work.solver, work.registry), {}
+
+
+def _quality(work: _Work) -> _Found:
+    meshes = list(work.asked.meshes)
+    meshes = meshes or surfaces.compared(work.registry, work.kind, work.asked.faces)
+    records = work.measured("quality", meshes, work.baselines, work.asked.rounds)
+    ours = [record for record in records if record.cell.algorithm == work.name]
+    return quality_findings(ours), {
+        "surfaces": tuple(mesh.name for mesh in meshes),
+        "folds_on": tuple(folds_on(ours)),
+        "no_map_on": without_map(ours),
+        "against": tuple(comparison_with(records, work.name, name) for name in work.baselines),
+    }
+
+
+def _scaling(work: _Work) -> _Found:
+    meshes = surfaces.growing(work.registry, work.kind, sizes(work.asked.up_to))
+    beside = work.baselines[:1]
+    records = work.measured("scaling", meshes, beside, SCALING_ROUNDS)
+    found = growths(records, work.name, beside[0] if beside else None)
+    ours = next((growth for growth in found if growth.what == work.name), None)
+    others = [growth for growth in found if growth is not ours]
+    return [scales(ours, others)], {"growths": tuple(found)}
+
+
+_STAGES: dict[Stage, Callable[[_Work], _Found]] = {
+    "contract": _contract,
+    "correctness": _correctness,
+    "quality": _quality,
+    "scaling": _scaling,
+}
+
+
+def _is_asked(stage: Stage, asked: Asked) -> bool:
+    if stage in ("contract", "correctness"):
+        return True
+    return not asked.checks_only and (stage == "quality" or asked.up_to > 0)
+
+
+def baselines(
+    algorithm: Algorithm, registry: Registry, asked: Sequence[str] | None
+) -> tuple[str, ...]:
+    """With which algorithms is it compared? With the usual one of its target, if there is one.
+
+    Raises
+    ------
+    RegistryError
+        An unknown name.
+    ParameterError
+        One that takes other surfaces, or the algorithm itself.
+
+    """
+    if asked is None:
+        usual = _USUAL_BASELINE[algorithm.target]
+        return (usual,) if usual in registry.algorithms and usual != algorithm.name else ()
+    kind = surfaces.kind_of(algorithm)
+    for name in asked:
+        other = registry.algorithm(name)
+        if name == algorithm.name or not issubclass(kind, other.mesh_type):
+            fits = ", ".join(
+                a.name
+                for a in registry.algorithms.values()
+                if issubclass(kind, a.mesh_type) and a.name != algorithm.name
+            )
+            raise ParameterError(
+                f"--against {name}: {algorithm.name} cannot be compared with it; those that take "
+                f"a {kind.__name__} are: {fits or 'none'}."
+            )
+    return tuple(dict.fromkeys(asked))

@@ -1,0 +1,252 @@
+"""Is it better than a baseline, and is it faster? Paired by surface, and by round for the seconds.
+
+Quality: the ratio of a figure on each surface that both map validly. A surface counts as lower or
+higher where the ratio is more than 1 % off 1; the median ratio has the order interval of
+:mod:`cembench.intervals` over the surfaces, none for fewer than six.
+
+Speed: a round's figure is the median over the surfaces of the ratio of both algorithms' seconds in
+that round; the interval is over the rounds, so it tells how sure the figure is on these surfaces,
+not how it would be on others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import exp, log
+from statistics import median
+
+from pydantic import BaseModel, ConfigDict
+
+from cembench.comparison import Verdict as SpeedVerdict
+from cembench.comparison import compare, compare_ratios, paired_ratios
+from cembench.intervals import median_interval
+from cembench.records import Record
+from cembench.running.measure import MESH_CHANGED
+from cembench.validation.finding import Finding
+
+#: Ratios this near to 1 are ties.
+TIE = 0.01
+#: Energies below this share of the image's area are rounding, and equal.
+_NO_ENERGY = 1e-9
+
+
+class Sides(BaseModel):
+    """On how many surfaces is a figure lower, equal within 1 %, or higher than the baseline's?"""
+
+    model_config = ConfigDict(frozen=True)
+
+    lower: int
+    equal: int
+    higher: int
+    #: Median over the surfaces of ours over theirs, and where it lies with 95 %.
+    ratio: float | None
+    low: float | None
+    high: float | None
+
+    @property
+    def surfaces(self) -> int:
+        """How many pairs there were."""
+        return self.lower + self.equal + self.higher
+
+
+class Speed(BaseModel):
+    """Our seconds over the baseline's, and the verdict of the interval over the rounds."""
+
+    model_config = ConfigDict(frozen=True)
+
+    ratio: float
+    low: float | None
+    high: float | None
+    verdict: SpeedVerdict
+    rounds: int
+
+
+class Pair(BaseModel):
+    """One surface: our figures and the baseline's; None where there is no valid map."""
+
+    model_config = ConfigDict(frozen=True)
+
+    surface: str
+    faces: int
+    energy: float | None
+    baseline_energy: float | None
+    angle: float | None
+    baseline_angle: float | None
+    seconds: float | None
+    baseline_seconds: float | None
+    seconds_ratio: float | None
+    speed: SpeedVerdict | None
+    #: Keys of our record and of the baseline's.
+    records: tuple[str, str]
+
+
+class Against(BaseModel):
+    """The comparison with one baseline."""
+
+    model_config = ConfigDict(frozen=True)
+
+    baseline: str
+    title: str
+    #: Targets differ, so energies were divided by the area of the image.
+    relative: bool
+    pairs: tuple[Pair, ...]
+    energy: Sides
+    angle: Sides
+    #: None where no round timed both.
+    speed: Speed | None
+
+
+def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Against:
+    """All records of a run, of which those of two algorithms are compared.
+
+    Raises
+    ------
+    ValueError
+        There is no record of one of them.
+
+    """
+    mine = {r.cell.mesh: r for r in records if r.cell.algorithm == ours}
+    theirs = {r.cell.mesh: r for r in records if r.cell.algorithm == baseline}
+    names = [name for name in mine if name in theirs]
+    if not names:
+        raise ValueError(f"no surface has records of both {ours!r} and {baseline!r}")
+    relative = next(iter(mine.values())).target != next(iter(theirs.values())).target
+    pairs = tuple(_pair(mine[name], theirs[name], relative=relative) for name in names)
+    return Against(
+        baseline=baseline,
+        title=theirs[names[0]].title,
+        relative=relative,
+        pairs=pairs,
+        energy=sides(
+            [
+                _energy_ratio(p.energy, p.baseline_energy)
+                for p in pairs
+                if p.energy is not None and p.baseline_energy is not None
+            ]
+        ),
+        angle=sides([p.angle / p.baseline_angle for p in pairs if p.angle and p.baseline_angle]),
+        speed=speed_of([(mine[name], theirs[name]) for name in names]),
+    )
+
+
+def sides(ratios: Sequence[float]) -> Sides:
+    """What do the ratios of the surfaces, ours over theirs, say?"""
+    interval = median_interval(ratios)
+    return Sides(
+        lower=sum(ratio < 1 - TIE for ratio in ratios),
+        equal=sum(1 - TIE <= ratio <= 1 + TIE for ratio in ratios),
+        higher=sum(ratio > 1 + TIE for ratio in ratios),
+        ratio=_median_ratio(ratios) if ratios else None,
+        low=interval.low if interval else None,
+        high=interval.high if interval else None,
+    )
+
+
+def speed_of(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
+    """How do our seconds compare, over all surfaces that both were timed on?"""
+    by_surface = [paired_ratios(ours, theirs) for ours, theirs in pairs]
+    by_surface = [ratios for ratios in by_surface if ratios]
+    by_round = [_median_ratio(ratios) for ratios in zip(*by_surface, strict=False)]
+    if not by_round:
+        return None
+    found = compare_ratios(by_round)
+    low, high = (found.interval.low, found.interval.high) if found.interval else (None, None)
+    return Speed(ratio=found.ratio, low=low, high=high, verdict=found.verdict, rounds=len(by_round))
+
+
+def folds_on(records: Sequence[Record]) -> list[str]:
+    """Surfaces on which there is a map whose only fault is folded triangles."""
+    return [r.cell.mesh for r in records if _only_folds(r)]
+
+
+def without_map(records: Sequence[Record]) -> dict[str, str]:
+    """Surfaces on which the algorithm gave up or met a limit, with the cause."""
+    return {r.cell.mesh: r.outcome.cause or "" for r in records if _has_none(r)}
+
+
+def quality_findings(records: Sequence[Record]) -> list[Finding]:
+    """Is every outcome a map, a map with folds, or an honest refusal? The candidate's records."""
+    bad = [
+        f"{r.cell.mesh}: {r.outcome.status}: {r.outcome.cause}"
+        for r in records
+        if r.outcome.status != "ok" and not _only_folds(r) and not _has_none(r)
+    ]
+    none = len(without_map(records)) == len(records)
+    changing = [
+        r.cell.mesh for r in records if any("not deterministic" in n for n in r.outcome.notes)
+    ]
+    return [
+        Finding(
+            stage="quality",
+            name="every surface",
+            ok=not bad and not none,
+            measured="; ".join(bad)
+            or (
+                f"no map on any of {len(records)} surfaces" if none else "a map or a cause on each"
+            ),
+            allowed="a map with its boundary and orientation right, or AlgorithmFailed with a "
+            "cause; folds are counted",
+            remedy="run `cembench map` on that surface and follow the cause.",
+        ),
+        Finding(
+            stage="quality",
+            name="repeatable in every round",
+            ok=not changing,
+            measured=f"other bits in a later call on {', '.join(changing)}"
+            if changing
+            else "the same bits in every round",
+            allowed="the same bits in every process, and in the second call of a process",
+            remedy="keep nothing from one call to the next.",
+        ),
+    ]
+
+
+def _pair(ours: Record, theirs: Record, *, relative: bool) -> Pair:
+    found = compare(ours, theirs)
+    return Pair(
+        surface=ours.cell.mesh,
+        faces=ours.mesh.faces,
+        energy=_energy(ours, relative=relative),
+        baseline_energy=_energy(theirs, relative=relative),
+        angle=_valid(ours).get("angle_error_mean_deg"),
+        baseline_angle=_valid(theirs).get("angle_error_mean_deg"),
+        seconds=ours.outcome.median_seconds if ours.outcome.status == "ok" else None,
+        baseline_seconds=theirs.outcome.median_seconds if theirs.outcome.status == "ok" else None,
+        seconds_ratio=found.ratio if found else None,
+        speed=found.verdict if found else None,
+        records=(ours.cell.key, theirs.cell.key),
+    )
+
+
+def _valid(record: Record) -> Mapping[str, float | int | None]:
+    return record.outcome.metrics if record.outcome.status == "ok" else {}
+
+
+def _energy(record: Record, *, relative: bool) -> float | None:
+    energy, area = (_valid(record).get(name) for name in ("conformal_energy", "image_area"))
+    if energy is None or not area:
+        return None
+    return energy / area if relative else energy
+
+
+def _energy_ratio(ours: float, theirs: float) -> float:
+    return max(ours, _NO_ENERGY) / max(theirs, _NO_ENERGY)
+
+
+def _median_ratio(ratios: Sequence[float]) -> float:
+    return exp(median(map(log, ratios)))
+
+
+def _only_folds(record: Record) -> bool:
+    """Is there nothing wrong with the map but folds? The harness names a boundary first."""
+    cause, folded = record.outcome.cause or "", record.outcome.metrics.get("flipped_triangles")
+    told = f"{folded} of {record.mesh.faces} triangles are folded"
+    return (
+        record.outcome.status == "invalid"
+        and cause.startswith(told)
+        and (MESH_CHANGED not in cause)
+    )
+
+
+def _has_none(record: Record) -> bool:
+    return record.outcome.status in ("timeout", "out_of_memory") or record.outcome.gave_up

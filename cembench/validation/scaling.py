@@ -1,0 +1,121 @@
+"""How do the seconds grow with the number of triangles?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydantic import BaseModel, ConfigDict
+
+from cembench.errors import ParameterError
+from cembench.estimate import fit_power_law
+from cembench.records import Record
+from cembench.validation.finding import Finding
+
+#: The largest exponent that is allowed. Factoring the Laplacian of a planar mesh costs faces^1.5
+#: in theory; 0.2 are for the clock.
+MOST_EXPONENT = 1.7
+#: The fewest triangles of the largest mesh.
+LEAST_UP_TO = 900
+#: Phase whose growth is shown beside.
+_FACTORISATION = "factorisation"
+
+
+class Growth(BaseModel):
+    """Seconds against triangles, and the exponent that fits them.
+
+    Each round has an exponent of its own; `exponent` is the fit to the medians, `low` and `high`
+    the smallest and largest of the rounds.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    what: str
+    faces: tuple[int, ...]
+    seconds: tuple[float, ...]
+    exponent: float
+    low: float
+    high: float
+
+
+def sizes(up_to: int) -> tuple[int, ...]:
+    """The numbers of triangles: three, each three times the one before.
+
+    Raises
+    ------
+    ParameterError
+        So few that the start of a call outweighs them.
+
+    """
+    if up_to < LEAST_UP_TO:
+        raise ParameterError(
+            f"--up-to {up_to} is too few to fit an exponent; allowed are {LEAST_UP_TO:,} triangles "
+            "and more, or 0 to leave that stage out."
+        )
+    return up_to // 9, up_to // 3, up_to
+
+
+def growth(what: str, faces: Sequence[int], rounds: Sequence[Sequence[float]]) -> Growth:
+    """Which exponent fits? `rounds` holds the seconds of each round, in the order of the sizes.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two sizes, or no round.
+
+    """
+    if len(faces) < 2 or not rounds:
+        raise ValueError("an exponent needs two sizes and a round")
+    middle = [sorted(size)[(len(size) - 1) // 2] for size in zip(*rounds, strict=True)]
+    exponents = [_exponent(faces, seconds) for seconds in rounds]
+    return Growth(
+        what=what,
+        faces=tuple(faces),
+        seconds=tuple(middle),
+        exponent=_exponent(faces, middle),
+        low=min(exponents),
+        high=max(exponents),
+    )
+
+
+def growths(records: Sequence[Record], ours: str, baseline: str | None) -> list[Growth]:
+    """That of our seconds, of the baseline's, and of its factorisation; as far as there are any."""
+    found = []
+    for name in (ours, baseline):
+        timed = [r for r in records if r.cell.algorithm == name and r.outcome.rounds]
+        timed = sorted((r for r in timed if r.outcome.status == "ok"), key=lambda r: r.mesh.faces)
+        if len(timed) < 2:
+            continue
+        faces = [r.mesh.faces for r in timed]
+        rounds = list(zip(*(r.outcome.seconds for r in timed), strict=True))
+        found.append(growth(timed[0].cell.algorithm, faces, rounds))
+        factored = [
+            tuple(k.phases.get(_FACTORISATION, 0.0) for k in r.outcome.rounds) for r in timed
+        ]
+        if name != ours and all(seconds > 0 for row in factored for seconds in row):
+            what = f"{name}'s {_FACTORISATION}"
+            found.append(growth(what, faces, list(zip(*factored, strict=True))))
+    return found
+
+
+def scales(ours: Growth | None, others: Sequence[Growth]) -> Finding:
+    """Is our exponent one that a solver of sparse systems may have? None: too few timed sizes.
+
+    Judged is the smallest exponent of the rounds: a disturbance in one of them is no fault.
+    """
+    beside = ", ".join(f"{other.what} {other.exponent:.2f}" for other in others)
+    measured = "it could not be timed on two sizes"
+    if ours is not None:
+        measured = f"seconds grow like faces^{ours.exponent:.2f}" + (beside and f" ({beside})")
+    return Finding(
+        stage="scaling",
+        name="growth of the seconds",
+        ok=ours is not None and ours.low <= MOST_EXPONENT,
+        measured=measured,
+        allowed=f"an exponent of {MOST_EXPONENT:g} at most; factoring a planar Laplacian has 1.5",
+        remedy="look for a loop over vertices within a loop over vertices, for dense matrices, "
+        "and for iterations whose number grows with the mesh.",
+    )
+
+
+def _exponent(faces: Sequence[int], seconds: Sequence[float]) -> float:
+    return fit_power_law([(float(f), s) for f, s in zip(faces, seconds, strict=True)]).exponent

@@ -1,0 +1,98 @@
+"""The algorithm that is examined, and how it is called: always in a process of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.errors import RegistryError
+from cembench.geometry.mesh import TriangleMesh
+from cembench.records import Outcome
+from cembench.registry import Algorithm, Registry, load_registry
+from cembench.running.local import Options, map_once
+from cembench.running.plan import How, Task, plan_cells
+
+Complex = NDArray[np.complex128]
+Call = Callable[[Task], tuple[Outcome, Complex | None]]
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """One surface, what the harness says of the call, and the map if a figure can be made of it."""
+
+    mesh: TriangleMesh
+    outcome: Outcome
+    uv: Complex | None
+
+    @property
+    def is_usable(self) -> bool:
+        """Is there a map of the right shape and type, and finite?"""
+        return self.uv is not None
+
+
+def in_a_process(options: Options) -> Call:
+    """Call with these limits, in a process of its own."""
+
+    def call(task: Task) -> tuple[Outcome, Complex | None]:
+        record, uv = map_once(task, options)
+        return record.outcome, uv
+
+    return call
+
+
+@dataclass(frozen=True)
+class Solver:
+    """An algorithm with its parameters, and what calls it."""
+
+    algorithm: Algorithm
+    plugins: tuple[str, ...] = ()
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    call: Call = field(default_factory=lambda: in_a_process(Options(timeout=120.0)))
+
+    def map(self, mesh: TriangleMesh, solves: str = "reuse") -> Mapped:
+        """What comes out on this surface, with systems solved this way?"""
+        how = How(solves=solves, repeats=1)
+        (task,) = plan_cells([self.algorithm], [mesh], self.parameters, how, self.plugins)
+        return Mapped(mesh, *self.call(task))
+
+
+def load_solver(text: str) -> tuple[Algorithm, Registry, tuple[str, ...]]:
+    """Which algorithm does the user mean: ``FILE.py``, ``FILE.py:name``, or a registered name?
+
+    Returns it with the registry that it is in, and the plug-ins to load for it.
+
+    Raises
+    ------
+    RegistryError
+        There is no such file or name, the file cannot be imported, or it declares no algorithm or
+        several and none is named.
+
+    """
+    file, _, name = text.rpartition(":") if ".py:" in text else (text, "", "")
+    if not file.endswith(".py") and ":" not in file:
+        registry = load_registry()
+        if file not in registry.algorithms:
+            known = ", ".join(sorted(registry.algorithms))
+            raise RegistryError(
+                f"{file!r} is neither a Python file (FILE.py, FILE.py:name, module:name) nor a "
+                f"registered algorithm; those are: {known}."
+            )
+        return registry.algorithm(file), registry, ()
+    plugin = str(Path(file).resolve()) if file.endswith(".py") else file
+    registry = load_registry([plugin])
+    built_in = set(load_registry().algorithms)
+    declared = [a for key, a in registry.algorithms.items() if key not in built_in]
+    if name:
+        declared = [a for a in declared if a.name == name]
+    if len(declared) != 1:
+        known = ", ".join(sorted(set(registry.algorithms) - built_in)) or "none"
+        wanted = f"no algorithm {name!r}" if name else "not exactly one algorithm"
+        raise RegistryError(
+            f"{file} declares {wanted}; it declares: {known}. Name one, as in {file}:NAME."
+        )
+    return declared[0], registry, (plugin,)

@@ -1,0 +1,152 @@
+"""The surfaces that every check runs on: small, and with what is known of their maps.
+
+They are taken from the registry by name, so a check says which family it needs and no more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.registry import Algorithm, ExactMap, Registry
+
+#: Families whose map is known or whose energy tends to zero, and in how many triangles.
+_REFINED: dict[type[TriangleMesh], dict[str, tuple[int, ...]]] = {
+    DiskMesh: {"spherical-cap": (384, 1536, 6144), "hemi-ellipsoid": (384, 1536, 6144)},
+    HoledMesh: {"catenoid-ring": (384, 1536, 6144), "holed-cap": (2000, 3000, 4500)},
+}
+#: What is compared on where the user names nothing: family and parameters.
+_COMPARED: dict[type[TriangleMesh], tuple[tuple[str, dict[str, Any]], ...]] = {
+    DiskMesh: (
+        ("hemi-ellipsoid", {}),
+        ("catenoid-sheet", {}),
+        ("cylinder-sheet", {}),
+        ("cone", {}),
+        ("cowboy-hat", {}),
+        ("nefertiti", {}),
+    ),
+    HoledMesh: (
+        ("catenoid-ring", {}),
+        *(("holed-cap", {"holes": holes}) for holes in (1, 2, 3, 5, 8)),
+    ),
+}
+#: On which the growth of the seconds is measured.
+_GROWING: dict[type[TriangleMesh], str] = {DiskMesh: "hemi-ellipsoid", HoledMesh: "catenoid-ring"}
+
+
+@dataclass(frozen=True)
+class Refined:
+    """One surface in triangulations that become finer."""
+
+    name: str
+    meshes: tuple[TriangleMesh, ...]
+    exact_map: ExactMap | None
+
+
+def kind_of(algorithm: Algorithm) -> type[TriangleMesh]:
+    """Which surfaces are it tried on? One that takes any surface is tried on disks."""
+    return HoledMesh if algorithm.mesh_type is HoledMesh else DiskMesh
+
+
+def make(registry: Registry, name: str, faces: int, **parameters: Any) -> TriangleMesh:
+    """A registered surface of about so many triangles."""
+    family = registry.surface(name)
+    mesh: TriangleMesh = family.function(**family.arguments({"faces": faces} | parameters))
+    return mesh
+
+
+def uneven(registry: Registry, kind: type[TriangleMesh]) -> TriangleMesh:
+    """A surface without symmetry, so that no choice hangs on rounding or on numbering."""
+    rng = np.random.default_rng(7)
+    name = _GROWING[kind]
+    mesh = make(registry, name, 1500)
+    V = mesh.V + 0.01 * rng.standard_normal(mesh.V.shape)
+    V[:, 2] += 0.3 * V[:, 0] ** 2 + 0.1 * V[:, 1]
+    return kind.from_arrays(V, mesh.F, name=f"uneven {name}")
+
+
+def awkward(registry: Registry, kind: type[TriangleMesh]) -> list[TriangleMesh]:
+    """Surfaces that are allowed and out of the ordinary."""
+    if kind is HoledMesh:
+        return [_slanted(make(registry, "catenoid-ring", 600), kind)]
+    return [_fan(), _strip(), _slanted(make(registry, "hemi-ellipsoid", 600), kind)]
+
+
+def refined(registry: Registry, kind: type[TriangleMesh]) -> list[Refined]:
+    """The families on which errors must fall with the size of the triangles."""
+    return [
+        Refined(
+            name,
+            tuple(make(registry, name, faces) for faces in sizes),
+            registry.surface(name).exact_map,
+        )
+        for name, sizes in _REFINED[kind].items()
+    ]
+
+
+def compared(registry: Registry, kind: type[TriangleMesh], faces: int) -> list[TriangleMesh]:
+    """What quality and speed are measured on where the user names no surface."""
+    meshes = []
+    for name, parameters in _COMPARED[kind]:
+        mesh = make(registry, name, faces, **parameters)
+        suffix = "".join(f"-{value}" for value in parameters.values())
+        meshes.append(replace(mesh, name=name + suffix))
+    return meshes
+
+
+def growing(
+    registry: Registry, kind: type[TriangleMesh], sizes: tuple[int, ...]
+) -> list[TriangleMesh]:
+    """One surface in these sizes."""
+    name = _GROWING[kind]
+    meshes = [make(registry, name, faces) for faces in sizes]
+    return [replace(mesh, name=f"{name}-{mesh.m}") for mesh in meshes]
+
+
+def moved(mesh: TriangleMesh) -> TriangleMesh:
+    """The same surface turned, shifted and 40 times as large."""
+    Q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
+    Q *= np.sign(np.linalg.det(Q))
+    V = 40 * mesh.V @ Q.T + [1, -2, 3]
+    return type(mesh).from_arrays(V, mesh.F, name=f"{mesh.name}, moved")
+
+
+def renumbered(mesh: TriangleMesh) -> tuple[TriangleMesh, NDArray[np.int64]]:
+    """The same surface with vertices, triangles and corners in another order; each vertex's new
+    number.
+    """
+    rng = np.random.default_rng(4)
+    number = rng.permutation(mesh.n)
+    V = np.empty_like(mesh.V)
+    V[number] = mesh.V
+    first = rng.integers(3, size=mesh.m)
+    F = mesh.F[np.arange(mesh.m)[:, None], (first[:, None] + np.arange(3)) % 3]
+    F = number[F][rng.permutation(mesh.m)]
+    return type(mesh).from_arrays(V, F, name=f"{mesh.name}, renumbered"), number
+
+
+def _fan() -> DiskMesh:
+    """Seven triangles about the only interior vertex."""
+    angle = 2 * np.pi * np.arange(7) / 7
+    rim = np.stack([np.cos(angle), np.sin(angle), 0.2 * np.cos(2 * angle)], axis=1)
+    k = np.arange(7)
+    F = np.stack([np.full(7, 7), k, (k + 1) % 7], axis=1)
+    return DiskMesh.from_arrays(np.concatenate([rim, [[0, 0, 0.3]]]), F, name="fan")
+
+
+def _strip() -> DiskMesh:
+    """Triangles in a row, without an interior vertex."""
+    k = np.arange(6)
+    V = np.array([[j, i, 0.0] for i in range(2) for j in range(7)])
+    F = np.concatenate([np.stack([k, k + 1, k + 8], axis=1), np.stack([k, k + 8, k + 7], axis=1)])
+    return DiskMesh.from_arrays(V, F, name="strip")
+
+
+def _slanted(mesh: TriangleMesh, kind: type[TriangleMesh]) -> TriangleMesh:
+    """Sheared until many triangles are obtuse and a tenth of the edges is not Delaunay."""
+    V = mesh.V @ np.array([[1.0, 0, 0], [1.0, 1, 0], [0, 0, 1]])
+    return kind.from_arrays(V, mesh.F, name=f"slanted {mesh.name}")

@@ -1,0 +1,176 @@
+"""What came out, in a sentence that can be read aloud.
+
+The figures are data (:class:`Validation`); :func:`sentence` is the one place that words them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from typing import Any, get_args
+
+from pydantic import BaseModel, ConfigDict
+
+from cembench.validation.finding import Finding, Stage
+from cembench.validation.quality import Against, Sides, Speed
+from cembench.validation.scaling import Growth
+
+STAGES: tuple[Stage, ...] = get_args(Stage)
+
+
+class Requirement(StrEnum):
+    """What ``--require`` may ask for besides validity, of every baseline."""
+
+    faster = "faster"
+    not_slower = "not-slower"
+    better = "better"
+    not_worse = "not-worse"
+    no_folds = "no-folds"
+
+
+class Validation(BaseModel):
+    """All that was examined of one algorithm."""
+
+    model_config = ConfigDict(frozen=True)
+
+    algorithm: str
+    title: str
+    target: str
+    source: str
+    parameters: dict[str, Any]
+    command: str
+    environment: str
+    findings: tuple[Finding, ...]
+    #: Stages that were not reached, with the reason.
+    skipped: dict[Stage, str] = {}
+    surfaces: tuple[str, ...] = ()
+    folds_on: tuple[str, ...] = ()
+    #: Surfaces without a map, and why.
+    no_map_on: dict[str, str] = {}
+    against: tuple[Against, ...] = ()
+    growths: tuple[Growth, ...] = ()
+    #: Of those asked for, the requirements that are not met.
+    unmet: tuple[Requirement, ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def faults(self) -> tuple[Finding, ...]:
+        """The findings that are not ok, the first cause first."""
+        return tuple(finding for finding in self.findings if not finding.ok)
+
+    @property
+    def valid(self) -> bool:
+        """Is there no fault?"""
+        return not self.faults
+
+    @property
+    def passed(self) -> bool:
+        """Valid, and all that was required is met?"""
+        return self.valid and not self.unmet
+
+
+def unmet(asked: Sequence[Requirement], validation: Validation) -> tuple[Requirement, ...]:
+    """Which requirements are not met? Where there is no baseline, a comparison is not."""
+    return tuple(r for r in dict.fromkeys(asked) if not _meets(r, validation))
+
+
+def sentence(validation: Validation) -> str:
+    """The verdict in words."""
+    if not validation.valid:
+        return _invalid(validation.faults)
+    parts = ["valid"]
+    several = len(validation.against) > 1
+    for against in validation.against:
+        parts.append(_energy_words(against))
+        if against.speed is not None:
+            parts.append(_speed_words(against.speed, against.title, named=several))
+    if validation.folds_on:
+        parts.append(f"folds on {_surfaces(validation.folds_on)}")
+    if validation.no_map_on:
+        parts.append(f"no map of {_surfaces(tuple(validation.no_map_on))}")
+    if validation.unmet:
+        parts.append(f"required and not met: {', '.join(validation.unmet)}")
+    return "; ".join(parts)
+
+
+def _invalid(faults: Sequence[Finding]) -> str:
+    first, *others = faults
+    words = f"invalid: {first.name}: {first.measured}"
+    if others:
+        names = ", ".join(dict.fromkeys(fault.name for fault in others))
+        words += f"; also: {names}"
+    return words
+
+
+def _energy_words(against: Against) -> str:
+    found, title = against.energy, against.title
+    energy = "E_C by area" if against.relative else "E_C"
+    if not found.surfaces:
+        return f"{energy} not compared with {title}: no surface that both map"
+    if found.equal == found.surfaces:
+        words = f"{energy} equal to {title}'s within 1 % on {_all(found.surfaces)}"
+    elif found.lower >= found.higher:
+        words = f"{energy} lower than {title} on {found.lower} of {_count(found.surfaces)}"
+    else:
+        words = f"{energy} higher than {title} on {found.higher} of {_count(found.surfaces)}"
+    if 0 < found.equal < found.surfaces:
+        other = min(found.lower, found.higher)
+        side = "higher" if found.lower >= found.higher else "lower"
+        words += f", equal within 1 % on {found.equal}"
+        words += f", {side} on {other}" if other else ""
+    return f"{words} ({_ratio_words(found)})"
+
+
+def _ratio_words(found: Sides) -> str:
+    words = f"median ratio {found.ratio:.2f}"
+    if found.low is not None:
+        return f"{words}, 95 % interval {found.low:.2f}-{found.high:.2f}"
+    return f"{words}, too few surfaces for an interval"
+
+
+def _speed_words(speed: Speed, title: str, *, named: bool) -> str:
+    than = f" than {title}" if named else ""
+    if speed.low is None or speed.high is None:
+        return f"{speed.ratio:.2f} times {title}'s seconds, too few rounds for a verdict"
+    if speed.verdict == "faster":
+        sure = f"{1 / speed.high:.1f}-{1 / speed.low:.1f}"
+        return f"{1 / speed.ratio:.1f} times faster{than} ({sure})"
+    if speed.verdict == "slower":
+        return f"{speed.ratio:.1f} times slower{than} ({speed.low:.1f}-{speed.high:.1f})"
+    return (
+        f"neither faster nor slower than {title} for sure "
+        f"({speed.low:.2f}-{speed.high:.2f} times its seconds)"
+    )
+
+
+def _meets(requirement: Requirement, validation: Validation) -> bool:
+    if requirement is Requirement.no_folds:
+        return not validation.folds_on
+    return bool(validation.against) and all(
+        _meets_against(requirement, against) for against in validation.against
+    )
+
+
+def _meets_against(requirement: Requirement, against: Against) -> bool:
+    energy, speed = against.energy, against.speed
+    if requirement is Requirement.faster:
+        return speed is not None and speed.verdict == "faster"
+    if requirement is Requirement.not_slower:
+        return speed is not None and speed.verdict in ("faster", "undecided")
+    if energy.ratio is None:
+        return False
+    if requirement is Requirement.better:
+        return energy.high is not None and energy.high < 1
+    return energy.ratio <= 1 if energy.low is None else energy.low <= 1
+
+
+def _surfaces(names: Sequence[str]) -> str:
+    return f"{_count(len(names))}: {', '.join(names)}"
+
+
+def _count(number: int) -> str:
+    return f"{number} surface{'' if number == 1 else 's'}"
+
+
+def _all(number: int) -> str:
+    return "the 1 surface" if number == 1 else f"all {number} surfaces"

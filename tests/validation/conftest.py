@@ -1,0 +1,29 @@
+import gc
+
+import pytest
+
+from cembench.validation import surfaces
+
+
+@pytest.fixture(scope="package", autouse=True)
+def without_old_objects():
+    """What is loaded already need not be looked at by the collection before each measured call."""
+    gc.freeze()
+    yield
+    gc.unfreeze()
+
+
+@pytest.fixture(scope="package", autouse=True)
+def surfaces_made_once():
+    """Meshes are frozen, so that one serves all tests."""
+    made, make = {}, surfaces.make
+
+    def kept(registry, name, faces, **parameters):
+        key = (name, faces, *parameters.items())
+        if key not in made:
+            made[key] = make(registry, name, faces, **parameters)
+        return made[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(surfaces, "make", kept)
+        yield

@@ -1,0 +1,32 @@
+"""Call algorithms in the tests' own process: the same outcomes without the start of processes."""
+
+from cembench.registry import load_registry
+from cembench.running.measure import check_cell, time_cell
+from cembench.validation.solver import Solver
+
+
+def call_here(task):
+    mesh = task.mesh
+    own = type(mesh)(mesh.V.copy(), mesh.F.copy(), mesh.name, mesh.notices)
+    return check_cell(task.algorithm, own, task.cell)
+
+
+def solver_here(name, plugin=None):
+    plugins = () if plugin is None else (str(plugin),)
+    return Solver(load_registry(plugins).algorithm(name), plugins, call=call_here)
+
+
+class LauncherHere:
+    """What a run starts instead of processes."""
+
+    def __init__(self, scratch, options):
+        self.scratch, self.options = scratch, options
+
+    def close(self):
+        """There is nothing to end."""
+
+    def check(self, task):
+        return call_here(task)
+
+    def time(self, task):
+        return time_cell(task.algorithm, task.mesh, task.cell)

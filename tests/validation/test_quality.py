@@ -1,0 +1,133 @@
+import pytest
+
+from cembench.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.validation.quality import (
+    comparison_with,
+    folds_on,
+    quality_findings,
+    sides,
+    without_map,
+)
+
+
+def record(algorithm, mesh, energy=0.01, seconds=(), *, target="disk", **outcome):
+    rounds = tuple(Round(sitting="s", calls=(t,)) for t in seconds)
+    metrics = {"conformal_energy": energy, "image_area": 3.14, "angle_error_mean_deg": 1.0}
+    described = {"status": "ok", "metrics": metrics, "rounds": rounds} | outcome
+    return Record(
+        cell=Cell(algorithm=algorithm, code_hash="c", mesh=mesh, mesh_hash=mesh),
+        title=algorithm.upper(),
+        target=target,
+        mesh=MeshFacts(vertices=9, faces=8, boundary_vertices=8, non_delaunay_share=0.0),
+        outcome=Outcome(**described),
+        environment="e",
+        started_at="",
+    )
+
+
+def folded(mesh, **more):
+    metrics = {"conformal_energy": 1.0, "image_area": 3.14, "flipped_triangles": 2}
+    cause = "2 of 8 triangles are folded (25.00%)"
+    return record("ours", mesh, status="invalid", metrics=metrics, **({"cause": cause} | more))
+
+
+def test_ratios_within_one_percent_are_ties():
+    found = sides([0.5, 0.98, 0.995, 1.0, 1.009, 1.02, 3.0])
+    assert (found.lower, found.equal, found.higher, found.surfaces) == (2, 3, 2, 7)
+    assert found.ratio == pytest.approx(1.0)
+
+
+def test_an_interval_needs_six_surfaces():
+    assert sides([0.9] * 5).low is None
+    found = sides([0.7, 0.8, 0.9, 0.95, 1.0, 1.1])
+    assert (found.low, found.high) == (0.7, 1.1)
+    assert sides([]).ratio is None
+
+
+def test_pairs_are_by_surface_and_only_of_valid_maps():
+    records = [record("ours", f"s{k}", 0.008) for k in range(3)]
+    records += [record("cem", f"s{k}", 0.01) for k in range(4)]
+    records[2] = folded("s2")
+    found = comparison_with(records, "ours", "cem")
+    assert (found.energy.lower, found.energy.surfaces) == (2, 2)
+    assert found.energy.ratio == pytest.approx(0.8)
+    assert found.pairs[2].energy is None
+    assert found.pairs[2].baseline_energy == 0.01
+    assert found.speed is None
+
+
+def test_energies_that_are_rounding_are_equal():
+    records = [record("ours", "flat", 1e-16), record("cem", "flat", -3e-15)]
+    assert comparison_with(records, "ours", "cem").energy.equal == 1
+
+
+def test_energies_of_different_targets_are_divided_by_the_area():
+    records = [record("ours", "s", 0.01, target="free boundary"), record("cem", "s", 0.01)]
+    found = comparison_with(records, "ours", "cem")
+    assert found.relative
+    assert found.pairs[0].energy == pytest.approx(0.01 / 3.14)
+
+
+def test_speed_is_judged_over_rounds_paired_on_every_surface():
+    slow_rounds = [1, 1, 5, 1, 1, 1]
+    records = [record("ours", name, seconds=[0.5 * t for t in slow_rounds]) for name in "ab"]
+    records += [record("cem", name, seconds=slow_rounds) for name in "ab"]
+    found = comparison_with(records, "ours", "cem").speed
+    assert (found.ratio, found.verdict, found.rounds) == (pytest.approx(0.5), "faster", 6)
+    assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(0.5))
+
+
+def test_folds_are_counted_and_are_no_fault():
+    records = [record("ours", "a"), folded("hand")]
+    assert folds_on(records) == ["hand"]
+    assert quality_findings(records)[0].ok
+
+
+@pytest.mark.parametrize(
+    "worse",
+    [
+        {"cause": "the boundary lies off the unit circle by up to 1; 2 of 8 triangles are folded"},
+        {
+            "cause": "2 of 8 triangles are folded (25.00%); the algorithm changed the mesh it was "
+            "given"
+        },
+        {"cause": "uv is NaN or infinite at 1 vertices, the first being 0", "metrics": {}},
+        {"status": "failed", "cause": "ZeroDivisionError: x", "traceback": "t", "metrics": {}},
+        {"status": "failed", "cause": "the process was ended by signal SIGSEGV", "metrics": {}},
+    ],
+)
+def test_what_is_worse_than_a_fold_is_a_fault(worse):
+    records = [record("ours", "a"), folded("hand").model_copy()]
+    if "metrics" in worse:
+        records[1] = record("ours", "hand", **({"status": "invalid"} | worse))
+    else:
+        records[1] = folded("hand", **worse)
+    finding = quality_findings(records)[0]
+    assert not finding.ok
+    assert "hand" in finding.measured
+    assert folds_on(records) == []
+
+
+def test_a_refusal_with_a_cause_is_told_and_is_no_fault():
+    gave_up = record("ours", "maze", status="failed", cause="no map", gave_up=True, metrics={})
+    late = record("ours", "big", status="timeout", cause="not finished after 1 s", metrics={})
+    assert without_map([record("ours", "a"), gave_up, late]) == {
+        "maze": "no map",
+        "big": "not finished after 1 s",
+    }
+    assert quality_findings([record("ours", "a"), gave_up])[0].ok
+    nothing = quality_findings([gave_up])[0]
+    assert not nothing.ok
+    assert "no map on any of 1 surfaces" in nothing.measured
+
+
+def test_other_bits_in_a_later_round_are_a_fault():
+    note = "not deterministic: other bits than in the check came out in rounds 2"
+    finding = quality_findings([record("ours", "a", notes=(note,))])[1]
+    assert not finding.ok
+    assert "a" in finding.measured
+
+
+def test_nothing_in_common_is_an_error():
+    with pytest.raises(ValueError, match="no surface has records of both 'ours' and 'cem'"):
+        comparison_with([record("ours", "a"), record("cem", "b")], "ours", "cem")

@@ -1,0 +1,125 @@
+import json
+from pathlib import Path
+
+import pytest
+
+from cembench.records import Record
+from tests.validation.in_this_process import LauncherHere, call_here
+
+FILE = Path(__file__).with_name("wrong.py")
+TINY = ("--surfaces", "hemi-ellipsoid,cone", "--faces", 600, "--repeats", 2, "--up-to", 900)
+
+
+@pytest.fixture
+def here(cli, monkeypatch):
+    """The command line without processes of its own; what runs is the same."""
+    monkeypatch.setattr("cembench.validation.solver.in_a_process", lambda options: call_here)
+    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
+
+    def validate(name, *arguments):
+        return cli("validate", f"{FILE}:{name}" if name else FILE, *arguments)
+
+    validate.folder = cli.folder
+    return validate
+
+
+def test_a_right_solver_is_valid_and_its_page_is_written(here):
+    code, out, err = here("right", *TINY, "-o", "there", "--against", "cem,lscm")
+    assert code == 0
+    said = " ".join(out.split())
+    assert "Right: valid; E_C equal to CEM's within 1 % on all 2 surfaces" in said
+    assert "contract ..." in err
+    assert max(map(len, out.splitlines())) <= 80
+    page = (here.folder / "there/index.html").read_text()
+    for words in ("Validation of Right", "valid; ", "Seconds against triangles"):
+        assert words in page
+    found = json.loads((here.folder / "there/validation.json").read_text())
+    assert [a["baseline"] for a in found["against"]] == ["cem", "lscm"]
+    (record, *_) = (here.folder / "there/quality/records").glob("*.json")
+    assert Record.model_validate_json(record.read_bytes()).outcome.status == "ok"
+
+
+def test_a_wrong_one_is_invalid_and_the_stages_behind_are_not_reached(here):
+    code, out, _ = here("off-circle", "--json", *TINY)
+    found = json.loads(out)
+    assert code == 1
+    assert found["verdict"].startswith("invalid: boundary: up to 1.0e-03 off the circle")
+    assert (found["valid"], found["passed"], found["against"]) == (False, False, [])
+    assert found["skipped"].keys() == {"quality", "scaling"}
+    assert not list(here.folder.iterdir())
+
+
+def test_a_fault_is_printed_with_what_is_allowed_and_what_to_do(here):
+    code, out, _ = here("single", "--checks-only", "-o", "there")
+    assert code == 1
+    assert "BAD returns a map: invalid on uneven hemi-ellipsoid: uv is complex64" in " ".join(
+        out.split()
+    )
+    assert "allowed: " in out
+    assert "to do: " in out
+    assert "not examined, because of a fault in contract" in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "not examined" in (here.folder / "there/index.html").read_text()
+
+
+def test_folds_and_refusals_are_told_and_what_is_required_gates(here):
+    named = ("--surfaces", "hemi-ellipsoid,cone,flat-disk", *TINY[2:4], "--repeats", 1)
+    required = ("--require", "no-folds", "--require", "not-worse")
+    code, out, _ = here("folds-sometimes", *named, "--up-to", 0, *required, "--json")
+    found = json.loads(out)
+    assert found["verdict"].endswith(
+        "folds on 1 surface: flat-disk; no map of 1 surface: cone; required and not met: no-folds"
+    )
+    assert found["no_map_on"] == {"cone": "no cones"}
+    assert (found["valid"], found["passed"], code) == (True, False, 1)
+
+
+def test_what_remembers_its_calls_is_caught_in_the_rounds(here):
+    from tests.validation import wrong
+
+    wrong.calls.clear()
+    code, out, _ = here("remembers", *TINY, "--json")
+    assert code == 1
+    assert json.loads(out)["verdict"].startswith("invalid: repeatable")
+
+
+@pytest.mark.parametrize(
+    ("plugin", "arguments", "message"),
+    [
+        ("nowhere.py", (), "plug-in"),
+        ("none", (), "'none' is neither a Python file"),
+        ("", (), "declares not exactly one algorithm; it declares: backslash,"),
+        (":none", (), "declares no algorithm 'none'; it declares: backslash,"),
+        (":right", ("--against", "none"), "unknown algorithm 'none'; known: backslash,"),
+        (":right", ("--against", "koebe-cem"), "--against koebe-cem: right cannot be compared"),
+        (":right", ("--surfaces", "catenoid-ring"), "which none of the chosen algorithms takes"),
+        (":right", ("-p", "steps=2"), "no chosen algorithm has a parameter 'steps'"),
+        (":right", ("-p", "steps"), "-p 'steps' is not of the form NAME=VALUE"),
+        (":right", ("--up-to", 100), "--up-to 100 is too few"),
+        (":right", ("--require", "wonders"), "Invalid value for '--require'"),
+    ],
+)
+def test_bad_usage_is_said_before_anything_is_run(here, cli, plugin, arguments, message):
+    if plugin in ("", ":none", ":right"):
+        code, _, err = here(plugin[1:], *arguments)
+    else:
+        code, _, err = cli("validate", plugin, *arguments)
+    assert code == 2
+    assert message in err
+    assert not list(cli.folder.iterdir())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["right", "quadratic", "not-conformal", "hangs"])
+def test_in_processes_of_its_own(cli, name):
+    few = ("--surfaces", "hemi-ellipsoid", "--faces", 600, "--repeats", 1, "--timeout", 20)
+    code, out, _ = cli("validate", f"{FILE}:{name}", *few, "--json")
+    said = json.loads(out)["verdict"]
+    expected = {
+        "right": "valid; E_C equal to CEM",
+        "quadratic": "invalid: growth of the seconds: seconds grow like faces^",
+        "not-conformal": "invalid: E_C under refinement: on hemi-ellipsoid",
+        "hangs": "invalid: returns a map: timeout on uneven hemi-ellipsoid: not finished after 20",
+    }
+    assert said.startswith(expected[name])
+    assert code == (0 if name == "right" else 1)

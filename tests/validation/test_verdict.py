@@ -1,0 +1,118 @@
+import pytest
+
+from cembench.validation.finding import Finding
+from cembench.validation.quality import Against, Sides, Speed
+from cembench.validation.verdict import Requirement, Validation, sentence, unmet
+
+
+def finding(name, measured, ok):
+    return Finding(
+        stage="correctness", name=name, ok=ok, measured=measured, allowed="x", remedy="y"
+    )
+
+
+def against(title="CEM", energy=(17, 0, 3, 0.93, 0.90, 0.96), speed=(0.55, 0.53, 0.58, "faster")):
+    counts = dict(zip(("lower", "equal", "higher", "ratio", "low", "high"), energy, strict=True))
+    found = Sides(**counts)
+    timed = None
+    if speed:
+        ratio, low, high, verdict = speed
+        timed = Speed(ratio=ratio, low=low, high=high, verdict=verdict, rounds=6)
+    return Against(
+        baseline=title.lower(),
+        title=title,
+        relative=False,
+        pairs=(),
+        energy=found,
+        angle=found,
+        speed=timed,
+    )
+
+
+def validation(**parts):
+    facts = dict.fromkeys(("algorithm", "title", "target", "source", "command", "environment"), "a")
+    return Validation(**(facts | {"parameters": {}, "findings": ()} | parts))
+
+
+def test_a_reviewer_can_read_it_aloud():
+    assert sentence(validation(against=(against(),), folds_on=("hand",))) == (
+        "valid; E_C lower than CEM on 17 of 20 surfaces (median ratio 0.93, 95 % interval "
+        "0.90-0.96); 1.8 times faster (1.7-1.9); folds on 1 surface: hand"
+    )
+
+
+def test_worse_slower_and_without_a_map():
+    worse = against(energy=(1, 1, 2, 1.2, None, None), speed=(1.52, 1.41, 1.7, "slower"))
+    assert sentence(validation(against=(worse,), no_map_on={"maze": "no"})) == (
+        "valid; E_C higher than CEM on 2 of 4 surfaces, equal within 1 % on 1, lower on 1 (median "
+        "ratio 1.20, too few surfaces for an interval); 1.5 times slower (1.4-1.7); no map of 1 "
+        "surface: maze"
+    )
+
+
+def test_equal_and_undecided():
+    same = against(energy=(0, 6, 0, 1.0, 0.998, 1.001), speed=(1.01, 0.97, 1.05, "undecided"))
+    assert sentence(validation(against=(same,))) == (
+        "valid; E_C equal to CEM's within 1 % on all 6 surfaces (median ratio 1.00, 95 % interval "
+        "1.00-1.00); neither faster nor slower than CEM for sure (0.97-1.05 times its seconds)"
+    )
+
+
+def test_several_baselines_are_named():
+    said = sentence(
+        validation(against=(against(), against("FDM", speed=(2, None, None, "too few rounds"))))
+    )
+    assert "1.8 times faster than CEM (1.7-1.9)" in said
+    assert "2.00 times FDM's seconds, too few rounds for a verdict" in said
+
+
+def test_nothing_to_compare_is_said():
+    none = against(energy=(0, 0, 0, None, None, None), speed=None)
+    assert sentence(validation(against=(none,))) == (
+        "valid; E_C not compared with CEM: no surface that both map"
+    )
+
+
+def test_the_first_fault_is_told_with_its_figure_and_the_others_by_name():
+    found = (
+        finding("orientation", "kept", True),
+        finding("folds", "3 of 9 triangles folded on cap", False),
+        finding("E_C under refinement", "order 0.1", False),
+        finding("E_C under refinement", "order 0.2", False),
+    )
+    one = validation(findings=found)
+    assert sentence(one) == (
+        "invalid: folds: 3 of 9 triangles folded on cap; also: E_C under refinement"
+    )
+    assert not one.valid
+    assert not one.passed
+
+
+GOOD, EVEN = against(), against(energy=(3, 3, 3, 1.0, 0.9, 1.1), speed=(1, 0.9, 1.1, "undecided"))
+BAD = against(energy=(0, 0, 9, 1.5, 1.2, 1.9), speed=(2, 1.9, 2.1, "slower"))
+
+
+@pytest.mark.parametrize(
+    ("asked", "met"),
+    [
+        (Requirement.faster, [GOOD]),
+        (Requirement.not_slower, [GOOD, EVEN]),
+        (Requirement.better, [GOOD]),
+        (Requirement.not_worse, [GOOD, EVEN]),
+    ],
+)
+def test_requirements(asked, met):
+    for one in (GOOD, EVEN, BAD):
+        assert (unmet([asked], validation(against=(one,))) == ()) == (one in met)
+    assert unmet([asked, asked], validation(against=(GOOD, BAD))) == (asked,)
+    assert unmet([asked], validation()) == (asked,)
+
+
+def test_a_requirement_that_is_not_met_is_told():
+    assert unmet([Requirement.no_folds], validation()) == ()
+    one = validation(
+        folds_on=("hand",), unmet=unmet([Requirement.no_folds], validation(folds_on=("hand",)))
+    )
+    assert sentence(one) == "valid; folds on 1 surface: hand; required and not met: no-folds"
+    assert one.valid
+    assert not one.passed

@@ -1,0 +1,66 @@
+"""Each wrong solver is caught by the check that is meant for it."""
+
+import pytest
+
+from cembench.registry import load_registry
+from cembench.validation.contract import examine_contract
+from cembench.validation.correctness import examine_correctness
+from tests.validation.in_this_process import solver_here
+
+WRONG = "tests/validation/wrong.py"
+CAUGHT_BY = {
+    "parameters": "parameters",
+    "real": "returns a map",
+    "columns": "returns a map",
+    "single": "returns a map",
+    "writes": "mesh untouched",
+    "boasts": "energy history",
+    "miscounts": "energy history",
+    "by-chance": "repeatable",
+    "nan-sometimes": "awkward meshes",
+    "crashes-without-interior": "awkward meshes",
+    "mirrored": "orientation",
+    "off-circle": "boundary",
+    "fold": "folds",
+    "by-number": "another numbering",
+    "by-axis": "rotation, shift, scale",
+    "backslash": "both linear-algebra policies",
+    "noise": "E_C under refinement",
+    "not-conformal": "E_C under refinement",
+    "other-limit": "E_C under refinement",
+}
+
+
+def examined(name, plugin=WRONG):
+    solver = solver_here(name, plugin)
+    findings = examine_contract(solver, load_registry())
+    if all(finding.ok for finding in findings):
+        findings += examine_correctness(solver, load_registry())
+    return findings
+
+
+@pytest.mark.parametrize("name", CAUGHT_BY)
+def test_the_right_check_catches_it(name):
+    faults = [finding for finding in examined(name) if not finding.ok]
+    print([fault.name for fault in faults])
+    assert faults[0].name == CAUGHT_BY[name]
+    assert faults[0].measured
+    assert faults[0].remedy
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["lscm", *(pytest.param(name, marks=pytest.mark.slow) for name in ("fdm", "ldm", "qiem"))],
+)
+def test_the_built_in_conformal_maps_are_right(name):
+    assert [f.measured for f in examined(name, None) if not f.ok] == []
+
+
+def test_a_solver_without_a_fault_has_none():
+    assert all(finding.ok for finding in examined("right"))
+
+
+def test_holes_that_are_no_circles_are_found_and_the_maps_laid_on_the_exact_ones():
+    found = examined("harmonic-filled", None)
+    assert [finding.name for finding in found if not finding.ok] == ["boundary"]
+    assert sum(finding.name == "exact map" for finding in found) == 2
