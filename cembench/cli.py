@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from cembench import run_verbs
-from cembench.console import Json, complain, err, out, print_json, split
+from cembench import morph_verbs, run_verbs
+from cembench.console import Json, assignments, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
 from cembench.paper.profiles import Profile
 from cembench.records import DEFAULT_ROUNDS
@@ -149,7 +149,7 @@ def map_(
     with err.status("reading", spinner="line"):
         surface = read_mesh_for(mesh, [chosen])
     how = How(solves.value, _installed(backend), threads, repeats=1)
-    tasks = plan_cells([chosen], [surface], _assignments(parameter), how, plugin)
+    tasks = plan_cells([chosen], [surface], assignments(parameter), how, plugin)
     with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
         record, uv = map_once(tasks[0], options)
     ok = record.outcome.status == "ok"
@@ -265,7 +265,7 @@ def run(
     tasks = []
     for policy in policies:
         how = How(policy, _installed(backend), threads, repeats)
-        tasks += plan_cells(chosen, found, _assignments(parameter), how, plugin, standing)
+        tasks += plan_cells(chosen, found, assignments(parameter), how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
         return
@@ -344,7 +344,7 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 #: Modules whose verbs are not written in this one.
-_MORE = (run_verbs,)
+_MORE = (run_verbs, morph_verbs)
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 
@@ -450,16 +450,6 @@ def _print_notices(meshes: Sequence[TriangleMesh]) -> None:
     for mesh in meshes:
         for notice in mesh.notices:
             err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
-
-
-def _assignments(given: Sequence[str]) -> dict[str, str]:
-    pairs = {}
-    for assignment in given:
-        name, equals, value = assignment.partition("=")
-        if not equals or not name:
-            raise ParameterError(f"-p {assignment!r} is not of the form NAME=VALUE.")
-        pairs[name.strip()] = value.strip()
-    return pairs
 
 
 def _policies(given: list[str]) -> list[str]:

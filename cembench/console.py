@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Sequence
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+
+from cembench.errors import ParameterError
 
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
@@ -33,3 +36,21 @@ def warn(message: str) -> None:
 def split(names: list[str]) -> list[str]:
     """Names out of options that were repeated, or hold several with commas."""
     return [part.strip() for name in names for part in name.split(",") if part.strip()]
+
+
+def assignments(given: Sequence[str]) -> dict[str, str]:
+    """The parameters that ``-p NAME=VALUE`` sets.
+
+    Raises
+    ------
+    ParameterError
+        One that is not of that form.
+
+    """
+    pairs = {}
+    for assignment in given:
+        name, equals, value = assignment.partition("=")
+        if not equals or not name:
+            raise ParameterError(f"-p {assignment!r} is not of the form NAME=VALUE.")
+        pairs[name.strip()] = value.strip()
+    return pairs

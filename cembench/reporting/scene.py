@@ -100,7 +100,7 @@ class Scene:
         plane = image_in_window(uv)
         board = plane[:, :2] * (SQUARES / 2 / FILL)
         fineness = _fineness(F, space, board)
-        table = np.column_stack([space, plane, board, _brightness(F, space), fineness])[F]
+        table = np.column_stack([space, plane, board, brightness(F, space), fineness])[F]
         table, origin = _cut_at_whole_numbers(table)
         level = np.ceil(table[:, :, -1].mean(axis=1)).clip(0)
         table[:, :, 6:8] *= FINER ** level[:, None, None]
@@ -179,7 +179,7 @@ def _to_vertices(F: Ints, values: Real, n: int) -> Real:
     return total
 
 
-def _brightness(F: Ints, points: Real) -> Real:
+def brightness(F: Ints, points: Real) -> Real:
     """Light that wraps round the surface: no part is black, so the board stays legible."""
     normals = _normals(F, points)
     smooth = np.stack([_to_vertices(F, normals[:, k], len(points)) for k in range(3)], axis=1)
