@@ -89,7 +89,8 @@ def vertex_areas(mesh: DiskMesh) -> Real:
     """What area belongs to each vertex: a third of the triangles round it? Shape (n,)."""
     p, q, r = (mesh.V[mesh.F[:, c]] for c in range(3))
     area = np.linalg.norm(np.cross(q - p, r - p), axis=1) / 6
-    return np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
+    total = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
+    return total.astype(np.float64)
 
 
 def _portrait(mesh: DiskMesh, z: Complex) -> Real:
@@ -102,7 +103,7 @@ def _portrait(mesh: DiskMesh, z: Complex) -> Real:
     )
     log_factor = np.log(vertex_areas(mesh) / image) / 2
     at = locate(z, mesh.F, mesh.boundary, _grid())
-    found = np.asarray(at.carry(mesh.F, log_factor)).reshape(RADII, DIRECTIONS)
+    found = at.carry(mesh.F, log_factor).reshape(RADII, DIRECTIONS)
     return found - np.average(found, axis=0, weights=_radii()).mean()
 
 

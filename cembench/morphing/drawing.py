@@ -155,9 +155,9 @@ def _by_pyvista(film: Film, tell: Callable[[int], object]) -> Pictures:
             for line in process.stdout or ():
                 tell(int(line))
         if process.returncode:
-            said = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
+            said = log.read_text(errors="replace").strip().rpartition("\n")[2] or "no word"
             raise _PyvistaFailed(
-                f"pyvista ended with code {process.returncode} ({said[-1] if said else 'no word'}); "
+                f"pyvista ended with code {process.returncode} ({said}); "
                 "`cembench doctor` says what it needs"
             )
         pictures: Pictures = np.load(target)

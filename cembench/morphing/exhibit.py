@@ -47,7 +47,7 @@ def lay_down(
         f"registration-{stem}",
         "maps.png",
         registration_page(morph, tell=tell),
-        "Conformal maps, and the same after the Moebius map and the registrations: the same squares "
+        "Conformal maps, and below them the Moebius map and the registrations: now equal squares "
         "lie on the same features. Dots are landmarks, rings their targets.",
     )
     spline = "a cubic spline" if len(names) > 2 else "a straight line"

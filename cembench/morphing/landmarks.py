@@ -1,4 +1,4 @@
-"""Which vertices of several surfaces are the same place: the tip of the nose, a corner of the eye?"""
+"""Which vertices of several surfaces are one place: the tip of the nose, a corner of the eye?"""
 
 from __future__ import annotations
 
@@ -73,7 +73,8 @@ def read_landmarks(
             f"landmarks {path} cannot be read: {error}. It must be a CSV file, a row a landmark: "
             "name, vertex on the first surface, vertex on the second, ..."
         ) from None
-    names, rows = [], []
+    names: list[str] = []
+    rows: list[list[int]] = []
     for number, line in enumerate(lines, start=1):
         cells = [cell.strip() for cell in next(csv.reader([line]), [])]
         if not any(cells) or line.lstrip().startswith("#"):

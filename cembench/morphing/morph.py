@@ -136,7 +136,7 @@ def morph(
         found = register(mesh, fitted, there, z[places[:, 0]], lam=lam, reach=reach)
         tell(f"carrying {first.name} onto {mesh.name}")
         at = locate(found.uv, mesh.F, mesh.boundary, z)
-        on = np.asarray(at.carry(mesh.F, mesh.V), dtype=np.float64)
+        on = at.carry(mesh.F, mesh.V)
         moved.append(fitted)
         registrations.append(found)
         carried.append(on)

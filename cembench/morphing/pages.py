@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -90,7 +91,7 @@ def _page(
     height = top + (side + below) * len(rows) + 4
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    words = {"color": INK, "ha": "center", "va": "center", "parse_math": False}
+    words: dict[str, Any] = {"color": INK, "ha": "center", "va": "center", "parse_math": False}
     for k, head in enumerate(heads):
         x = (left + (k + 0.5) * side) / width
         figure.text(x, 1 - top / 2 / height, head, fontsize=10, weight="bold", **words)
@@ -122,7 +123,7 @@ def _page(
     return buffer.getvalue()
 
 
-_DOT = {"linestyle": "", "marker": "o"}
+_DOT: dict[str, Any] = {"linestyle": "", "marker": "o"}
 #: Of landmarks, and of the places where they should be.
 _STYLES = (
     _DOT | {"markersize": 5, "color": PLACE},

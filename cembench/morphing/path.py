@@ -20,8 +20,8 @@ def spline(surfaces: int) -> CubicSpline:
     return CubicSpline(np.linspace(0, 1, surfaces), np.eye(surfaces), bc_type="natural")
 
 
-def position(surfaces: Sequence[Real], time: float) -> Real:
-    """Where are the vertices at a time from 0 to 1? `surfaces` are (n, 3) each; the result alike."""
+def position(surfaces: Sequence[Real] | Real, time: float) -> Real:
+    """Where are the vertices at a time from 0 to 1? `surfaces` are (n, 3) each, as the result."""
     total = np.zeros_like(surfaces[0])
     for weight, at in zip(spline(len(surfaces))(time), surfaces, strict=True):
         total += weight * at
@@ -29,7 +29,7 @@ def position(surfaces: Sequence[Real], time: float) -> Real:
 
 
 def largest_acceleration(surfaces: Sequence[Real]) -> float:
-    """How sharply does a vertex turn or hasten at most? Units of length over the whole time squared.
+    """How sharply does a vertex turn or hasten at most? Length over the whole time squared.
 
     The second derivative of a cubic spline is linear between knots, so the largest is at a knot.
     """

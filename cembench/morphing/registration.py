@@ -4,10 +4,10 @@ E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, the boundary held o
 minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
 
 A single point has no capacity in the plane: pulled alone, a vertex comes out of its surroundings as
-a spike, and triangles fold. So a landmark here is a small disk round its vertex, carried as a whole;
-its weights sum to 1, and with radius 0 the energy is (34) to the letter. Where the minimiser folds
-all the same, a smaller lambda moves the landmarks part of the way without folds, and the next step
-starts from that image, whose own E_D it lessens, until they meet.
+a spike, and triangles fold. So a landmark here is a small disk round its vertex that is carried
+along: a few more pairs in (34), whose weights sum to 1; with radius 0 it is (34) to the letter.
+Where the minimiser folds all the same, a smaller lambda moves the landmarks part of the way without
+folds, and the next step starts from that image, whose own E_D it lessens, until they meet.
 """
 
 from __future__ import annotations
@@ -17,10 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from cembench.clock import phase
-from cembench.errors import AlgorithmFailed, NotPositiveDefinite
+from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.laplacian import cotangent_laplacian, laplacian
 from cembench.geometry.mesh import DiskMesh
@@ -114,10 +113,10 @@ def register(
         with phase("laplacian"):
             L = cotangent_laplacian(np.stack([z.real, z.imag], axis=1), mesh.F)
     raise AlgorithmFailed(
-        f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a landmark "
-        f"is still {error:.2g} (of the disk's radius 1) from its target, and going on would fold "
-        f"triangles. Use fewer landmarks, look for one that is misplaced, or take a smaller --lambda "
-        "so that they need not meet."
+        f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a "
+        f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and going on "
+        "would fold triangles. Use fewer landmarks, look for one that is misplaced, or take a "
+        "smaller --lambda so that they need not meet."
     )
 
 
@@ -137,23 +136,19 @@ class _Pairs:
 def _pairs(F: Ints, z: Complex, landmarks: Ints, targets: Complex, reach: float) -> _Pairs:
     """The landmarks with the disks round them, each carried by its landmark's displacement."""
     at = z[landmarks]
-    points = np.stack([z.real, z.imag], axis=1)
     apart = np.abs(at[:, None] - at[None, :])
     np.fill_diagonal(apart, np.inf)
     room = np.minimum(apart.min(axis=1), 1 - np.abs(at))
     radius = np.minimum(reach * room, LARGEST_REACH)
-    near = cKDTree(points).query_ball_point(points[landmarks], radius)
     area = np.bincount(F.ravel(), weights=np.repeat(signed_areas(z, F), 3), minlength=len(z))
-    vertices, places, weights = [], [], []
-    inside = np.abs(z) < 1 - 1e-9
-    for j, found in enumerate(near):
-        v = np.union1d(np.array(found, dtype=np.int64), landmarks[j])
-        v = v[inside[v]]
-        distance = np.abs(z[v] - at[j]) / radius[j] if radius[j] > 0 else np.zeros(len(v))
-        w = np.maximum(1 - distance**2, 0.0) * area[v]  # a force without lumps
-        vertices.append(v)
-        places.append(z[v] + (targets[j] - at[j]))
-        weights.append(w / w.sum())
+    pairs = []
+    for j, vertex in enumerate(landmarks):
+        away = np.abs(z - at[j])
+        v = np.union1d(np.flatnonzero(away < radius[j]), vertex)
+        fall = 1 - (away[v] / radius[j]) ** 2 if radius[j] > 0 else np.ones(len(v))
+        w = fall * area[v]  # by area: vertices that crowd somewhere pull no harder there
+        pairs.append((v, z[v] + (targets[j] - at[j]), w / w.sum()))
+    vertices, places, weights = zip(*pairs, strict=True)
     return _Pairs(np.concatenate(vertices), np.concatenate(places), np.concatenate(weights))
 
 
@@ -192,11 +187,9 @@ def _smaller(lam: float, z: Complex, new: Complex, pairs: _Pairs, share: float) 
     A disk that is pulled by lambda against a capacity C moves the share g = 2 lambda / (C + 2
     lambda) of its way; at least a quarter of lambda is taken off.
     """
-    wanted = np.abs(pairs.targets - z[pairs.vertices])
-    moved = np.abs(new[pairs.vertices] - z[pairs.vertices])
-    g = float(
-        np.clip((pairs.weights @ moved) / max(pairs.weights @ wanted, 1e-300), 1e-6, 1 - 1e-6)
-    )
+    wanted = float(pairs.weights @ np.abs(pairs.targets - z[pairs.vertices]))
+    moved = float(pairs.weights @ np.abs(new[pairs.vertices] - z[pairs.vertices]))
+    g = min(max(moved / max(wanted, 1e-300), 1e-6), 1 - 1e-6)
     capacity = 2 * lam * (1 - g) / g
     less = max(share, 1e-3) * g
     return min(0.75 * lam, capacity * less / (2 * (1 - less)))

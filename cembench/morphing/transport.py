@@ -19,9 +19,10 @@ class Places:
     faces: Ints
     weights: Real
 
-    def carry(self, F: Ints, values: NDArray[np.generic]) -> NDArray[np.generic]:
+    def carry(self, F: Ints, values: Real) -> Real:
         """Interpolate values at vertices (n, ...) at these places: (p, ...)."""
-        return np.einsum("pc,pc...->p...", self.weights, values[F[self.faces]])
+        found: Real = np.einsum("pc,pc...->p...", self.weights, values[F[self.faces]])
+        return found
 
 
 def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> Places:

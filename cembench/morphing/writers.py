@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ def write_film(path: Path, pictures: Pictures) -> None:
         raise RecordError(f"{path} cannot be written: {error}") from error
 
 
-def _save_gif(file: object, pictures: Pictures) -> None:
+def _save_gif(file: BinaryIO, pictures: Pictures) -> None:
     from PIL import Image
 
     # One palette for all, so that colours do not flicker.
@@ -100,7 +101,7 @@ def _encode_mp4(path: Path, pictures: Pictures) -> None:
 
 
 def mesh_files(path: Path, frames: int) -> list[Path]:
-    """What are the numbered meshes called? ``face.obj`` gives face_000.obj; a folder, frame_000.ply."""
+    """What are numbered meshes called? ``a.obj`` gives a_000.obj; a folder f, f/frame_000.ply."""
     digits = max(3, len(str(frames - 1)))
     if path.suffix:
         return [path.with_stem(f"{path.stem}_{k:0{digits}d}") for k in range(frames)]
@@ -110,25 +111,22 @@ def mesh_files(path: Path, frames: int) -> list[Path]:
 def write_meshes(
     path: Path,
     mesh: TriangleMesh,
-    frames: Sequence[float],
+    times: Sequence[float] | Real,
     at: Callable[[float], Real],
     tell: Callable[[int], object] = lambda frame: None,
 ) -> list[Path]:
     """Write a mesh for each time, with the triangles of `mesh` and the vertices `at` that time."""
-    files = mesh_files(path, len(frames))
+    files = mesh_files(path, len(times))
     files[0].parent.mkdir(parents=True, exist_ok=True)
-    for k, (file, time) in enumerate(zip(files, frames, strict=True)):
+    for k, (file, time) in enumerate(zip(files, times, strict=True)):
         write_mesh(file, replace(mesh, V=at(time)))
         tell(k)
     return files
 
 
-def write_arrays(
-    path: Path, mesh: TriangleMesh, times: Real, at: Callable[[float], Real], **more: object
-) -> None:
-    """Write `frames` (frames, n, 3), `times` (frames,), `F` (m, 3) and more as NPZ."""
+def write_arrays(path: Path, mesh: TriangleMesh, times: Real, at: Callable[[float], Real]) -> None:
+    """Write `frames` (frames, n, 3), `times` (frames,) and `F` (m, 3) as NPZ."""
     frames = np.empty((len(times), mesh.n, 3))
     for k, time in enumerate(times):
         frames[k] = at(time)
-    arrays = {"frames": frames, "times": times, "F": mesh.F} | more
-    atomic.write(path, lambda file: np.savez(file, **arrays))
+    atomic.write(path, lambda file: np.savez(file, frames=frames, times=times, F=mesh.F))
