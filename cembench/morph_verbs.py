@@ -134,7 +134,10 @@ def morph(
         } | found.metrics(frames)
     written = _write(found, output, frames, chosen_views, size, seconds)
     if run is not None:
-        written += _lay_down(run, found, figures, registry, surfaces)
+        given = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
+        given += [] if faces is None else ["--faces", str(faces)]
+        command = f"cembench morph {' '.join(given)} --run {run}"
+        written += _lay_down(run, found, figures, command, registry, surfaces)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -243,7 +246,12 @@ def _write(
 
 
 def _lay_down(
-    run: Path, found: Morph, figures: dict[str, Any], registry: Registry, surfaces: list[str]
+    run: Path,
+    found: Morph,
+    figures: dict[str, Any],
+    command: str,
+    registry: Registry,
+    surfaces: list[str],
 ) -> list[Path]:
     from cembench.morphing.exhibit import lay_down
     from cembench.running.plan import standing_of
@@ -251,7 +259,6 @@ def _lay_down(
     generated = [name for name in surfaces if name in registry.surfaces]
     standing = standing_of(registry, generated)
     rows = tuple(standing[name].paper_row if name in standing else "" for name in surfaces)
-    command = f"cembench morph {' '.join(surfaces)} --run {run}"
     with err.status("drawing", spinner="line") as status:
         return lay_down(run, found, figures, command, rows, status.update)
 

@@ -23,11 +23,12 @@ def lay_down(
     command: str,
     rows_of_paper: tuple[str, ...],
     tell: Callable[[str], object] = lambda step: None,
+    sides: tuple[int, int] = (240, 420),
 ) -> list[Path]:
     """Write both exhibits into a run's folder; where are their descriptions?
 
     `figures` are the morph's metrics, `rows_of_paper` what each surface stands for in the paper,
-    empty for one that stands for nothing.
+    empty for one that stands for nothing, `sides` the pixels of a picture on either page.
     """
     in_paper = rows_of_paper == IN_THE_FIGURES
     origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
@@ -39,14 +40,14 @@ def lay_down(
         run,
         f"morph-{stem}",
         "strip.png",
-        strip_page(morph),
+        strip_page(morph, sides[0]),
         f"From {names[0]} to {names[-1]}: the path at seven moments, from the front and aside.",
     )
     board = _picture(
         run,
         f"registration-{stem}",
         "maps.png",
-        registration_page(morph, tell=tell),
+        registration_page(morph, sides[1], tell),
         "Conformal maps, and below them the Moebius map and the registrations: now equal squares "
         "lie on the same features. Dots are landmarks, rings their targets.",
     )

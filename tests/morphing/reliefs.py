@@ -16,9 +16,7 @@ HEIGHTS = {"nose": 0.30, "eye right": -0.12, "eye left": -0.12, "mouth": 0.15}
 def relief(places=NEUTRAL, *, faces=2500, name="relief"):
     flat = flat_disk(faces)
     z = flat.V[:, 0] + 1j * flat.V[:, 1]
-    height = sum(
-        HEIGHTS[key] * np.exp(-(np.abs(z - at) ** 2) / 0.02) for key, at in places.items()
-    )
+    height = sum(HEIGHTS[key] * np.exp(-(np.abs(z - at) ** 2) / 0.02) for key, at in places.items())
     return DiskMesh.from_arrays(np.stack([z.real, z.imag, height], 1), flat.F, name=name)
 
 
@@ -32,7 +30,9 @@ def three():
     places = (SMILE, NEUTRAL, {**NEUTRAL, "mouth": -0.15 - 0.4j})
     meshes = [
         relief(at, faces=faces, name=name)
-        for at, faces, name in zip(places, (2500, 2000, 3000), ("smile", "calm", "wry"), strict=True)
+        for at, faces, name in zip(
+            places, (2500, 2000, 3000), ("smile", "calm", "wry"), strict=True
+        )
     ]
     found = [vertices_of(mesh, at) for mesh, at in zip(meshes, places, strict=True)]
     rows = [[vertices[key] for vertices in found] for key in NEUTRAL]

@@ -59,9 +59,7 @@ def test_curvature_aligns_two_meshes_of_one_surface(face):
     other = relief(SMILE, faces=1500)
     reference = centred(mesh, z, NONE)
     found = aligned(other, to_centre(0.3j, 1.0)(cem(other).uv), NONE, mesh, reference, NONE)
-    there, here = (
-        list(vertices_of(m, SMILE).values()) for m in (other, mesh)
-    )
+    there, here = (list(vertices_of(m, SMILE).values()) for m in (other, mesh))
     assert np.abs(found[there] - reference[here]).max() < 0.06
 
 

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -27,7 +29,9 @@ def test_the_path_is_a_natural_cubic_spline():
     h = 1e-3
 
     def second(time):
-        return sum(w * position([A, B, C], time + k * h) for k, w in ((-1, 1), (0, -2), (1, 1))) / h**2
+        return (
+            sum(w * position([A, B, C], time + k * h) for k, w in ((-1, 1), (0, -2), (1, 1))) / h**2
+        )
 
     np.testing.assert_allclose(second(0.25), second(0.5 - h) / 2, atol=0.1)
     np.testing.assert_allclose(second(0.5 - h), second(0.5 + h), atol=0.2)
@@ -51,7 +55,7 @@ def test_the_largest_acceleration_is_that_of_finite_differences():
 def test_the_largest_step_is_between_two_frames():
     times = np.linspace(0, 1, 5)
     frames = [position([A, B, C], t) for t in times]
-    steps = [np.linalg.norm(q - p, axis=1).max() for p, q in zip(frames, frames[1:], strict=False)]
+    steps = [np.linalg.norm(q - p, axis=1).max() for p, q in pairwise(frames)]
     assert largest_step([A, B, C], times) == pytest.approx(max(steps))
 
 
