@@ -6,6 +6,7 @@ import importlib
 import sys
 from dataclasses import dataclass
 from importlib.metadata import version
+from importlib.util import find_spec
 
 from cembench.errors import CembenchError
 from cembench.geometry.cholesky import available_backends
@@ -42,6 +43,7 @@ def examine() -> list[Finding]:
         _backends(),
         _plugins(),
         _renderer(),
+        _video(),
         _machine(),
     ]
 
@@ -91,6 +93,17 @@ def _renderer() -> Finding:
         message,
         required=False,
         remedy="Previews are drawn by matplotlib instead, less finely.",
+    )
+
+
+def _video() -> Finding:
+    there = find_spec("imageio_ffmpeg") is not None
+    return Finding(
+        "video",
+        there,
+        "imageio-ffmpeg writes MP4" if there else "MP4 needs imageio-ffmpeg; GIF needs nothing",
+        required=False,
+        remedy="Run `pip install 'cembench[video]'`.",
     )
 
 

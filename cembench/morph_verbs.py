@@ -55,6 +55,12 @@ def morph(
     lam: Annotated[
         float, typer.Option("--lambda", min=1e-6, help="Weight of the landmarks in (34).")
     ] = 100.0,
+    reach: Annotated[
+        float,
+        typer.Option(
+            min=0, max=1, help="Radius of a landmark, in its distance to the next; 0: a vertex."
+        ),
+    ] = 0.4,
     frames: Annotated[int, typer.Option(min=2, help="Of the whole path; 24 a second.")] = 48,
     views: Annotated[
         str, typer.Option(help="Of a film, with commas.")
@@ -97,6 +103,8 @@ def morph(
     for name in surfaces:
         with err.status(f"reading {name}", spinner="line"):
             mesh, named = _surface(registry, name, faces)
+        for notice in mesh.notices:
+            err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
         meshes.append(mesh)
         known.append(named)
     places = (
@@ -116,6 +124,7 @@ def morph(
                 maps,
                 places,
                 lam=lam,
+                reach=reach,
                 pose=pose.value,
                 upright=first.V @ right + 1j * (first.V @ up),
                 tell=status.update,
@@ -130,6 +139,7 @@ def morph(
             "landmarks": list(places.names),
             "algorithm": algorithm,
             "lambda": lam,
+            "reach": reach,
             "frames": frames,
         } | found.metrics(frames)
     written = _write(found, output, frames, chosen_views, size, seconds)
@@ -276,8 +286,9 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
             if row["landmark_error_share"] is None
             else f"{row['landmark_error_share']:.2e} of the surface's size",
             "Dirichlet energy": f"{row['dirichlet_energy']:.4f}",
-            "dilatation": f"{row['dilatation_mean']:.2f} in the mean, "
-            f"{row['dilatation_max']:.1f} at most",
+            "dilatation": "beyond numbers: a triangle nearly without area"
+            if row["dilatation_max"] is None
+            else f"{row['dilatation_mean']:.2f} in the mean, {row['dilatation_max']:.1f} at most",
             "folded triangles": f"{row['flipped_triangles']}",
             "distance": f"{row['distance_mean_edges']:.3f} mean edges in the mean, "
             f"{row['hausdorff_edges']:.2f} at most",

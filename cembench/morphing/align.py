@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
+from cembench.geometry.folds import interior_without_folds
+from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.moebius import Moebius
 from cembench.geometry.planar import signed_areas
@@ -37,10 +39,21 @@ def best_turn(z: Complex, targets: Complex) -> float:
     return float(np.angle(np.vdot(z, targets)))
 
 
+def without_new_folds(mesh: DiskMesh, z: Complex) -> Complex:
+    """The map, repaired where a Moebius map folded it: it bends edges, and triangles stay straight.
+
+    That happens to large triangles near the boundary. They are laid flat by
+    :func:`cembench.geometry.folds.interior_without_folds`; elsewhere, and mostly, nothing changes.
+    """
+    if (signed_areas(z, mesh.F) > 0).all():
+        return z
+    return interior_without_folds(mesh, laplacian(mesh), z)[0]
+
+
 def centred(mesh: DiskMesh, z: Complex, landmarks: Ints) -> Complex:
     """The map with the first landmark at 0; without landmarks, the centre of the surface's area."""
     if len(landmarks):
-        return to_centre(complex(z[landmarks[0]]))(z)
+        return without_new_folds(mesh, to_centre(complex(z[landmarks[0]]))(z))
     share = vertex_areas(mesh)
     share = share / share.sum()
     for _ in range(100):  # Abikoff's iteration for the conformal barycentre
@@ -48,7 +61,7 @@ def centred(mesh: DiskMesh, z: Complex, landmarks: Ints) -> Complex:
         z = to_centre(middle)(z)
         if abs(middle) < 1e-10:
             break
-    return z
+    return without_new_folds(mesh, z)
 
 
 def aligned(
@@ -82,7 +95,7 @@ def aligned(
     turn = _turn_by_curvature(picture, model)
     if len(landmarks):
         return z * np.exp(1j * turn)
-    return _refined(picture, model, turn).inverse(z)
+    return without_new_folds(mesh, _refined(picture, model, turn).inverse(z))
 
 
 def vertex_areas(mesh: DiskMesh) -> Real:

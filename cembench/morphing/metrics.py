@@ -58,7 +58,8 @@ def registration_metrics(
         `landmark_error_share` is the largest distance in space of a carried landmark from its
         target, as a share of the target's size (:func:`size_of`); distances are in mean edges of
         the target and, `carried_to_target` or the other way, the mean and the largest over vertices
-        and random points. Energies and dilatations are those of the registration map.
+        and random points. Energies and dilatations are those of the registration
+        map; None where a triangle is too thin for a number.
 
     """
     stretch = dilatations(target, registration.uv)
@@ -81,6 +82,8 @@ def registration_metrics(
     sides = ("carried_to_target", "target_to_carried")
     figures["distance_mean_edges"] = max(figures[f"{side}_mean_edges"] for side in sides)
     figures["hausdorff_edges"] = max(figures[f"{side}_max_edges"] for side in sides)
+    if not np.isfinite(figures["dilatation_max"]):  # a triangle thin beyond what numbers hold
+        figures |= {"dilatation_mean": None, "dilatation_max": None}
     return figures
 
 

@@ -41,6 +41,8 @@ NEAR = 2e-3
 MOST_STEPS, MOST_TRIES = 40, 8
 #: What share of the way to the first fold a step goes.
 CAUTION = 0.7
+#: Where no landmark moves so far, in its distance to the next, there is no getting on.
+LEAST_STEP = 0.02
 
 
 @dataclass(frozen=True)
@@ -101,13 +103,13 @@ def register(
     error = _error(z, landmarks, targets)
     L = laplacian(mesh)
     for _ in range(MOST_STEPS):
-        pairs = _pairs(mesh.F, z, landmarks, targets, reach)
+        at, pairs = z[landmarks], _pairs(mesh.F, z, landmarks, targets, reach)
         z, used = _step(mesh, L, z, pairs, lam)
         lambdas.append(used)
-        before, error = error, _error(z, landmarks, targets)
+        error = _error(z, landmarks, targets)
         if used == lam or error <= NEAR:
             return Registration(z, tuple(lambdas), error)
-        if error > 0.98 * before:
+        if (np.abs(z[landmarks] - at) < LEAST_STEP * _room(at)).all():
             break
         # Dirichlet's energy is that of the image from now on: the next map is composed with this.
         with phase("laplacian"):
@@ -136,10 +138,7 @@ class _Pairs:
 def _pairs(F: Ints, z: Complex, landmarks: Ints, targets: Complex, reach: float) -> _Pairs:
     """The landmarks with the disks round them, each carried by its landmark's displacement."""
     at = z[landmarks]
-    apart = np.abs(at[:, None] - at[None, :])
-    np.fill_diagonal(apart, np.inf)
-    room = np.minimum(apart.min(axis=1), 1 - np.abs(at))
-    radius = np.minimum(reach * room, LARGEST_REACH)
+    radius = np.minimum(reach * _room(at), LARGEST_REACH)
     area = np.bincount(F.ravel(), weights=np.repeat(signed_areas(z, F), 3), minlength=len(z))
     pairs = []
     for j, vertex in enumerate(landmarks):
@@ -150,6 +149,13 @@ def _pairs(F: Ints, z: Complex, landmarks: Ints, targets: Complex, reach: float)
         pairs.append((v, z[v] + (targets[j] - at[j]), w / w.sum()))
     vertices, places, weights = zip(*pairs, strict=True)
     return _Pairs(np.concatenate(vertices), np.concatenate(places), np.concatenate(weights))
+
+
+def _room(at: Complex) -> Real:
+    """How far is each landmark from the next one, or from the boundary? Shape (k,)."""
+    apart = np.abs(at[:, None] - at[None, :])
+    np.fill_diagonal(apart, np.inf)
+    return np.minimum(apart.min(axis=1), 1 - np.abs(at))
 
 
 def _step(

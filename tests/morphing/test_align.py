@@ -3,7 +3,15 @@ import pytest
 
 from algorithms.cem import cem
 from cembench.geometry.laplacian import cotangent_laplacian
-from cembench.morphing.align import aligned, best_turn, centred, to_centre, vertex_areas
+from cembench.metrics import flipped_triangles
+from cembench.morphing.align import (
+    aligned,
+    best_turn,
+    centred,
+    to_centre,
+    vertex_areas,
+    without_new_folds,
+)
 from tests.morphing.reliefs import SMILE, relief, vertices_of
 
 NONE = np.empty(0, dtype=np.int64)
@@ -61,6 +69,18 @@ def test_curvature_aligns_two_meshes_of_one_surface(face):
     found = aligned(other, to_centre(0.3j, 1.0)(cem(other).uv), NONE, mesh, reference, NONE)
     there, here = (list(vertices_of(m, SMILE).values()) for m in (other, mesh))
     assert np.abs(found[there] - reference[here]).max() < 0.06
+
+
+def test_a_triangle_that_a_moebius_map_folds_is_laid_flat():
+    """On a coarse disk, with a point very near to the boundary taken to the centre."""
+    mesh = relief(faces=150)
+    z = cem(mesh).uv
+    moved = to_centre(0.98j)(z)
+    assert flipped_triangles(mesh, moved) > 0
+    flat = without_new_folds(mesh, moved)
+    assert flipped_triangles(mesh, flat) == 0
+    np.testing.assert_array_equal(flat[mesh.boundary], moved[mesh.boundary])
+    assert without_new_folds(mesh, z) is z
 
 
 def test_alignment_is_conformal(face):
