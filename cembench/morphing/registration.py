@@ -6,12 +6,14 @@ minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda 
 A single point has no capacity in the plane: pulled alone, a vertex comes out of its surroundings as
 a spike, and triangles fold. So a landmark here is a small disk round its vertex that is carried
 along: a few more pairs in (34), whose weights sum to 1; with radius 0 it is (34) to the letter.
-Where the minimiser folds all the same, a smaller lambda moves the landmarks part of the way without
-folds, and the next step starts from that image, whose own E_D it lessens, until they meet.
+Where the minimiser folds all the same, a radial stretch first brings the landmarks to about the
+right distances from the centre; then a smaller lambda moves them part of the way without folds, and
+the next step starts from that image, whose own E_D it lessens, until they meet.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +43,8 @@ NEAR = 2e-3
 MOST_STEPS, MOST_TRIES = 40, 8
 #: What share of the way to the first fold a step goes.
 CAUTION = 0.7
+#: About the capacity of a landmark's disk in the unit disk; only the lambdas tried depend on it.
+CAPACITY = 2.0
 #: Where no landmark moves so far, in its distance to the next, there is no getting on.
 LEAST_STEP = 0.02
 
@@ -57,12 +61,15 @@ class Registration:
         The lambda of each step; a single one, as asked for, where nothing folded.
     landmark_error : float
         Largest distance of a landmark from its target, in units of the disk's radius.
+    exponent : float
+        Of the radial stretch before the first of several steps, 1 for none.
 
     """
 
     uv: Complex
     lambdas: tuple[float, ...]
     landmark_error: float
+    exponent: float = 1.0
 
 
 def register(
@@ -99,26 +106,28 @@ def register(
     """
     if not len(landmarks):
         return Registration(start, (), 0.0)
-    z, lambdas = start, []
-    error = _error(z, landmarks, targets)
-    L = laplacian(mesh)
+    found = _minimisers(mesh, laplacian(mesh), start, landmarks, targets, reach)(lam)
+    if first_fold(start, found, mesh.F) > 1:
+        return Registration(found, (lam,), _error(found, landmarks, targets))
+    z, exponent = radially_stretched(mesh, start, landmarks, targets)
+    lambdas = []
     for _ in range(MOST_STEPS):
-        at, pairs = z[landmarks], _pairs(mesh.F, z, landmarks, targets, reach)
-        z, used = _step(mesh, L, z, pairs, lam)
+        at = z[landmarks]
+        with phase("laplacian"):
+            L = cotangent_laplacian(np.stack([z.real, z.imag], axis=1), mesh.F)
+        z, used = _step(z, mesh.F, _minimisers(mesh, L, z, landmarks, targets, reach), lam)
         lambdas.append(used)
         error = _error(z, landmarks, targets)
         if used == lam or error <= NEAR:
-            return Registration(z, tuple(lambdas), error)
+            return Registration(z, tuple(lambdas), error, exponent)
         if (np.abs(z[landmarks] - at) < LEAST_STEP * _room(at)).all():
             break
-        # Dirichlet's energy is that of the image from now on: the next map is composed with this.
-        with phase("laplacian"):
-            L = cotangent_laplacian(np.stack([z.real, z.imag], axis=1), mesh.F)
     raise AlgorithmFailed(
         f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a "
         f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and going on "
-        "would fold triangles. Use fewer landmarks, look for one that is misplaced, or take a "
-        "smaller --lambda so that they need not meet."
+        "would fold triangles. Use fewer landmarks, look for one that is misplaced, name the "
+        "surface first on which they spread wider in the disk (a face before a whole head), or "
+        "take a smaller --lambda so that they need not meet."
     )
 
 
@@ -158,12 +167,21 @@ def _room(at: Complex) -> Real:
     return np.minimum(apart.min(axis=1), 1 - np.abs(at))
 
 
-def _step(
-    mesh: DiskMesh, L: sparse.csc_array, z: Complex, pairs: _Pairs, lam: float
-) -> tuple[Complex, float]:
-    """The minimiser of (34) for the largest lambda up to `lam` found that folds nothing."""
+def _minimisers(
+    mesh: DiskMesh,
+    L: sparse.csc_array,
+    z: Complex,
+    landmarks: Ints,
+    targets: Complex,
+    reach: float,
+) -> Callable[[float], Complex]:
+    """The function that gives the minimiser of (34) for a lambda, from one analysis of the matrix.
+
+    L is the Laplacian of E_D, z the map whose boundary is kept and in which landmarks have disks.
+    """
     i, b = mesh.interior, mesh.boundary
     with phase("assembly"):
+        pairs = _pairs(mesh.F, z, landmarks, targets, reach)
         rows = sparse.csr_array(L)[i]
         L_ii, right = sparse.csc_array(rows[:, i]), -(rows[:, b] @ z[b])
         pull = np.zeros(mesh.n)
@@ -171,34 +189,70 @@ def _step(
         np.add.at(pull, pairs.vertices, 2 * pairs.weights)
         np.add.at(pulled, pairs.vertices, 2 * pairs.weights * pairs.targets)
     factor: Cholesky | None = None
-    tried = lam
-    for _ in range(MOST_TRIES):
-        A = sparse.csc_array(L_ii + sparse.diags_array(tried * pull[i]))
+
+    def minimiser(lam: float) -> Complex:
+        nonlocal factor
+        A = sparse.csc_array(L_ii + sparse.diags_array(lam * pull[i]))
         if factor is None:
             factor = Cholesky(A)
         else:
             factor.update(A)
-        new = z.copy()
-        new[i] = factor.solve(right + tried * pulled[i])
-        share = first_fold(z, new, mesh.F)
+        found = z.copy()
+        found[i] = factor.solve(right + lam * pulled[i])
+        return found
+
+    return minimiser
+
+
+def _step(
+    z: Complex, F: Ints, minimiser: Callable[[float], Complex], lam: float
+) -> tuple[Complex, float]:
+    """The minimiser for the largest lambda found, up to `lam`, that folds nothing; and that lambda.
+
+    The way that the landmarks go is about g = 2 lambda / (C + 2 lambda) of the whole, C being the
+    capacity of their disks: about 2, for disks that are small but not very small. From the share
+    of the way up to the first fold follows the next lambda to be tried.
+    """
+    tried = lam
+    for _ in range(MOST_TRIES):
+        new = minimiser(tried)
+        share = first_fold(z, new, F)
         if share > 1:
             return new, tried
-        tried = _smaller(tried, z, new, pairs, CAUTION * share)
+        less = CAUTION * max(share, 1e-3) * 2 * tried / (CAPACITY + 2 * tried)
+        tried = min(0.75 * tried, CAPACITY * less / (2 * (1 - less)))
     return z, tried
 
 
-def _smaller(lam: float, z: Complex, new: Complex, pairs: _Pairs, share: float) -> float:
-    """Which lambda moves the landmarks this share as far? From the capacity C of their disks.
+def radially_stretched(
+    mesh: DiskMesh, z: Complex, landmarks: Ints, targets: Complex
+) -> tuple[Complex, float]:
+    """Which map z |z|^(k-1) brings the landmarks nearest to the right distances from the centre?
 
-    A disk that is pulled by lambda against a capacity C moves the share g = 2 lambda / (C + 2
-    lambda) of its way; at least a quarter of lambda is taken off.
+    It has the same dilatation everywhere, max(k, 1/k): the least that any map between rings has
+    (Groetzsch 1928). k is the least squares fit of log |target| = k log |landmark|; if that folds
+    triangles, which stay straight, k comes nearer to 1.
+
+    Returns
+    -------
+    z : complex128 (n,)
+        The stretched map; no triangle is folded.
+    k : float
+        The exponent.
+
     """
-    wanted = float(pairs.weights @ np.abs(pairs.targets - z[pairs.vertices]))
-    moved = float(pairs.weights @ np.abs(new[pairs.vertices] - z[pairs.vertices]))
-    g = min(max(moved / max(wanted, 1e-300), 1e-6), 1 - 1e-6)
-    capacity = 2 * lam * (1 - g) / g
-    less = max(share, 1e-3) * g
-    return min(0.75 * lam, capacity * less / (2 * (1 - less)))
+    far = np.minimum(np.abs(z[landmarks]), np.abs(targets)) > 1e-9
+    there, here = np.log(np.abs(targets[far])), np.log(np.abs(z[landmarks][far]))
+    if not len(here):
+        return z, 1.0
+    k = float(there @ here / (here @ here))
+    modulus = np.maximum(np.abs(z), 1e-300)
+    for _ in range(MOST_TRIES):
+        new = z * modulus ** (k - 1)
+        if (signed_areas(new, mesh.F) > 0).all():
+            return new, k
+        k = np.sqrt(k)
+    return z, 1.0
 
 
 def first_fold(z: Complex, new: Complex, F: Ints) -> float:

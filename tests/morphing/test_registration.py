@@ -6,9 +6,9 @@ from algorithms.cem import cem
 from cembench import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.laplacian import laplacian
-from cembench.metrics import flipped_triangles
+from cembench.metrics import dilatations, flipped_triangles
 from cembench.morphing.align import centred
-from cembench.morphing.registration import NEAR, first_fold, register
+from cembench.morphing.registration import NEAR, first_fold, radially_stretched, register
 from meshes_gen.flat_disk import flat_disk
 from tests.morphing.reliefs import NEUTRAL, relief, vertices_of
 
@@ -55,15 +55,39 @@ def test_more_lambda_meets_the_landmarks_better_and_costs_energy(face):
 
 
 def test_folds_are_repaired_by_smaller_lambdas_step_by_step(face):
-    """Eyes and mouth so far that one solve folds: the pulled vertices pass others."""
+    """Eyes and mouth turned about the nose so far that one solve folds."""
     mesh, z, landmarks = face
-    targets = z[landmarks] * np.array([1, 0.3, 0.3, 0.25])
+    targets = z[landmarks] * np.exp(1.2j)
     found = register(mesh, z, landmarks, targets)
     assert len(found.lambdas) > 1
     assert all(lam < 100 for lam in found.lambdas[:-1])
     assert flipped_triangles(mesh, found.uv) == 0
     assert found.landmark_error <= NEAR
     np.testing.assert_array_equal(found.uv[mesh.boundary], z[mesh.boundary])
+
+
+def test_a_face_of_another_size_in_the_disk_is_stretched_before(face):
+    """One radial stretch of even dilatation, instead of many steps that wear triangles thin."""
+    mesh, z, landmarks = face
+    at = z[landmarks]
+    found = register(mesh, z, landmarks, at * np.abs(at) ** 2)
+    assert found.exponent == pytest.approx(3, rel=1e-6)
+    assert len(found.lambdas) == 1
+    assert found.landmark_error <= NEAR
+    assert flipped_triangles(mesh, found.uv) == 0
+
+
+def test_the_stretch_keeps_the_boundary_and_has_even_dilatation(face):
+    mesh, z, landmarks = face
+    stretched, exponent = radially_stretched(
+        mesh, z, landmarks, z[landmarks] * np.abs(z[landmarks])
+    )
+    assert exponent == pytest.approx(2)
+    np.testing.assert_allclose(stretched, z * np.abs(z), atol=1e-12)
+    np.testing.assert_allclose(stretched[mesh.boundary], z[mesh.boundary], rtol=1e-12)
+    flat = type(mesh)(np.stack([z.real, z.imag, 0 * z.real], 1), mesh.F)
+    away = np.abs(z[mesh.F]).min(axis=1) > 0.2
+    np.testing.assert_allclose(dilatations(flat, stretched)[away], 2, rtol=0.25)
 
 
 def test_the_landmarks_disk_lets_one_solve_go_further(face):
