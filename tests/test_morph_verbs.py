@@ -103,21 +103,44 @@ def test_what_cannot_be_morphed_is_refused_with_the_reason(arguments, message, p
     assert set(pair.folder.iterdir()) == before
 
 
-def test_landmarks_that_cannot_meet_are_exit_code_1(cli):
-    """Two that change places on a disk of 60 triangles: the reason is told, nothing is written."""
+@pytest.fixture
+def coarse(cli):
+    """One disk of 60 triangles as two files; landmarks as pairs of vertices."""
     mesh = flat_disk(60)
-    write_mesh(cli.folder / "a.obj", mesh)
-    write_mesh(cli.folder / "b.obj", mesh)
-    z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
-    far = mesh.interior[np.argsort(-np.abs(z[mesh.interior]))]
-    near = mesh.interior[np.argsort(np.abs(z[mesh.interior]))]
-    rows = [(near[0], near[0]), (far[0], near[1]), (near[1], far[0])]
-    text = "\n".join(f"m{k},{a},{b}" for k, (a, b) in enumerate(rows))
-    (cli.folder / "marks.csv").write_text(text)
-    code, out, err = cli("morph", "a.obj", "b.obj", "--landmarks", "marks.csv", "-o", "c.npz")
-    assert (code, out) in ((1, ""), (2, ""))
-    assert re.search("would fold triangles|contradictory order", err), err
-    assert not (cli.folder / "c.npz").exists()
+    for name in ("a.obj", "b.obj"):
+        write_mesh(cli.folder / name, mesh)
+
+    def morph(pairs):
+        text = "\n".join(f"m{k},{a},{b}" for k, (a, b) in enumerate(pairs))
+        (cli.folder / "marks.csv").write_text(text)
+        found = cli("morph", "a.obj", "b.obj", "--landmarks", "marks.csv", "-o", "c.npz")
+        assert not (cli.folder / "c.npz").exists()
+        return found
+
+    z = mesh.V[mesh.interior, 0] + 1j * mesh.V[mesh.interior, 1]
+    return morph, z, mesh.interior
+
+
+def test_exchanged_landmarks_contradict_the_order(coarse):
+    morph, z, inside = coarse
+    centre, left, below, right = (inside[np.argmin(np.abs(z - at))] for at in (0, -0.5, -0.5j, 0.5))
+    code, out, err = morph([(centre, centre), (left, right), (right, left), (below, below)])
+    assert (code, out) == (2, "")
+    assert "contradictory order of landmarks: from 'm1' to 'm3'" in err
+
+
+def test_landmarks_that_cannot_meet_are_exit_code_1(coarse):
+    """Two in one direction from the centre, which would have to pass each other."""
+    morph, z, inside = coarse
+    centre = int(np.argmin(np.abs(z)))
+    far = int(np.argmax(np.abs(z)))
+    aside = np.abs(np.angle(z / z[far]))
+    aside[[centre, far]] = np.inf
+    near = int(np.argmin(aside))
+    assert aside[near] < np.deg2rad(10)
+    code, out, err = morph(inside[[(centre, centre), (near, far), (far, near)]])
+    assert (code, out) == (1, "")
+    assert "going on would fold triangles" in err
 
 
 def test_a_real_face_morphs_into_a_real_head(cli):
