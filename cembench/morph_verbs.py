@@ -37,7 +37,9 @@ def morph(
     *,
     landmarks: Annotated[
         Path | None,
-        typer.Option(help="CSV, a row each: name, vertex on the first surface, on the second, ..."),
+        typer.Option(
+            help="CSV, a row each: name, vertex on the first surface, on the second, ...; or none."
+        ),
     ] = None,
     output: Annotated[
         list[Path],
@@ -83,7 +85,7 @@ def morph(
 
     The first landmark goes to the centre of the disk, the others are registered by (34), and the
     first surface's vertices are carried onto all others. Without --landmarks those are taken that
-    the surfaces have by name, as the generated faces do; else curvature aligns them.
+    the surfaces have by name, as the generated faces do; with none at all, curvature aligns them.
     """
     from cembench.morphing.drawing import check_views
     from cembench.morphing.landmarks import common_landmarks, read_landmarks
@@ -107,9 +109,10 @@ def morph(
             err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
         meshes.append(mesh)
         known.append(named)
-    places = (
-        read_landmarks(landmarks, meshes, known) if landmarks else common_landmarks(meshes, known)
-    )
+    if landmarks is None or str(landmarks) == "none":
+        places = common_landmarks(meshes, [{} for _ in known] if landmarks else known)
+    else:
+        places = read_landmarks(landmarks, meshes, known)
     seconds: dict[str, float] = {}
     started = perf_counter()
     maps = _maps(registry, meshes, algorithm, assignments(parameter), plugin, timeout)
@@ -281,7 +284,9 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
         steps = len(row["lambdas"])
         lines = {
             "lambda": f"{figures['lambda']:g}"
-            + (f", reached in {steps} steps without folds" if steps > 1 else ""),
+            + (f", reached in {steps} steps without folds" if steps > 1 else "")
+            if steps
+            else "-",
             "landmark error": "-"
             if row["landmark_error_share"] is None
             else f"{row['landmark_error_share']:.2e} of the surface's size",

@@ -62,6 +62,13 @@ def test_the_figures_are_told_in_words_of_80_columns(pair):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_without_landmarks_curvature_aligns(pair):
+    code, out, _ = pair.morph("--landmarks", "none")
+    assert code == 0
+    assert "landmarks  none: aligned by curvature" in out
+    assert re.search(r"lambda +-\n", out)
+
+
 def test_a_map_that_fails_is_exit_code_1(pair):
     code, out, err = pair.morph("--landmarks", "marks.csv", "--timeout", 0.1)
     assert (code, out) == (1, "")
