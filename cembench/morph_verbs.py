@@ -240,7 +240,7 @@ def _write(
 
         started = perf_counter()
         for path in others:
-            if path.suffix.lower() in writers.ARRAYS:
+            if path.suffix.lower() in writers.ARRAYS and not path.is_dir():
                 writers.write_arrays(path, first, times, found.at)
             else:
                 writers.write_meshes(path, first, times, found.at, tell)

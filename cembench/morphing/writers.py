@@ -27,6 +27,8 @@ FILMS, MESHES, ARRAYS = (".gif", ".mp4"), (".obj", ".ply"), (".npz",)
 
 def check_output(path: Path) -> None:
     """Raise :class:`ParameterError` where a path cannot be written to this place, before work."""
+    if path.is_dir():
+        return
     suffix = path.suffix.lower()
     if suffix not in (*FILMS, *MESHES, *ARRAYS, ""):
         raise ParameterError(
@@ -103,7 +105,7 @@ def _encode_mp4(path: Path, pictures: Pictures) -> None:
 def mesh_files(path: Path, frames: int) -> list[Path]:
     """What are numbered meshes called? ``a.obj`` gives a_000.obj; a folder f, f/frame_000.ply."""
     digits = max(3, len(str(frames - 1)))
-    if path.suffix:
+    if path.suffix and not path.is_dir():
         return [path.with_stem(f"{path.stem}_{k:0{digits}d}") for k in range(frames)]
     return [path / f"frame_{k:0{digits}d}.ply" for k in range(frames)]
 
@@ -115,12 +117,28 @@ def write_meshes(
     at: Callable[[float], Real],
     tell: Callable[[int], object] = lambda frame: None,
 ) -> list[Path]:
-    """Write a mesh for each time, with the triangles of `mesh` and the vertices `at` that time."""
+    """Write a mesh for each time, with the triangles of `mesh` and the vertices `at` that time.
+
+    All files get their names at the end, so that no half of a sequence is left.
+
+    Raises
+    ------
+    RecordError
+        The place cannot be written to.
+
+    """
     files = mesh_files(path, len(times))
-    files[0].parent.mkdir(parents=True, exist_ok=True)
-    for k, (file, time) in enumerate(zip(files, times, strict=True)):
-        write_mesh(file, replace(mesh, V=at(time)))
-        tell(k)
+    place = files[0].parent
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=place, prefix=atomic.DRAFT) as folder:
+            for k, (file, time) in enumerate(zip(files, times, strict=True)):
+                write_mesh(Path(folder) / file.name, replace(mesh, V=at(time)))
+                tell(k)
+            for file in files:
+                (Path(folder) / file.name).replace(file)
+    except OSError as error:
+        raise atomic.unwritable(files[0], error) from error
     return files
 
 

@@ -71,6 +71,24 @@ def test_a_folder_is_filled_with_ply(tmp_path):
     np.testing.assert_allclose(read_mesh(files[1]).V, at(TIMES[1]), rtol=1e-15)
 
 
+def test_a_folder_may_have_a_dot_in_its_name(tmp_path):
+    (tmp_path / "take.2").mkdir()
+    check_output(tmp_path / "take.2")
+    (first, *_) = write_meshes(tmp_path / "take.2", MESH, TIMES, at)
+    assert first == tmp_path / "take.2" / "frame_000.ply"
+
+
+def test_no_half_of_a_sequence_is_left(tmp_path):
+    def breaks(time):
+        if time > 0.5:
+            raise OSError(28, "No space left on device")
+        return at(time)
+
+    with pytest.raises(RecordError, match="No space left on device"):
+        write_meshes(tmp_path / "a.obj", MESH, TIMES, breaks)
+    assert not list(tmp_path.iterdir())
+
+
 def test_many_frames_get_more_digits(tmp_path):
     names = mesh_files(tmp_path, 1001)
     assert names[0].name == "frame_0000.ply"
