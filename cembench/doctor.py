@@ -10,6 +10,7 @@ import importlib
 import sys
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points, version
+from importlib.util import find_spec
 
 from cembench.datasets import cache_directory, is_fetched
 from cembench.errors import CembenchError
@@ -53,6 +54,7 @@ def examine() -> list[Finding]:
         _renderer(),
         *(_offered(entry) for entry in sorted(entry_points(group=CHECKS), key=lambda e: e.name)),
         *_datasets(),
+        _video(),
         _machine(),
     ]
 
@@ -127,6 +129,17 @@ def _datasets() -> list[Finding]:
     detail += f"; kept in {cache_directory()}"
     remedy = "For the paper's public models run `cembench fetch NAME`; stand-ins do without."
     return [Finding("datasets", len(here) == len(known), detail, required=False, remedy=remedy)]
+
+
+def _video() -> Finding:
+    there = find_spec("imageio_ffmpeg") is not None
+    return Finding(
+        "video",
+        there,
+        "imageio-ffmpeg writes MP4" if there else "MP4 needs imageio-ffmpeg; GIF needs nothing",
+        required=False,
+        remedy="Run `pip install 'cembench[video]'`.",
+    )
 
 
 def _machine() -> Finding:

@@ -118,7 +118,8 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
     """Which vertex is the nose tip, an eye corner, a mouth corner of this face?
 
     Keys: nose_tip, eye_inner_right, eye_outer_right, eye_inner_left, eye_outer_left,
-    mouth_corner_right, mouth_corner_left (the person's own right and left are x < 0 and x > 0).
+    mouth_corner_right, mouth_corner_left, and lips_right, lips_middle, lips_left on the line where
+    the lips meet (the person's own right and left are x < 0 and x > 0).
 
     Raises
     ------

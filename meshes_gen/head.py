@@ -209,12 +209,15 @@ class Head:
         return carve(d, hollow, 0.04)
 
     def landmarks(self) -> dict[str, NDArray[np.float64]]:
-        """Points near the surface: nose tip, eye corners, mouth corners; (3,) each."""
+        """Points near the surface: nose tip, corners of eyes and mouth, lips; (3,) each."""
         c, P, mouth = self._points, self.person, self._between_lips()
         found = {
             "nose_tip": c["tip"] + (0, -0.085 * P.nose_width, 0),
             "mouth_corner_right": mouth[0],
             "mouth_corner_left": mouth[4],
+            "lips_right": mouth[1],
+            "lips_middle": mouth[2],
+            "lips_left": mouth[3],
         }
         for s, side in ((-1, "right"), (1, "left")):
             eye = c[f"eye_{side}"]

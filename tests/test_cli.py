@@ -151,7 +151,7 @@ def test_a_check_that_breaks_is_a_finding(monkeypatch):
     assert "AttributeError" in found.detail
 
 
-VERBS = ["status", "show", "compare", "merge", "export", "fetch", "report", "validate"]
+VERBS = ["status", "show", "compare", "merge", "export", "fetch", "report", "validate", "morph"]
 
 
 @pytest.mark.parametrize("verb", ["", "list", "map", "run", "reproduce", "doctor", *VERBS])

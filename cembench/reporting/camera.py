@@ -56,6 +56,17 @@ def view_rotation(mesh: TriangleMesh) -> Real:
     return _moved(_best_view(axes, up, middles, normals, areas), *PORTRAIT)
 
 
+def viewpoints(mesh: TriangleMesh) -> dict[str, Real]:
+    """How does one look at the surface from the front, from the side and three-quarter?
+
+    Rotations as in :func:`view_rotation`; the front is the coordinate axis that shows most, the
+    side a quarter turn to the viewer's right about the vertical.
+    """
+    front = _frame(_best_axis(*_samples(mesh)))
+    angles = {"front": 0.0, "three-quarter": 45.0, "side": 90.0}
+    return {name: _moved(front, aside, 0.0) for name, aside in angles.items()}
+
+
 def _samples(mesh: TriangleMesh) -> tuple[Real, Real, Real]:
     """Middles (k, 3), unit normals (k, 3) and areas (k,) of an even choice of triangles."""
     corners = mesh.V[mesh.F[:: -(-mesh.m // SAMPLE)]]

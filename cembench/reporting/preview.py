@@ -130,6 +130,15 @@ def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = 
     return drawn
 
 
+def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Picture]:
+    """How do a surface and its image look under one checkerboard? uint8 (side, side, 3) each.
+
+    Raises what :func:`write_preview` raises, except for files.
+    """
+    _check(mesh, uv, SIZE)
+    return _draw(Scene.of(mesh, uv), side, "pyvista")[0]
+
+
 def renderer_status() -> tuple[bool, str]:
     """Does pyvista draw here, and if not, why, and what can the user do?"""
     corners = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]])
