@@ -202,3 +202,14 @@ def test_the_environment_says_what_a_figure_depends_on():
     assert environment["libraries"]["cvxopt"]
     assert environment["memory_bytes"] > 0
     assert environment == describe_environment()
+
+
+def test_a_run_keeps_its_surfaces_also_those_of_cells_from_before(tmp_path):
+    store = Store(tmp_path)
+    (task,) = tasks_of("harmonic-circle")
+    run_tasks([task], store)
+    assert store.mesh(task.cell).hash == task.mesh.hash
+    (kept,) = (tmp_path / "meshes").iterdir()
+    kept.unlink()
+    run_tasks([task], store)
+    assert store.mesh(task.cell).name == task.mesh.name
