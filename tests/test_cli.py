@@ -125,7 +125,7 @@ def test_doctor_says_what_is_missing(cli, monkeypatch):
     assert "pip install libigl" in out
 
 
-VERBS = ["status", "show", "compare", "merge", "export"]
+VERBS = ["status", "show", "compare", "merge", "export", "report"]
 
 
 @pytest.mark.parametrize("verb", ["", "list", "map", "run", "reproduce", "doctor", *VERBS])
