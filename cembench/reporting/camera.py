@@ -43,8 +43,8 @@ def view_rotation(mesh: TriangleMesh) -> Real:
         Rows: the unit vectors in space that point right, up, and towards the viewer.
 
     """
-    middles, normals, areas = _samples(mesh)
-    net = (normals * areas[:, None]).sum(axis=0) / areas.sum()
+    _, normals, areas = _samples(mesh)
+    net = areas @ normals / areas.sum()
     strength = float(np.linalg.norm(net))
     if strength > FLAT:
         return _frame(net / strength)
@@ -52,8 +52,7 @@ def view_rotation(mesh: TriangleMesh) -> Real:
         axis = np.zeros(3)
         axis[np.argmax(np.abs(net))] = np.sign(net[np.argmax(np.abs(net))])
         return _moved(_frame(axis), *OBLIQUE)
-    axes, up = _views(mesh, middles, areas) if strength < CLOSED else (ANY, Y)
-    return _moved(_best_view(axes, up, middles, normals, areas), *PORTRAIT)
+    return _moved(_front(mesh), *PORTRAIT)
 
 
 def viewpoints(mesh: TriangleMesh) -> dict[str, Real]:
@@ -62,9 +61,17 @@ def viewpoints(mesh: TriangleMesh) -> dict[str, Real]:
     Rotations as in :func:`view_rotation`; the front is the coordinate axis that shows most, the
     side a quarter turn to the viewer's right about the vertical.
     """
-    front = _frame(_best_axis(*_samples(mesh)))
+    front = _front(mesh)
     angles = {"front": 0.0, "three-quarter": 45.0, "side": 90.0}
     return {name: _moved(front, aside, 0.0) for name, aside in angles.items()}
+
+
+def _front(mesh: TriangleMesh) -> Real:
+    """Straight along the coordinate axis that shows most, what points up upwards."""
+    middles, normals, areas = _samples(mesh)
+    nearly_closed = np.linalg.norm(areas @ normals) < CLOSED * areas.sum()
+    axes, up = _views(mesh, middles, areas) if nearly_closed else (ANY, Y)
+    return _best_view(axes, up, middles, normals, areas)
 
 
 def _samples(mesh: TriangleMesh) -> tuple[Real, Real, Real]:

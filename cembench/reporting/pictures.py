@@ -14,14 +14,14 @@ from PIL import Image
 from cembench.errors import RenderError
 
 #: Pixels of all pictures of a page together: at 0.13 bytes each (small pictures of meshes and
-#: checkerboards; large and smooth ones take half) about 3.5 MB, and a third more as text.
-PIXELS = 26_000_000
+#: checkerboards; large and smooth ones take half) about 2.5 MB, and a third more as text.
+PIXELS = 16_000_000
 #: Pixels along the longer side of one picture, and what a thumbnail has.
 LONGEST, THUMBNAIL = 1600, 360
 #: Quality of WebP at which a checkerboard's edges are still clean.
 QUALITY = 76
 #: Bytes up to which a vector graphic is embedded as it is; one of many marks outgrows its pixels.
-VECTOR_BYTES = 80_000
+VECTOR_BYTES = 55_000
 #: CSS pixels of the units that an SVG's size is given in.
 _SVG_UNITS = {"pt": 4 / 3, "px": 1.0, "": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54}
 

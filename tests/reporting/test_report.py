@@ -16,7 +16,7 @@ from cembench.reporting.document import (
 )
 from cembench.reporting.terminal_report import paper_tables
 from cembench.reporting.write_report import write_report
-from cembench.store import Store
+from cembench.store import Store, merge
 from tests.reporting.small_run import write_run
 
 
@@ -228,3 +228,21 @@ def test_a_store_keeps_surfaces_and_knows_a_wrong_one(tmp_path):
     one.write_bytes(b"cut")
     with pytest.raises(RecordError, match="cannot be read"):
         store.mesh(wrong.cell)
+
+
+def test_runs_that_are_merged_bring_their_surfaces(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    merge([store], Store(tmp_path / "both"))
+    names = [path.name for path in (tmp_path / "run" / "meshes").iterdir()]
+    assert sorted(p.name for p in (tmp_path / "both" / "meshes").iterdir()) == sorted(names)
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_reproduce_is_a_run_and_its_report(cli, monkeypatch):
+    monkeypatch.setattr("cembench.paper.profiles.surfaces_of", lambda *_: ["nefertiti"])
+    code, out, _ = cli("reproduce", "-o", "here")
+    assert code == 0
+    assert all(f"Table {k}: " in out for k in (1, 2, 3, 4))
+    assert max(map(len, out.splitlines()[:-1])) <= 80
+    assert out.splitlines()[-1] == f"Report: {cli.folder / 'here/report/index.html'}"
+    assert (cli.folder / "here/report/report.tex").is_file()

@@ -227,3 +227,14 @@ def test_a_renamed_mesh_is_not_measured_again(tmp_path):
     both = run_tasks([old, new], store)
     assert [r.outcome for r in both] == [first.outcome] * 2
     assert meshes() == ["new", "old"]
+
+
+def test_a_run_keeps_its_surfaces_also_those_of_cells_from_before(tmp_path):
+    store = Store(tmp_path)
+    (task,) = tasks_of("harmonic-circle")
+    run_tasks([task], store)
+    assert store.mesh(task.cell).hash == task.mesh.hash
+    (kept,) = (tmp_path / "meshes").iterdir()
+    kept.unlink()
+    run_tasks([task], store)
+    assert store.mesh(task.cell).name == task.mesh.name

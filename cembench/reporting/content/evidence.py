@@ -20,6 +20,7 @@ from cembench.exhibits import Exhibit, read_exhibits
 from cembench.geometry.mesh import TriangleMesh
 from cembench.records import Cell, MeshOrigin, Record
 from cembench.reporting import frame
+from cembench.reporting.palette import Look, looks
 from cembench.store import Store
 
 #: The algorithms that the paper's tables compare, by their columns there.
@@ -177,6 +178,12 @@ class Evidence:
             for r in self.records
         }
 
+    @cached_property
+    def looks(self) -> dict[str, Look]:
+        """Colour, marker and dash of each series, by its label: the same in every plot."""
+        found = looks([s.name for s in self.series])
+        return {s.label: found[s.name] for s in self.series}
+
     def find(
         self, surface: SurfaceFacts, series: Series, policy: str | None = None
     ) -> Record | None:
@@ -234,10 +241,6 @@ class Evidence:
         if record is None or record.outcome.status != "ok":
             return None
         return self.store.uv(record.cell)
-
-    def exhibit(self, figure: str) -> Exhibit | None:
-        """The exhibit that regenerates a figure of the paper, if the run has it."""
-        return next((e for e in self.exhibits if e.figure == figure), None)
 
 
 def slug(name: str) -> str:

@@ -9,7 +9,6 @@ from cembench.reporting.content.beside import significant
 from cembench.reporting.content.evidence import REFERENCE, Evidence, Series, SurfaceFacts
 from cembench.reporting.content.table_2 import measured_rates
 from cembench.reporting.document import Column, Gap, Table, Value, missing, words
-from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot
 from cembench.reporting.plots import Series as Bars
 
@@ -118,7 +117,6 @@ def speedups_table(evidence: Evidence) -> Table:
 
 def policies_plot(evidence: Evidence) -> Plot:
     """The ratios as points over the surfaces."""
-    style = looks([s.algorithm for s in evidence.series])
     drawn = []
     for series in evidence.series:
         names, values = [], []
@@ -126,7 +124,7 @@ def policies_plot(evidence: Evidence) -> Plot:
             a, b = (seconds_under(evidence, surface, series, p)[1] for p in BOTH)
             names.append(surface.title)
             values.append(b / a if a and b else None)
-        drawn.append(Bars(series.label, names, values, "both", style[series.algorithm]))
+        drawn.append(Bars(series.label, names, values, "both", evidence.looks[series.label]))
     return Plot(
         "reuse-against-backslash",
         "What factoring anew costs",

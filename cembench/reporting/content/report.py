@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from cembench import __version__
+from cembench.records import MeshOrigin
 from cembench.reporting.content import policies
 from cembench.reporting.content.claims import claims
 from cembench.reporting.content.evidence import REFERENCE, Evidence
@@ -43,6 +44,14 @@ PICTURES = (
 )
 
 
+#: What is said of surfaces by their origin.
+_KINDS: Mapping[MeshOrigin, str] = {
+    "model": "of the paper's models",
+    "stand-in": "stand-ins for models of the paper",
+    "surface": "not in the paper",
+}
+
+
 def build_report(
     evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
 ) -> Report:
@@ -55,8 +64,8 @@ def build_report(
     progress("tables, plots and claims", n - 2, n)
     sections = [
         _summary(evidence),
-        Section("claims", "Claims of the paper", tuple(claims(evidence, inspections))),
         _tables(evidence),
+        Section("claims", "Claims of the paper", tuple(claims(evidence, inspections))),
         _figures(evidence, inspections, folder),
         _beyond(evidence, folder),
         *exhibit_sections(evidence, folder),
@@ -83,13 +92,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
         ("run", str(evidence.store.folder)),
         ("measured", " to ".join(dict.fromkeys((dates[0], dates[-1])))),
         ("cells", ", ".join(f"{count} {status}" for status, count in statuses.most_common())),
-        (
-            "surfaces",
-            ", ".join(
-                f"{count} {ORIGINS[o][0].removeprefix('measured here on ')}"
-                for o, count in origins.items()
-            ),
-        ),
+        ("surfaces", ", ".join(f"{count} {_KINDS[o]}" for o, count in origins.items())),
         ("algorithms", ", ".join(series.label for series in evidence.series)),
         ("solves", ", ".join(evidence.policies)),
         ("rounds", ", ".join(map(str, rounds)) or "none"),

@@ -23,7 +23,6 @@ from cembench.reporting.document import (
     Value,
     words,
 )
-from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot
 
 #: Degrees up to which the histograms of a page go.
@@ -162,10 +161,9 @@ def _line(
 
 def _plot(evidence: Evidence, surface: SurfaceFacts, seen: Inspection, name: str) -> Plot | None:
     """Histograms, the energies of the iterations and the phases, as far as there are any."""
-    style = looks([s.algorithm for s in evidence.series])
     panels: list[Panel] = []
     curves = [
-        histogram(s.label, seen.angles[s.label], style[s.algorithm], SHOWN, "line")
+        histogram(s.label, seen.angles[s.label], evidence.looks[s.label], SHOWN, "line")
         for s in evidence.series
         if s.label in seen.angles
     ]

@@ -271,11 +271,10 @@
   const isAxis = (name) => /^[xy]axis/.test(name);
   const typeset = (words) => words.replace(/\b([A-Za-z])_([A-Z]+)\b/g, "<i>$1</i><sub>$2</sub>");
   const isNarrow = () => innerWidth < 700;
-  const rowsOf = (layout) => isNarrow()
-    ? Math.max(1, Object.keys(layout).filter((name) => name.startsWith("xaxis")).length)
-    : layout.grid?.rows ?? 1;
-  const heightOf = ({ layout }) =>
-    BAR + (isNarrow() ? 350 * rowsOf(layout) : layout.height ?? 460);
+  const rowsOf = ({ data, layout }) => isNarrow()
+    ? new Set(data.map((trace) => trace.xaxis ?? "x")).size : layout.grid?.rows ?? 1;
+  const heightOf = (drawing) =>
+    BAR + (isNarrow() ? 350 * rowsOf(drawing) : drawing.layout.height ?? 460);
 
   function layoutOf(drawing) {
     const { width, height, title, ...layout } = drawing.layout;
@@ -285,7 +284,7 @@
       title: { ...axis.title, text: typeset(axis.title?.text ?? "") },
     }]);
     const stacked = isNarrow() && layout.grid
-      ? { grid: { ...layout.grid, rows: rowsOf(layout), columns: 1, ygap: 0.45 } } : {};
+      ? { grid: { ...layout.grid, rows: rowsOf(drawing), columns: 1, ygap: 0.45 } } : {};
     return {
       ...layout,
       ...Object.fromEntries(axes),

@@ -8,7 +8,6 @@ import numpy as np
 
 from cembench.records import Record
 from cembench.reporting.content.evidence import Evidence
-from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot, Point, through
 
 METRIC = "angle_error_mean_deg"
@@ -43,9 +42,8 @@ def _panel(evidence: Evidence, policy: str) -> Panel | None:
             clouds[label].append(Point(seconds / fastest, error / finest, surface.title))
     if not any(clouds.values()):
         return None
-    style = looks([s.algorithm for s in evidence.disk_series])
     drawn = [
-        through(s.label, clouds[s.label], "points", style[s.algorithm])
+        through(s.label, clouds[s.label], "points", evidence.looks[s.label])
         for s in evidence.disk_series
         if clouds[s.label]
     ]

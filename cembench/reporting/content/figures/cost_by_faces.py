@@ -10,7 +10,7 @@ import numpy as np
 from cembench import paper
 from cembench.reporting.content.evidence import PAPER_ALGORITHMS, Evidence
 from cembench.reporting.document import Column, Table, Value, missing, words
-from cembench.reporting.palette import looks
+from cembench.reporting.palette import Look, looks
 from cembench.reporting.plots import Axis, Panel, Plot, Point, Series, through
 
 #: Fewer points determine no exponent that says anything.
@@ -64,11 +64,12 @@ def cost_by_faces(evidence: Evidence) -> Plot:
     panels = []
     for policy in evidence.policies:
         groups = [
-            (s.label, s.algorithm, measured_points(evidence, s.label, policy))
+            (s.label, evidence.looks[s.label], measured_points(evidence, s.label, policy))
             for s in evidence.disk_series
         ]
         panels.append(_panel(groups, f"measured here, solves: {policy}"))
-    groups = [(a.upper(), a, printed_points(a)) for a in PAPER_ALGORITHMS]
+    usual = looks(PAPER_ALGORITHMS)
+    groups = [(a.upper(), usual[a], printed_points(a)) for a in PAPER_ALGORITHMS]
     panels.append(_panel(groups, "printed in the paper (Table 1)"))
     return Plot(
         "figure-10",
@@ -82,21 +83,18 @@ def cost_by_faces(evidence: Evidence) -> Plot:
     )
 
 
-def _panel(groups: Sequence[tuple[str, str, list[Point]]], title: str) -> Panel:
-    style = looks([algorithm for _, algorithm, _ in groups])
+def _panel(groups: Sequence[tuple[str, Look, list[Point]]], title: str) -> Panel:
     drawn = []
-    for label, algorithm, points in groups:
+    for label, look, points in groups:
         if not points:
             continue
-        drawn.append(through(label, points, "points", style[algorithm]))
+        drawn.append(through(label, points, "points", look))
         law = fit(points)
         if law:
             ends = [min(p.x for p in points), max(p.x for p in points)]
             line = [law.factor * e**law.exponent for e in ends]
             words = [f"{label}: exponent {law.exponent:.2f}"] * 2
-            drawn.append(
-                Series(f"{label}, fitted", ends, line, "line", style[algorithm], words, named=False)
-            )
+            drawn.append(Series(f"{label}, fitted", ends, line, "line", look, words, named=False))
     return Panel(Axis("triangles", log=True), Axis("seconds", log=True), tuple(drawn), title)
 
 

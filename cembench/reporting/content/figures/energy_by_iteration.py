@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from cembench.reporting.content.evidence import REFERENCE, Evidence, SurfaceFacts, model_surface
 from cembench.reporting.document import Gap
-from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot, Series
 
 #: The models of the paper's figure.
@@ -46,7 +43,7 @@ def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Pane
         return None
     history = record.outcome.energy_history
     steps = list(range(len(history)))
-    drawn = Series(series.title, steps, history, "both", looks([REFERENCE])[REFERENCE])
+    drawn = Series(series.title, steps, history, "both", evidence.looks[series.label])
     return Panel(Axis("iteration"), Axis("conformal energy E_C"), (drawn,), title)
 
 
@@ -61,8 +58,3 @@ def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
         f"no map of {model} by CEM: {why}.",
         f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
     )
-
-
-def present(evidence: Evidence, models: Sequence[str]) -> list[SurfaceFacts]:
-    """The surfaces of the run that are or stand for these models."""
-    return [s for s in evidence.models if s.paper_row in models]

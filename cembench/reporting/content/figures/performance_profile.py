@@ -10,7 +10,6 @@ from __future__ import annotations
 from math import inf
 
 from cembench.reporting.content.evidence import Evidence, Series, SurfaceFacts
-from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot
 from cembench.reporting.plots import Series as Line
 
@@ -62,7 +61,6 @@ def performance_profile(evidence: Evidence) -> Plot | None:
 
 
 def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: str) -> Panel:
-    style = looks([s.algorithm for s in evidence.disk_series])
     finite = [r for values in found.values() for r in values if r < inf]
     last = 1.15 * max(finite)
     lines = []
@@ -70,7 +68,7 @@ def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: st
         ordered = sorted(r for r in found[series.label] if r < inf)
         x = [1.0, *ordered, last]
         y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
-        lines.append(Line(series.label, x, y, "steps", style[series.algorithm]))
+        lines.append(Line(series.label, x, y, "steps", evidence.looks[series.label]))
     return Panel(
         Axis("tau, times the fastest", log=True, low=1.0, high=last),
         Axis("surfaces (%)", low=0, high=104),
