@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
-from cembench.geometry.folds import interior_without_folds
-from cembench.geometry.harmonic import harmonic_extension
-from cembench.geometry.koebe import Patches, Weights, koebe_steps, rounded
-from cembench.geometry.laplacian import laplacian
+from cembench.geometry.koebe import Patches, Weights, finished, koebe_steps
 from cembench.geometry.mesh import HoledMesh
 from cembench.metrics import boundary_circularity
 from cembench.parameterization import Parameterization
@@ -61,18 +57,12 @@ def koebe_cem(
             inversion=inversion,
         )
     )
-    uv = steps[-1].uv
     iterations = [len(step.energies) - 1 for step in steps]
+    uv, repairs = finished(mesh, steps[-1].uv, outer=outer, rounding=rounding)
     extras: dict[str, Any] = {
         "iterations_by_step": iterations,
         "order_kept": sum(step.order_kept for step in steps),
-        "circularity_before_rounding": boundary_circularity(mesh, uv),
+        "circularity_before_rounding": boundary_circularity(mesh, steps[-1].uv),
+        "fold_repairs": repairs,
     }
-    L = laplacian(mesh)
-    if rounding:
-        _, holes = mesh.outer_and_holes(outer)
-        b = np.concatenate(mesh.loops)
-        uv = harmonic_extension(L, b, rounded(uv, holes)[b])
-    uv, repairs = interior_without_folds(mesh, L, uv)
-    extras["fold_repairs"] = repairs
     return Parameterization(uv, sum(iterations), (), extras)

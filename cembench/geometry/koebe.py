@@ -9,7 +9,7 @@ each with its error, and errors of earlier steps are forgotten.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -21,7 +21,8 @@ from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole
 from cembench.geometry.condensed import Condensed, DenseCholesky, condensed
-from cembench.geometry.folds import in_order
+from cembench.geometry.folds import in_order, interior_without_folds
+from cembench.geometry.harmonic import harmonic_extension
 from cembench.geometry.laplacian import cotangent_laplacian, laplacian
 from cembench.geometry.mesh import HoledMesh
 from cembench.geometry.patches import disk_patch, fan_patch
@@ -113,23 +114,30 @@ def koebe_steps(
             yield Step(sweep, k, before, uv, energies, order_kept)
 
 
-def rounded(uv: Complex, holes: Sequence[Loop]) -> Complex:
-    """Where do the boundaries lie when every hole is put on the circle fitted to it? (n,)
+def finished(
+    mesh: HoledMesh, uv: Complex, *, outer: int | None = None, rounding: bool = True
+) -> tuple[Complex, int]:
+    """Which map comes of the last image, its holes made round and its folds mended?
 
-    Radially, as (25) puts the outer boundary on its circle; vertices that would change places take
-    the nearest angles in order. Interior values are left as they are.
+    With `rounding`, each hole is put on the circle fitted to it, radially, as (25) puts the outer
+    boundary on its circle (vertices that would change places take the nearest angles in order), and
+    the interior is solved for again. The second value counts the repairs of folds.
 
     Raises
     ------
     AlgorithmFailed
-        A hole is too far from a circle for that.
+        A hole is too far from a circle for that, or folds remain.
 
     """
-    uv = uv.copy()
-    for hole in holes:
-        centre, radius = fitted_circle(uv[hole])
-        uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
-    return uv
+    L = laplacian(mesh)
+    if rounding:
+        uv = uv.copy()
+        for hole in mesh.outer_and_holes(outer)[1]:
+            centre, radius = fitted_circle(uv[hole])
+            uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
+        boundary = np.concatenate(mesh.loops)
+        uv = harmonic_extension(L, boundary, uv[boundary])
+    return interior_without_folds(mesh, L, uv)
 
 
 class _FilledSurface:
