@@ -107,7 +107,10 @@ def koebe_steps(
             with phase("patches"):
                 glued = {j: _patch(points[loop], patches) for j, loop in enumerate(loops) if j != k}
             disk = _FilledSurface(surface, glued, k)
-            start = kept[k] if k in kept else disk.start(*pole(points, mesh.F))
+            starts = [kept[k] if k in kept else disk.start(*pole(points, mesh.F))]
+            if before is not None:
+                starts += _projected(before[loops[k]])
+            start = min(map(on_circle, starts), key=disk.energy)
             kept[k], uv, energies, order_kept = disk.map(
                 start, tolerance=tolerance, max_iterations=max_iterations, inversion=inversion
             )
@@ -141,23 +144,29 @@ def finished(
 
 
 class _FilledSurface:
-    """A surface with patches on all of its boundaries but number `k`: a disk."""
+    """A surface with patches on all of its boundaries but number `k`: a disk.
+
+    The closed boundaries c are eliminated too, so that an iteration of CEM needs only the open
+    boundary o and the interior: f_c = -W f_o, and half of f_o^* S f_o is the Dirichlet energy.
+    """
 
     def __init__(self, surface: Condensed, patches: dict[int, Real], k: int) -> None:
         self._surface = surface
-        self._open = surface.parts[k]
+        o = self._open = surface.parts[k]
         with phase("patches"):
-            self._A = surface.S.copy()
+            A = surface.S.copy()
             for j, P in patches.items():
-                self._A[surface.parts[j], surface.parts[j]] += P
-            closed = np.ones(len(self._A), dtype=bool)
-            closed[self._open] = False
-            self._closed = np.flatnonzero(closed)
-        self._filled = DenseCholesky(self._A[np.ix_(self._closed, self._closed)])
-        self._across = self._A[self._closed][:, self._open]
-        self._ring = DenseCholesky(surface.L_bb[self._open][:, self._open].toarray())
-        self._to_interior = surface.L_bi[self._open]
-        self._to_closed = surface.L_bb[self._open][:, self._closed]
+                A[surface.parts[j], surface.parts[j]] += P
+            closed = np.ones(len(A), dtype=bool)
+            closed[o] = False
+            c = self._closed = np.flatnonzero(closed)
+        filled = DenseCholesky(A[np.ix_(c, c)])
+        self._W = filled.solve(A[c][:, o])
+        with phase("condensation"):
+            self._S = A[o, o] - A[o][:, c] @ self._W
+        self._ring = DenseCholesky(surface.L_bb[o][:, o].toarray())
+        self._to_interior = surface.L_bi[o]
+        self._to_closed = surface.L_bb[o][:, c]
 
     def start(self, corners: Loop, values: Complex) -> Complex:
         """Boundary values of the map with a pole (Eqs. 13 to 18) on the filled surface."""
@@ -168,52 +177,62 @@ class _FilledSurface:
             rhs[corners] = values
             inside = surface.solve_interior(rhs[surface.interior])
             rhs_b = rhs[surface.boundary] - surface.L_bi @ inside
-            # Pinned at one vertex of the open boundary (Theorem 1).
-            g = np.zeros(len(rhs_b), dtype=np.complex128)
-            free = np.delete(np.arange(len(g)), self._open.stop - 1)
-            g[free] = DenseCholesky(self._A[np.ix_(free, free)]).solve(rhs_b[free])
-        f_k = g[self._open]
-        return np.conj(f_k) if polygon_area(f_k) < 0 else f_k
+            rhs_o = rhs_b[self._open] - _product(self._W.T, rhs_b[self._closed])
+        # Pinned at the last vertex (Theorem 1).
+        f_o = np.append(DenseCholesky(self._S[:-1, :-1]).solve(rhs_o[:-1]), 0.0)
+        return np.conj(f_o) if polygon_area(f_o) < 0 else f_o
+
+    def energy(self, f_o: Complex) -> float:
+        """E_C (Eq. 7) of the filled surface's map that is harmonic for these boundary values."""
+        with phase("energy"):
+            return 0.5 * float(np.vdot(f_o, _product(self._S, f_o)).real) - polygon_area(f_o)
 
     def map(
         self, start: Complex, *, tolerance: float, max_iterations: int, inversion: bool
     ) -> tuple[Complex, Complex, tuple[float, ...], int]:
-        """CEM (Algorithm 1) from these boundary values.
+        """CEM (Algorithm 1) from these boundary values on the unit circle.
 
         Returns the open boundary's values, the map (n,), E_C of the filled surface before and after
         each iteration, and how often the order had to be kept.
         """
         surface, m = self._surface, len(self._closed)
 
-        def dirichlet(f_k: Complex) -> Complex:
-            f_c = -self._filled.solve(self._across @ f_k)
-            f_b = self._joined(f_k, f_c)
-            return np.concatenate([f_c, surface.extension(f_b)])
+        def on_boundaries(f_o: Complex) -> Complex:
+            f_b = np.empty(len(surface.boundary), dtype=np.complex128)
+            f_b[self._open], f_b[self._closed] = f_o, -_product(self._W, f_o)
+            return f_b
+
+        def dirichlet(f_o: Complex) -> Complex:
+            f_b = on_boundaries(f_o)
+            return np.concatenate([f_b[self._closed], surface.extension(f_b)])
 
         def ring(f: Complex) -> Complex:
             return self._ring.solve(-(self._to_interior @ f[m:] + self._to_closed @ f[:m]))
 
-        def energy(f: Complex, f_k: Complex) -> float:
-            with phase("energy"):
-                f_b = self._joined(f_k, f[:m])
-                return 0.5 * float(np.vdot(f_b, self._A @ f_b).real) - polygon_area(f_k)
-
-        f_k, f, history, order_kept = iterate_boundary(
-            on_circle(start),
+        f_o, f, history, order_kept = iterate_boundary(
+            start,
             dirichlet,
             ring,
-            energy,
+            lambda _, f_o: self.energy(f_o),
             tolerance=tolerance,
             max_iterations=max_iterations,
             inversion=inversion,
         )
-        uv = surface.whole(self._joined(f_k, f[:m]), f[m:])
-        return f_k, uv, tuple(history), order_kept
+        uv = surface.whole(on_boundaries(f_o), f[m:])
+        return f_o, uv, tuple(history), order_kept
 
-    def _joined(self, f_k: Complex, f_c: Complex) -> Complex:
-        f_b = np.empty(len(self._A), dtype=np.complex128)
-        f_b[self._open], f_b[self._closed] = f_k, f_c
-        return f_b
+
+def _product(M: Real, f: Complex) -> Complex:
+    """M f without a complex copy of M."""
+    return M @ f.real + 1j * (M @ f.imag)
+
+
+def _projected(z: Complex) -> list[Complex]:
+    """An outer boundary's image put on its fitted circle radially, if that keeps its order."""
+    away: Complex = z - fitted_circle(z)[0]
+    if not np.abs(away).min() > 0 or backward_arcs(away):
+        return []
+    return [away / np.abs(away)]
 
 
 def _outside_in(uv: Complex, loop: Loop) -> Complex:
