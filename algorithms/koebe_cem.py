@@ -39,12 +39,12 @@ def koebe_cem(
     weights in every step (`weights="plane"` takes those of the last image, as the paper's text
     reads); a hole that has an image is filled by a round disk with its vertices where the image
     puts them (`patches="fans"`: by a fan to the centroid, as in the paper, which knows nothing of
-    the disk's inside); the holes come longest first, so the shortest is opened first; a step
-    starts from the paper's pole, later from where the boundary was when last opened, or from its
-    last image put on a circle, whichever has the lower E_C; at last each hole is put on the circle fitted to it and
-    the interior is solved for again (`rounding`; `circularity_before_rounding` tells how far it
-    was). Since patches change only dense blocks at the boundary, the interior is eliminated once,
-    for all steps of all sweeps.
+    the disk's inside); the holes come longest first, so the shortest is opened first; a step starts
+    from the paper's pole (in later sweeps from where the boundary was when last opened) or from the
+    boundary's last image put on a circle, whichever has the lower E_C; at last each hole is put on
+    the circle fitted to it and the interior is solved for again (`rounding`;
+    `circularity_before_rounding` tells how far it was). Since patches change only dense blocks at
+    the boundary, the interior is eliminated once, for all steps of all sweeps.
     """
     steps = list(
         koebe_steps(
