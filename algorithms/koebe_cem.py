@@ -59,7 +59,7 @@ def koebe_cem(
         )
     )
     iterations = [len(step.energies) - 1 for step in steps]
-    uv, repairs = finished(mesh, steps[-1].uv, outer=outer, rounding=rounding)
+    uv, repairs = finished(mesh, steps[-1], outer=outer, rounding=rounding)
     extras: dict[str, Any] = {
         "iterations_by_step": iterations,
         "order_kept": sum(step.order_kept for step in steps),

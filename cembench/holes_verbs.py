@@ -100,7 +100,7 @@ def _best_sweep(mesh: HoledMesh, steps: list[Step], outer: int | None) -> int:
     energies = []
     for step in steps:
         if step.boundary == 0:
-            uv, _ = finished(mesh, step.uv, outer=outer)
+            uv, _ = finished(mesh, step, outer=outer)
             energies.append(dirichlet_energy(mesh, uv) - image_area(mesh, uv))
     enough = min(energies) * (1.01 if min(energies) > 0 else 0.99)
     return 1 + next(k for k, energy in enumerate(energies) if energy <= enough)

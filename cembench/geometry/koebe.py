@@ -22,11 +22,10 @@ from cembench.errors import AlgorithmFailed
 from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole
 from cembench.geometry.condensed import Condensed, DenseCholesky, condensed
 from cembench.geometry.folds import in_order, interior_without_folds
-from cembench.geometry.harmonic import harmonic_extension
 from cembench.geometry.laplacian import cotangent_laplacian, laplacian
 from cembench.geometry.mesh import HoledMesh
 from cembench.geometry.patches import disk_patch, fan_patch
-from cembench.geometry.planar import backward_arcs, fitted_circle, polygon_area
+from cembench.geometry.planar import backward_arcs, fitted_circle, polygon_area, signed_areas
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -57,6 +56,8 @@ class Step:
         E_C of the filled surface, before and after each iteration of CEM.
     order_kept : int
         How often a step of CEM was changed so that the boundary kept its order.
+    surface : Condensed
+        The surface with its own weights, its interior eliminated.
 
     """
 
@@ -66,6 +67,7 @@ class Step:
     uv: Complex
     energies: tuple[float, ...]
     order_kept: int
+    surface: Condensed
 
 
 def koebe_steps(
@@ -95,7 +97,7 @@ def koebe_steps(
     loops = (first, *holes)
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so no harmonic map has any freedom")
-    surface = condensed(mesh, laplacian(mesh), loops)
+    own = surface = condensed(mesh, laplacian(mesh), loops)
     uv: Complex | None = None
     kept: dict[int, Complex] = {}
     for sweep in range(1, sweeps + 1):
@@ -114,13 +116,13 @@ def koebe_steps(
             kept[k], uv, energies, order_kept = disk.map(
                 start, tolerance=tolerance, max_iterations=max_iterations, inversion=inversion
             )
-            yield Step(sweep, k, before, uv, energies, order_kept)
+            yield Step(sweep, k, before, uv, energies, order_kept, own)
 
 
 def finished(
-    mesh: HoledMesh, uv: Complex, *, outer: int | None = None, rounding: bool = True
+    mesh: HoledMesh, step: Step, *, outer: int | None = None, rounding: bool = True
 ) -> tuple[Complex, int]:
-    """Which map comes of the last image, its holes made round and its folds mended?
+    """Which map comes of the last step's image, its holes made round and its folds mended?
 
     With `rounding`, each hole is put on the circle fitted to it, radially, as (25) puts the outer
     boundary on its circle (vertices that would change places take the nearest angles in order), and
@@ -132,15 +134,17 @@ def finished(
         A hole is too far from a circle for that, or folds remain.
 
     """
-    L = laplacian(mesh)
+    uv = step.uv
     if rounding:
         uv = uv.copy()
         for hole in mesh.outer_and_holes(outer)[1]:
             centre, radius = fitted_circle(uv[hole])
             uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
-        boundary = np.concatenate(mesh.loops)
-        uv = harmonic_extension(L, boundary, uv[boundary])
-    return interior_without_folds(mesh, L, uv)
+        f_b = uv[step.surface.boundary]
+        uv = step.surface.whole(f_b, step.surface.extension(f_b))
+    if (signed_areas(uv, mesh.F) > 0).all():
+        return uv, 0
+    return interior_without_folds(mesh, laplacian(mesh), uv)
 
 
 class _FilledSurface:
