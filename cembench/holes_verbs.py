@@ -25,7 +25,7 @@ MOST_STEPS = 4
 def holes(
     meshes: Annotated[
         list[str],
-        typer.Argument(metavar="[MESH]...", help="Surface with holes: a file, or a known name."),
+        typer.Argument(metavar="MESH", help="Surface with holes: a file, or a known name."),
     ] = [STAND_IN],  # noqa: B006 - typer copies defaults
     *,
     outer: Annotated[
@@ -53,10 +53,17 @@ def holes(
         mesh.outer_and_holes(outer)
     algorithms = [a for a in registry.algorithms.values() if a.target == "circular holes"]
     rows: list[dict[str, Any]] = []
-    for mesh in surfaces:
+    options = "".join(
+        f" --{option} {value}"
+        for option, value in (("outer", outer), ("sweeps", sweeps), ("faces", faces))
+        if value is not None
+    )
+    for name, mesh in zip(meshes, surfaces, strict=True):
         with err.status(f"Koebe's method on {mesh.name}", spinner="line"):
-            rows += _examine(mesh, algorithms, outer, sweeps, run)
-    _lay_down_table(rows, run, meshes)
+            command = f"cembench holes {Path(name).name}{options}"
+            rows += _examine(mesh, algorithms, outer, sweeps, run, command)
+    files = " ".join(Path(name).name for name in meshes)
+    _lay_down_table(rows, run, f"cembench holes {files}{options}")
     if as_json:
         print_json(rows)
     else:
@@ -69,7 +76,12 @@ def holes(
 
 
 def _examine(
-    mesh: HoledMesh, algorithms: list[Algorithm], outer: int | None, sweeps: int, run: Path
+    mesh: HoledMesh,
+    algorithms: list[Algorithm],
+    outer: int | None,
+    sweeps: int,
+    run: Path,
+    command: str,
 ) -> list[dict[str, Any]]:
     """Everything about one surface: a row for each way of mapping it, and two exhibits."""
     from cembench.errors import AlgorithmFailed
@@ -88,7 +100,7 @@ def _examine(
             row, record, uv = _measured(mesh, algorithm, outer, count)
             rows.append(row)
             if algorithm.name == KOEBE and uv is not None and count == 1:
-                _lay_down_pictures(mesh, steps, uv, record, outer, run)
+                _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
     return rows
 
 
@@ -138,7 +150,13 @@ def _measured(
 
 
 def _lay_down_pictures(
-    mesh: HoledMesh, steps: list[Step], uv: Any, record: Record, outer: int | None, run: Path
+    mesh: HoledMesh,
+    steps: list[Step],
+    uv: Any,
+    record: Record,
+    outer: int | None,
+    run: Path,
+    command: str,
 ) -> None:
     """Figure 1, the steps of the first sweep, and Figure 7, the map."""
     from cembench.exhibits import Exhibit, Picture, exhibit_folder, write_exhibit
@@ -147,7 +165,6 @@ def _lay_down_pictures(
 
     metrics = record.outcome.metrics
     origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
-    command = f"cembench holes {mesh.name}"
     figures = {
         "angle_error_mean_deg": metrics["angle_error_mean_deg"],
         "conformal_energy": metrics["conformal_energy"],
@@ -257,7 +274,7 @@ _TABLE = (
 )
 
 
-def _lay_down_table(rows: list[dict[str, Any]], run: Path, meshes: list[str]) -> None:
+def _lay_down_table(rows: list[dict[str, Any]], run: Path, command: str) -> None:
     from cembench.exhibits import Exhibit, Table, write_exhibit
 
     table = Table(
@@ -277,7 +294,7 @@ def _lay_down_table(rows: list[dict[str, Any]], run: Path, meshes: list[str]) ->
             title="Surfaces with holes",
             text="Koebe's method after one sweep and after the best number of sweeps, beside the "
             "other maps to a disk with holes.",
-            command=f"cembench holes {' '.join(meshes)}",
+            command=command,
             origin="stand-in" if standing else "surface",
             tables=(table,),
             facts={"rows": rows},

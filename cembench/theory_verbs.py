@@ -51,10 +51,12 @@ def theory(
     registry = load_registry()
     surfaces = [surface_named(registry, name, DiskMesh, faces) for name in meshes]
     found: list[tuple[dict[str, Any], Exhibit]] = []
-    for mesh in surfaces:
+    rival = registry.algorithms.get(RIVAL)
+    size = "" if faces is None else f" --faces {faces}"
+    for name, mesh in zip(meshes, surfaces, strict=True):
+        command = f"cembench theory {Path(name).name} --iterations {iterations}{size}"
         with err.status(f"Section 4 on {mesh.name}", spinner="line"):
-            rival = registry.algorithms.get(RIVAL)
-            found.append(_examine(mesh, rival, iterations, run))
+            found.append(_examine(mesh, rival, iterations, run, command))
     if as_json:
         print_json([facts for facts, _ in found])
     else:
@@ -65,7 +67,7 @@ def theory(
 
 
 def _examine(
-    mesh: DiskMesh, rival: Any, iterations: int, run: Path
+    mesh: DiskMesh, rival: Any, iterations: int, run: Path, command: str
 ) -> tuple[dict[str, Any], Exhibit]:
     from cembench.exhibits import Exhibit, Picture, exhibit_folder, write_exhibit
     from cembench.reporting.theory_plot import write_theory_plot
@@ -120,7 +122,7 @@ def _examine(
         name=name,
         title=f"Section 4 on {mesh.name}",
         text=_summary(facts) + (f" {missing}" if missing else ""),
-        command=f"cembench theory {mesh.name}",
+        command=command,
         origin="surface",
         pictures=(
             Picture(
@@ -164,6 +166,8 @@ def _rival_history(rival: Any, mesh: DiskMesh) -> tuple[dict[str, tuple[float, .
         result = rival.function(mesh.fresh(), **rival.arguments({}))
     except AlgorithmFailed as error:
         return {}, f"{rival.title} failed: {error}."
+    if not result.energy_history:
+        return {}, f"{rival.title} tells no energies."
     return {rival.title: result.energy_history}, ""
 
 

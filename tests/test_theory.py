@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from cembench import DiskMesh
+from cembench import DiskMesh, Parameterization, algorithm
 from cembench.errors import AlgorithmFailed
 from cembench.exhibits import read_exhibits
 from cembench.theory import (
@@ -16,6 +16,7 @@ from cembench.theory import (
     statements,
     trajectory,
 )
+from cembench.theory_verbs import _rival_history
 from meshes_gen.flat_disk import flat_disk
 from tests import gallery
 from tests.real_meshes import real_mesh
@@ -108,6 +109,24 @@ def test_the_verb_shows_and_lays_down_an_exhibit(cli):
     (exhibit,) = read_exhibits(cli.folder / "r")
     assert (cli.folder / "r/exhibits/theory-flat-disk/theory.png").stat().st_size > 10_000
     assert exhibit.tables[1].rows[0][:3] == ("K 1 = 1", "Theorem 2", "yes")
+
+
+def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
+    mesh = flat_disk(100)
+
+    def rival(energies, failing=False):
+        @algorithm("rival", title="Rival", target="disk")
+        def solver(mesh: DiskMesh) -> Parameterization:
+            if failing:
+                raise AlgorithmFailed("no luck")
+            return Parameterization(np.zeros(mesh.n, complex), 1, energies)
+
+        return solver.__cembench__
+
+    assert _rival_history(rival((0.2, 0.1)), mesh) == ({"Rival": (0.2, 0.1)}, "")
+    assert _rival_history(rival(()), mesh)[1] == "Rival tells no energies."
+    assert _rival_history(rival((), failing=True), mesh)[1] == "Rival failed: no luck."
+    assert _rival_history(None, mesh) == ({}, "direct-cem is not installed here.")
 
 
 @pytest.mark.parametrize(
