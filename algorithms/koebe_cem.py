@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
-from cembench.geometry.folds import interior_without_folds
-from cembench.geometry.harmonic import harmonic_extension
-from cembench.geometry.koebe import Patches, Weights, koebe_steps, rounded
-from cembench.geometry.laplacian import laplacian
+from cembench.geometry.koebe import Patches, Weights, finished, koebe_steps
 from cembench.geometry.mesh import HoledMesh
 from cembench.metrics import boundary_circularity
 from cembench.parameterization import Parameterization
@@ -43,11 +39,12 @@ def koebe_cem(
     weights in every step (`weights="plane"` takes those of the last image, as the paper's text
     reads); a hole that has an image is filled by a round disk with its vertices where the image
     puts them (`patches="fans"`: by a fan to the centroid, as in the paper, which knows nothing of
-    the disk's inside); the holes come longest first, so the shortest is opened first; a boundary
-    opened again starts from where it was; at last each hole is put on the circle fitted to it and
-    the interior is solved for again (`rounding`; `circularity_before_rounding` tells how far it
-    was). Since patches change only dense blocks at the boundary, the interior is eliminated once,
-    for all steps of all sweeps.
+    the disk's inside); the holes come longest first, so the shortest is opened first; a step starts
+    from the paper's pole (in later sweeps from where the boundary was when last opened) or from the
+    boundary's last image put on a circle, whichever has the lower E_C; at last each hole is put on
+    the circle fitted to it and the interior is solved for again (`rounding`;
+    `circularity_before_rounding` tells how far it was). Since patches change only dense blocks at
+    the boundary, the interior is eliminated once, for all steps of all sweeps.
     """
     steps = list(
         koebe_steps(
@@ -61,18 +58,12 @@ def koebe_cem(
             inversion=inversion,
         )
     )
-    uv = steps[-1].uv
     iterations = [len(step.energies) - 1 for step in steps]
+    uv, repairs = finished(mesh, steps[-1], outer=outer, rounding=rounding)
     extras: dict[str, Any] = {
         "iterations_by_step": iterations,
         "order_kept": sum(step.order_kept for step in steps),
-        "circularity_before_rounding": boundary_circularity(mesh, uv),
+        "circularity_before_rounding": boundary_circularity(mesh, steps[-1].uv),
+        "fold_repairs": repairs,
     }
-    L = laplacian(mesh)
-    if rounding:
-        _, holes = mesh.outer_and_holes(outer)
-        b = np.concatenate(mesh.loops)
-        uv = harmonic_extension(L, b, rounded(uv, holes)[b])
-    uv, repairs = interior_without_folds(mesh, L, uv)
-    extras["fold_repairs"] = repairs
     return Parameterization(uv, sum(iterations), (), extras)

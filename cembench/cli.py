@@ -13,7 +13,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from cembench import fetch_verbs, morph_verbs, report_verbs, run_verbs, validate_verbs
+from cembench import (
+    fetch_verbs,
+    holes_verbs,
+    morph_verbs,
+    report_verbs,
+    run_verbs,
+    theory_verbs,
+    validate_verbs,
+)
 from cembench.console import Json, assignments, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
 from cembench.paper.profiles import Profile
@@ -385,7 +393,15 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 #: Modules whose verbs are not written in this one.
-_MORE = (run_verbs, report_verbs, validate_verbs, morph_verbs, fetch_verbs)
+_MORE = (
+    run_verbs,
+    report_verbs,
+    validate_verbs,
+    holes_verbs,
+    theory_verbs,
+    morph_verbs,
+    fetch_verbs,
+)
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 

@@ -45,6 +45,8 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("verb", ["map", "run"])
 def test_each_bad_file_has_its_own_message(name, verb, cli, tmp_path):
+    if (name, verb) == ("tube.obj", "run"):
+        pytest.skip("`run` takes it: there are algorithms for surfaces with holes")
     text, message = FILES[name]
     (tmp_path / name).write_text(text)
     where = [tmp_path / name] if verb == "map" else ["--mesh", tmp_path / name]

@@ -151,7 +151,19 @@ def test_a_check_that_breaks_is_a_finding(monkeypatch):
     assert "AttributeError" in found.detail
 
 
-VERBS = ["status", "show", "compare", "merge", "export", "fetch", "report", "validate", "morph"]
+VERBS = [
+    "status",
+    "show",
+    "compare",
+    "merge",
+    "export",
+    "fetch",
+    "report",
+    "validate",
+    "morph",
+    "holes",
+    "theory",
+]
 
 
 @pytest.mark.parametrize("verb", ["", "list", "map", "run", "reproduce", "doctor", *VERBS])

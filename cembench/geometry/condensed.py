@@ -122,4 +122,10 @@ class DenseCholesky:
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """A x = b, real or complex."""
         with phase("solves"):
-            return linalg.cho_solve(self._factor, b, check_finite=False)
+            if np.iscomplexobj(b):  # LAPACK would make a complex copy of the factor
+                return self._solve(b.real) + 1j * self._solve(b.imag)
+            return self._solve(b)
+
+    def _solve(self, b: Real) -> Real:
+        x: Real = linalg.cho_solve(self._factor, b, check_finite=False)
+        return x

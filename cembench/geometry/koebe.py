@@ -9,7 +9,7 @@ each with its error, and errors of earlier steps are forgotten.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -21,11 +21,11 @@ from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole
 from cembench.geometry.condensed import Condensed, DenseCholesky, condensed
-from cembench.geometry.folds import in_order
+from cembench.geometry.folds import in_order, interior_without_folds
 from cembench.geometry.laplacian import cotangent_laplacian, laplacian
 from cembench.geometry.mesh import HoledMesh
 from cembench.geometry.patches import disk_patch, fan_patch
-from cembench.geometry.planar import backward_arcs, fitted_circle, polygon_area
+from cembench.geometry.planar import backward_arcs, fitted_circle, polygon_area, signed_areas
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -56,6 +56,8 @@ class Step:
         E_C of the filled surface, before and after each iteration of CEM.
     order_kept : int
         How often a step of CEM was changed so that the boundary kept its order.
+    surface : Condensed
+        The surface with its own weights, its interior eliminated.
 
     """
 
@@ -65,6 +67,7 @@ class Step:
     uv: Complex
     energies: tuple[float, ...]
     order_kept: int
+    surface: Condensed
 
 
 def koebe_steps(
@@ -94,7 +97,7 @@ def koebe_steps(
     loops = (first, *holes)
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so no harmonic map has any freedom")
-    surface = condensed(mesh, laplacian(mesh), loops)
+    own = surface = condensed(mesh, laplacian(mesh), loops)
     uv: Complex | None = None
     kept: dict[int, Complex] = {}
     for sweep in range(1, sweeps + 1):
@@ -106,50 +109,68 @@ def koebe_steps(
             with phase("patches"):
                 glued = {j: _patch(points[loop], patches) for j, loop in enumerate(loops) if j != k}
             disk = _FilledSurface(surface, glued, k)
-            start = kept[k] if k in kept else disk.start(*pole(points, mesh.F))
+            starts = [kept[k] if k in kept else disk.start(*pole(points, mesh.F))]
+            if before is not None:
+                starts += _projected(before[loops[k]])
+            start = min(map(on_circle, starts), key=disk.energy)
             kept[k], uv, energies, order_kept = disk.map(
                 start, tolerance=tolerance, max_iterations=max_iterations, inversion=inversion
             )
-            yield Step(sweep, k, before, uv, energies, order_kept)
+            yield Step(sweep, k, before, uv, energies, order_kept, own)
 
 
-def rounded(uv: Complex, holes: Sequence[Loop]) -> Complex:
-    """Where do the boundaries lie when every hole is put on the circle fitted to it? (n,)
+def finished(
+    mesh: HoledMesh, step: Step, *, outer: int | None = None, rounding: bool = True
+) -> tuple[Complex, int]:
+    """Which map comes of the last step's image, its holes made round and its folds mended?
 
-    Radially, as (25) puts the outer boundary on its circle; vertices that would change places take
-    the nearest angles in order. Interior values are left as they are.
+    With `rounding`, each hole is put on the circle fitted to it, radially, as (25) puts the outer
+    boundary on its circle (vertices that would change places take the nearest angles in order), and
+    the interior is solved for again. The second value counts the repairs of folds.
 
     Raises
     ------
     AlgorithmFailed
-        A hole is too far from a circle for that.
+        A hole is too far from a circle for that, or folds remain.
 
     """
-    uv = uv.copy()
-    for hole in holes:
-        centre, radius = fitted_circle(uv[hole])
-        uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
-    return uv
+    uv = step.uv
+    if rounding:
+        uv = uv.copy()
+        for hole in mesh.outer_and_holes(outer)[1]:
+            centre, radius = fitted_circle(uv[hole])
+            uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
+        f_b = uv[step.surface.boundary]
+        uv = step.surface.whole(f_b, step.surface.extension(f_b))
+    if (signed_areas(uv, mesh.F) > 0).all():
+        return uv, 0
+    return interior_without_folds(mesh, laplacian(mesh), uv)
 
 
 class _FilledSurface:
-    """A surface with patches on all of its boundaries but number `k`: a disk."""
+    """A surface with patches on all of its boundaries but number `k`: a disk.
+
+    The closed boundaries c are eliminated too, so that an iteration of CEM needs only the open
+    boundary o and the interior: f_c = -W f_o, and half of f_o^* S f_o is the Dirichlet energy.
+    """
 
     def __init__(self, surface: Condensed, patches: dict[int, Real], k: int) -> None:
         self._surface = surface
-        self._open = surface.parts[k]
+        o = self._open = surface.parts[k]
         with phase("patches"):
-            self._A = surface.S.copy()
+            A = surface.S.copy()
             for j, P in patches.items():
-                self._A[surface.parts[j], surface.parts[j]] += P
-            closed = np.ones(len(self._A), dtype=bool)
-            closed[self._open] = False
-            self._closed = np.flatnonzero(closed)
-        self._filled = DenseCholesky(self._A[np.ix_(self._closed, self._closed)])
-        self._across = self._A[self._closed][:, self._open]
-        self._ring = DenseCholesky(surface.L_bb[self._open][:, self._open].toarray())
-        self._to_interior = surface.L_bi[self._open]
-        self._to_closed = surface.L_bb[self._open][:, self._closed]
+                A[surface.parts[j], surface.parts[j]] += P
+            closed = np.ones(len(A), dtype=bool)
+            closed[o] = False
+            c = self._closed = np.flatnonzero(closed)
+        filled = DenseCholesky(A[np.ix_(c, c)])
+        self._W = filled.solve(A[c][:, o])
+        with phase("condensation"):
+            self._S = A[o, o] - A[o][:, c] @ self._W
+        self._ring = DenseCholesky(surface.L_bb[o][:, o].toarray())
+        self._to_interior = surface.L_bi[o]
+        self._to_closed = surface.L_bb[o][:, c]
 
     def start(self, corners: Loop, values: Complex) -> Complex:
         """Boundary values of the map with a pole (Eqs. 13 to 18) on the filled surface."""
@@ -160,52 +181,62 @@ class _FilledSurface:
             rhs[corners] = values
             inside = surface.solve_interior(rhs[surface.interior])
             rhs_b = rhs[surface.boundary] - surface.L_bi @ inside
-            # Pinned at one vertex of the open boundary (Theorem 1).
-            g = np.zeros(len(rhs_b), dtype=np.complex128)
-            free = np.delete(np.arange(len(g)), self._open.stop - 1)
-            g[free] = DenseCholesky(self._A[np.ix_(free, free)]).solve(rhs_b[free])
-        f_k = g[self._open]
-        return np.conj(f_k) if polygon_area(f_k) < 0 else f_k
+            rhs_o = rhs_b[self._open] - _product(self._W.T, rhs_b[self._closed])
+        # Pinned at the last vertex (Theorem 1).
+        f_o = np.append(DenseCholesky(self._S[:-1, :-1]).solve(rhs_o[:-1]), 0.0)
+        return np.conj(f_o) if polygon_area(f_o) < 0 else f_o
+
+    def energy(self, f_o: Complex) -> float:
+        """E_C (Eq. 7) of the filled surface's map that is harmonic for these boundary values."""
+        with phase("energy"):
+            return 0.5 * float(np.vdot(f_o, _product(self._S, f_o)).real) - polygon_area(f_o)
 
     def map(
         self, start: Complex, *, tolerance: float, max_iterations: int, inversion: bool
     ) -> tuple[Complex, Complex, tuple[float, ...], int]:
-        """CEM (Algorithm 1) from these boundary values.
+        """CEM (Algorithm 1) from these boundary values on the unit circle.
 
         Returns the open boundary's values, the map (n,), E_C of the filled surface before and after
         each iteration, and how often the order had to be kept.
         """
         surface, m = self._surface, len(self._closed)
 
-        def dirichlet(f_k: Complex) -> Complex:
-            f_c = -self._filled.solve(self._across @ f_k)
-            f_b = self._joined(f_k, f_c)
-            return np.concatenate([f_c, surface.extension(f_b)])
+        def on_boundaries(f_o: Complex) -> Complex:
+            f_b = np.empty(len(surface.boundary), dtype=np.complex128)
+            f_b[self._open], f_b[self._closed] = f_o, -_product(self._W, f_o)
+            return f_b
+
+        def dirichlet(f_o: Complex) -> Complex:
+            f_b = on_boundaries(f_o)
+            return np.concatenate([f_b[self._closed], surface.extension(f_b)])
 
         def ring(f: Complex) -> Complex:
             return self._ring.solve(-(self._to_interior @ f[m:] + self._to_closed @ f[:m]))
 
-        def energy(f: Complex, f_k: Complex) -> float:
-            with phase("energy"):
-                f_b = self._joined(f_k, f[:m])
-                return 0.5 * float(np.vdot(f_b, self._A @ f_b).real) - polygon_area(f_k)
-
-        f_k, f, history, order_kept = iterate_boundary(
-            on_circle(start),
+        f_o, f, history, order_kept = iterate_boundary(
+            start,
             dirichlet,
             ring,
-            energy,
+            lambda _, f_o: self.energy(f_o),
             tolerance=tolerance,
             max_iterations=max_iterations,
             inversion=inversion,
         )
-        uv = surface.whole(self._joined(f_k, f[:m]), f[m:])
-        return f_k, uv, tuple(history), order_kept
+        uv = surface.whole(on_boundaries(f_o), f[m:])
+        return f_o, uv, tuple(history), order_kept
 
-    def _joined(self, f_k: Complex, f_c: Complex) -> Complex:
-        f_b = np.empty(len(self._A), dtype=np.complex128)
-        f_b[self._open], f_b[self._closed] = f_k, f_c
-        return f_b
+
+def _product(M: Real, f: Complex) -> Complex:
+    """M f without a complex copy of M."""
+    return M @ f.real + 1j * (M @ f.imag)
+
+
+def _projected(z: Complex) -> list[Complex]:
+    """An outer boundary's image put on its fitted circle radially, if that keeps its order."""
+    away: Complex = z - fitted_circle(z)[0]
+    if not np.abs(away).min() > 0 or backward_arcs(away):
+        return []
+    return [away / np.abs(away)]
 
 
 def _outside_in(uv: Complex, loop: Loop) -> Complex:

@@ -8,6 +8,7 @@ positive semi-definite with the constants as its kernel.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,16 +89,22 @@ def sum_of_cosines(x: Real) -> Real:
     Its second derivative is log|2 sin(x / 2)|: x^2 (log x / 2 - 3 / 4) less a power series in x^2
     with coefficients |B_2k| / (2k (2k + 2)!), B the Bernoulli numbers.
     """
-    from scipy.special import bernoulli, factorial
-
     x = np.abs(x) % (2 * np.pi)
     x = np.minimum(x, 2 * np.pi - x)
     squared = x * x
-    k = np.arange(1, _TERMS + 1)
-    terms = np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))
     rest = np.zeros_like(x)
-    for term in terms[::-1]:
+    for term in _coefficients()[::-1]:
         rest = (rest + term) * squared
     log = np.log(np.where(x > 0, x, 1.0))
     total: Real = squared * (log / 2 - 0.75 - rest)
     return total
+
+
+@cache
+def _coefficients() -> Real:
+    """The numbers |B_2k| / (2k (2k + 2)!) for k = 1, 2, ..."""
+    from scipy.special import bernoulli, factorial
+
+    k = np.arange(1, _TERMS + 1)
+    numbers: Real = np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))
+    return numbers
