@@ -1,8 +1,9 @@
 """Sparse Cholesky by cvxopt's CHOLMOD: the default, the fastest that installs as a wheel.
 
 cvxopt keeps its options in one dictionary for the process, so they are set before each use:
-``supernodal = 2`` (which also makes an indefinite matrix an error) and ``nmethods = 1`` (without it
-a permutation handed over may be ignored).
+``supernodal = 2`` (which also makes an indefinite matrix an error), ``nmethods = 1`` (without it a
+permutation handed over may be ignored) and ``postorder``, which would mix a leading block that is
+not connected with what follows it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from scipy import sparse
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
+from cembench.geometry.supernodes import trailing_block
 
 # Codes of `cholmod.solve`: the whole system, and its four steps.
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
@@ -37,6 +39,7 @@ class CholmodFactor:
     def _analyse(self) -> None:
         with phase("symbolic"):
             _set_options()
+            cholmod.options["postorder"] = self._leading is None
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
 
     def _factor(self) -> None:
@@ -77,6 +80,11 @@ class CholmodFactor:
         cholmod.solve(self._symbolic, x, sys=_BACKWARD)
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
         return np.array(x)[: self._leading]
+
+    def schur_factor(self) -> NDArray[np.float64] | None:
+        """The factor's own trailing block, after the leading one; None where it cannot be seen."""
+        assert self._leading is not None
+        return trailing_block(self._symbolic, self._lower.size[0], self._leading)
 
 
 def _set_options() -> None:
