@@ -6,6 +6,8 @@ are comparable between surfaces, for a free boundary only after scaling the imag
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,17 +73,52 @@ def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:
     return dilatations_of(beltrami_coefficients(uv, mesh.F, mesh.V))
 
 
+@dataclass(frozen=True)
+class BoundaryCircle:
+    """The circle that lies closest to a boundary's image.
+
+    Parameters
+    ----------
+    vertex : int
+        The smallest vertex of the boundary loop, by which it is known.
+    vertices : int
+        How many vertices the loop has.
+    centre : complex
+        The circle's centre.
+    radius : float
+        Its radius; NaN where the image determines no circle.
+    circularity : float
+        The largest ``| |z - c| - r | / r`` over the loop; infinite where there is no circle.
+
+    """
+
+    vertex: int
+    vertices: int
+    centre: complex
+    radius: float
+    circularity: float
+
+
+def boundary_circles(mesh: TriangleMesh, uv: Complex) -> tuple[BoundaryCircle, ...]:
+    """Which circles are the boundary images nearly, and how nearly? That of largest area first."""
+    loops = sorted(mesh.loops, key=lambda loop: polygon_area(uv[loop]), reverse=True)
+    return tuple(_circle_of(loop, uv[loop]) for loop in [*loops[:1], *sorted(loops[1:], key=min)])
+
+
+def _circle_of(loop: NDArray[np.int64], z: Complex) -> BoundaryCircle:
+    centre, radius = fitted_circle(z)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = float(np.max(np.abs(np.abs(z - centre) - radius) / np.float64(radius)))
+    circularity = off if np.isfinite(off) else float("inf")
+    return BoundaryCircle(int(loop.min()), len(loop), centre, radius, circularity)
+
+
 def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
     """How far from circles are the boundary images: the largest ``| |z - c| - r | / r``?
 
     Centre and radius are fitted to each loop; infinite where a loop determines no circle.
     """
-    worst = 0.0
-    for loop in mesh.loops:
-        centre, radius = fitted_circle(uv[loop])
-        off = float(np.abs(np.abs(uv[loop] - centre) - radius).max() / radius)
-        worst = max(worst, off if np.isfinite(off) else np.inf)
-    return worst
+    return max((circle.circularity for circle in boundary_circles(mesh, uv)), default=0.0)
 
 
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:

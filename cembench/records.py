@@ -86,6 +86,21 @@ class Round(BaseModel):
         return lower_median(self.calls)
 
 
+class Boundary(BaseModel):
+    """The circle fitted to a boundary's image; null where the image determines none."""
+
+    model_config = ConfigDict(frozen=True, ser_json_inf_nan="null")
+
+    #: The smallest vertex of the loop, and how many it has.
+    vertex: int
+    vertices: int
+    #: Centre, real and imaginary part.
+    centre: tuple[float, float]
+    radius: float | None
+    #: The largest distance from the circle, relative to its radius.
+    circularity: float | None
+
+
 class Outcome(BaseModel):
     """What one cell's processes have to tell, or what is told of one that cannot."""
 
@@ -99,6 +114,8 @@ class Outcome(BaseModel):
     rounds: tuple[Round, ...] = ()
     #: Figures computed by the harness (cembench.metrics); null where infinite.
     metrics: dict[str, float | int | None] = Field(default_factory=dict)
+    #: Of a surface with holes: the circles of its boundaries, the outer one first.
+    boundaries: tuple[Boundary, ...] = ()
     iterations: int | None = None
     energy_history: tuple[float, ...] = ()
     extras: dict[str, Any] = Field(default_factory=dict)

@@ -1,8 +1,9 @@
 """Small surfaces, good and bad, that many tests use."""
 
 import numpy as np
+from scipy.spatial import Delaunay
 
-from cembench import DiskMesh
+from cembench import DiskMesh, HoledMesh
 from meshes_gen.flat_disk import flat_disk
 
 
@@ -88,3 +89,51 @@ def crumpled_disk():
     noise = 0.15 * np.random.default_rng(0).standard_normal(mesh.V.shape)
     inside = np.linalg.norm(mesh.V, axis=1) < 0.7
     return DiskMesh.from_arrays(mesh.V + inside[:, None] * noise, mesh.F, name="crumpled disk")
+
+
+def annulus(inner=0.5, faces=600):
+    """A plane ring about 0 out of rings of nearly equilateral triangles; V and F."""
+    turns = max(6, round(np.sqrt(faces * np.pi / (np.log(1 / inner) * 2 * 0.866 / np.pi) / 2)))
+    rings = max(2, round(np.log(1 / inner) * turns / (2 * np.pi * 0.866)))
+    i, j, F = grid(rings, turns, wrap_columns=True)
+    z = inner ** (i / rings) * np.exp(2j * np.pi * (j + 0.5 * i) / turns)
+    return np.stack([z.real, z.imag, 0 * z.real], axis=1), F
+
+
+def rings_with_holes(centres, radii, faces=600):
+    """The unit disk less round holes: V and F of a Delaunay triangulation, its z = x + i y."""
+    z, rim = _points_of_holes(np.asarray(centres, complex), np.asarray(radii, float), faces)
+    F = Delaunay(np.stack([z.real, z.imag], axis=1)).simplices.astype(np.int64)
+    middle = z[F].mean(axis=1)
+    keep = np.all([abs(middle - c) > 0.98 * r for c, r in zip(centres, radii, strict=True)], axis=0)
+    F = F[keep & ~((rim[F] == rim[F[:, :1]]).all(axis=1) & (rim[F[:, 0]] > 0))]
+    areas = np.imag(np.conj(z[F[:, 1]] - z[F[:, 0]]) * (z[F[:, 2]] - z[F[:, 0]]))
+    F = np.where((areas > 0)[:, None], F, F[:, ::-1])
+    return np.stack([z.real, z.imag, 0 * z.real], axis=1), F
+
+
+def _points_of_holes(centres, radii, faces):
+    """Points of a triangular lattice well inside, and evenly on the circles; which circle each."""
+    h = np.sqrt((np.pi - np.pi * (radii**2).sum()) * 4 / np.sqrt(3) / faces)
+    circles, rim = [], []
+    for k, (c, r) in enumerate([(0, 1.0), *zip(centres, radii, strict=True)]):
+        count = max(12, round(2 * np.pi * r / h))
+        circles.append(c + r * np.exp(2j * np.pi * np.arange(count) / count))
+        rim += [k] * count
+    n = int(2 / h) + 2
+    a, b = np.meshgrid(np.arange(-2 * n, 2 * n), np.arange(-n, n))
+    inside = (h * (a + b / 2 + 0.5j * np.sqrt(3) * b)).ravel()
+    inside = inside[abs(inside) < 1 - 0.6 * h]
+    for c, r in zip(centres, radii, strict=True):
+        inside = inside[abs(inside - c) > r + 0.6 * h]
+    z = np.concatenate([*circles, inside])
+    return z, np.array(rim + [-1] * len(inside))
+
+
+def three_holes(faces=1200):
+    """A plane disk with three round holes of different sizes."""
+    return HoledMesh.from_arrays(*rings_with_holes(*THREE_HOLES, faces), name="three holes")
+
+
+#: Centres and radii of three holes in the unit disk.
+THREE_HOLES = ((0.45 + 0.1j, -0.3 + 0.4j, -0.15 - 0.45j), (0.2, 0.15, 0.25))

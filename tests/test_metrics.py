@@ -4,8 +4,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cembench import DiskMesh
-from cembench.metrics import all_metrics, angle_errors, corner_angles, dilatations
+from cembench import DiskMesh, HoledMesh
+from cembench.metrics import (
+    all_metrics,
+    angle_errors,
+    boundary_circles,
+    corner_angles,
+    dilatations,
+)
 from meshes_gen.flat_disk import flat_disk
 from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
 from tests import gallery
@@ -101,3 +107,35 @@ def test_figures_do_not_depend_on_pose_size_or_numbering(seed, scale, shift):
     assert before["conformal_energy"] >= 0
     assert (dilatations(mesh, uv) >= 1).all()
     assert (angle_errors(mesh, uv) >= 0).all()
+
+
+def test_round_holes_are_found_with_centre_and_radius_and_leave_the_area():
+    mesh = gallery.three_holes()
+    uv = planar(mesh)
+    outer, *holes = boundary_circles(mesh, uv)
+    assert (outer.centre, outer.radius) == (pytest.approx(0, abs=1e-12), pytest.approx(1))
+    expected = sorted(zip(*gallery.THREE_HOLES, strict=True), key=lambda hole: hole[1])
+    for hole, (centre, radius) in zip(sorted(holes, key=lambda h: h.radius), expected, strict=True):
+        assert hole.centre == pytest.approx(centre)
+        assert hole.radius == pytest.approx(radius)
+        assert hole.circularity < 1e-12
+    polygons = [
+        n / 2 * np.sin(2 * np.pi / n) * r**2
+        for n, r in [(c.vertices, c.radius) for c in (outer, *holes)]
+    ]
+    found = all_metrics(mesh, uv)
+    assert found["image_area"] == pytest.approx(polygons[0] - sum(polygons[1:]))
+    assert abs(found["conformal_energy"]) < 1e-12
+
+
+def test_circularity_of_an_ellipse_and_of_a_point():
+    V, F = gallery.annulus(0.4)
+    mesh = HoledMesh.from_arrays(V, F)
+    uv = planar(mesh)
+    hole = np.abs(uv) < 0.4 + 1e-9
+    uv[hole] += 0.04 * np.conj(uv[hole]) / 0.4  # half axes 0.44 and 0.36 about a radius of 0.4
+    outer, inner = boundary_circles(mesh, uv)
+    assert outer.circularity < 1e-12
+    assert inner.circularity == pytest.approx(0.1, rel=0.1)
+    uv[hole] = 0
+    assert boundary_circles(mesh, uv)[1].circularity == np.inf

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csgraph
 
 from cembench.clock import phase
-from cembench.errors import MeshError
+from cembench.errors import MeshError, ParameterError
 from cembench.geometry import topology
 
 #: A triangle counts as degenerate when its area is below this share of its longest edge squared.
@@ -140,6 +140,38 @@ class DiskMesh(TriangleMesh):
 @dataclass(frozen=True, eq=False)
 class HoledMesh(TriangleMesh):
     """A multiply-connected surface of genus zero: an outer boundary and at least one hole."""
+
+    def outer_and_holes(
+        self, outer: int | None = None
+    ) -> tuple[NDArray[np.int64], tuple[NDArray[np.int64], ...]]:
+        """Which boundary loop is the outer one, and which are holes?
+
+        The outer one is that of the vertex `outer`, or the longest; the holes come longest first.
+        Each has the surface on its left, so the outer one runs counter-clockwise in a map.
+
+        Raises
+        ------
+        ParameterError
+            There is no such vertex, or it lies on no boundary loop.
+
+        """
+        lengths = [
+            np.linalg.norm(np.roll(self.V[loop], -1, axis=0) - self.V[loop], axis=1).sum()
+            for loop in self.loops
+        ]
+        loops = [self.loops[k] for k in np.argsort(lengths, kind="stable")[::-1]]
+        if outer is None:
+            return loops[0], tuple(loops[1:])
+        chosen = [k for k, loop in enumerate(loops) if (loop == outer).any()]
+        if not chosen:
+            where = "is no vertex" if not 0 <= outer < self.n else "lies on no boundary loop"
+            shown = ", ".join(f"{loop[0]} ({len(loop)} vertices)" for loop in loops[:5])
+            raise ParameterError(
+                f"outer={outer}: vertex {outer} (counted from 0) {where} of {self.name}, so it "
+                "names no outer boundary. Name any vertex of the loop; the longest loops have for "
+                f"example: {shown}."
+            )
+        return loops.pop(chosen[0]), tuple(loops)
 
     @classmethod
     def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:

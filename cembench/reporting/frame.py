@@ -55,6 +55,7 @@ def row(record: Record) -> dict[str, Any]:
         "status": outcome.status,
         "cause": outcome.cause,
         **outcome.metrics,
+        "boundaries": [boundary.model_dump() for boundary in outcome.boundaries],
         "iterations": outcome.iterations,
         "seconds": outcome.median_seconds,
         "seconds_raw": list(outcome.seconds),

@@ -18,17 +18,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.clock import Timing, measure
-from cembench.errors import AlgorithmFailed
+from cembench.errors import AlgorithmFailed, CembenchError
 from cembench.geometry.cholesky import linear_algebra
 from cembench.geometry.mesh import TriangleMesh
-from cembench.metrics import all_metrics, flipped_triangles, image_area
+from cembench.geometry.planar import crossing_segments, polygon_area
+from cembench.metrics import all_metrics, boundary_circles, flipped_triangles, image_area
 from cembench.parameterization import Parameterization
-from cembench.records import Cell, Outcome, Round
+from cembench.records import Boundary, Cell, Outcome, Round
 from cembench.registry import Algorithm
 from cembench.running.memory import Memory, memory_of_call
 
 #: How far from the unit circle a boundary vertex of a disk may lie.
 CIRCLE_TOLERANCE = 1e-9
+#: How far from a circle, relative to its radius, a hole's image may be and still be called one.
+CIRCULAR = 1e-3
 #: A process times further calls until they have taken so many seconds together, or are so many.
 ENOUGH_SECONDS = 0.1
 ENOUGH_CALLS = 5
@@ -64,7 +67,9 @@ def check_cell(
     described = {
         "status": "invalid" if problems else "ok",
         "cause": "; ".join(problems) or None,
-        "metrics": {name: v if math.isfinite(v) else None for name, v in metrics.items()},
+        "metrics": {name: _finite(v) for name, v in metrics.items()},
+        "boundaries": _boundaries(mesh, found.uv),
+        "notes": tuple(remarks(algorithm, mesh, found.uv)),
         "iterations": found.iterations,
         "energy_history": tuple(found.energy_history),
         "extras": found.extras,
@@ -93,6 +98,8 @@ def outcome_of_error(error: Exception, mesh: TriangleMesh) -> Outcome:
     if isinstance(error, AlgorithmFailed):
         cause = "; ".join([str(error), *_broken_premises(mesh)])
         return Outcome(status="failed", cause=cause)
+    if isinstance(error, CembenchError):
+        return Outcome(status="failed", cause=str(error))
     told = "".join(traceback.format_exception(error))
     if isinstance(error, MemoryError):
         return Outcome(
@@ -157,10 +164,14 @@ def _broken_premises(mesh: TriangleMesh) -> list[str]:
 def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
     """Which promises does this map break? Empty for a valid one."""
     problems = []
-    if algorithm.target == "disk":
-        off = np.abs(np.abs(uv[mesh.loops[0]]) - 1).max()
+    if algorithm.target in ("disk", "circular holes"):
+        outer = max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
+        name = "boundary" if len(mesh.loops) == 1 else "outer boundary"
+        off = np.abs(np.abs(uv[outer]) - 1).max()
         if off > CIRCLE_TOLERANCE:
-            problems.append(f"the boundary lies off the unit circle by up to {off:.2g}")
+            problems.append(f"the {name} lies off the unit circle by up to {off:.2g}")
+    if algorithm.target == "circular holes":
+        problems += _crossings(mesh, uv)
     flipped = flipped_triangles(mesh, uv)
     if image_area(mesh, uv) <= 0 or flipped == mesh.m:
         problems.append("the map reverses the surface's orientation")
@@ -168,3 +179,53 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128])
         problems.append(f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})")
         problems += _broken_premises(mesh)
     return problems
+
+
+def _crossings(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
+    """Do the boundaries' images cross?
+
+    Where no triangle is folded and none do, the map is injective: a point has as many preimages as
+    the outer polygon winds round it, less the holes'.
+    """
+    crossing = crossing_segments([uv[loop] for loop in mesh.loops])
+    if crossing is None:
+        return []
+    one, other = (f"boundary {int(mesh.loops[k].min())}" for k in crossing)
+    whom = "itself" if one == other else other
+    return [f"{one} crosses {whom} (boundaries are called by their smallest vertex)"]
+
+
+def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
+    """What should a reader know of a valid map? That its holes are no circles, where they are none.
+
+    How circular the holes are is a figure like the energy, not a promise: `boundaries` has it.
+    """
+    if algorithm.target != "circular holes":
+        return []
+    circles = boundary_circles(mesh, uv)[1:]
+    off = [circle for circle in circles if not circle.circularity <= CIRCULAR]
+    if not off:
+        return []
+    worst = max(circle.circularity for circle in off)
+    return [
+        f"{len(off)} of {len(circles)} holes are no circles: off by up to {worst:.2g} of the radius"
+    ]
+
+
+def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:
+    if len(mesh.loops) == 1:
+        return ()
+    return tuple(
+        Boundary(
+            vertex=circle.vertex,
+            vertices=circle.vertices,
+            centre=(circle.centre.real, circle.centre.imag),
+            radius=_finite(circle.radius),
+            circularity=_finite(circle.circularity),
+        )
+        for circle in boundary_circles(mesh, uv)
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from cembench import DiskMesh, HoledMesh, MeshError, TriangleMesh
+from cembench.errors import ParameterError
 from meshes_gen.flat_disk import flat_disk
 from tests import gallery
 
@@ -110,3 +111,24 @@ def test_what_is_no_disk_is_refused(surface, message):
     mesh = TriangleMesh.from_arrays(*surface())
     with pytest.raises(MeshError, match=message):
         DiskMesh.from_arrays(mesh.V, mesh.F)
+
+
+def test_the_longest_loop_is_the_outer_one_unless_a_vertex_names_another():
+    mesh = gallery.three_holes()
+    outer, holes = mesh.outer_and_holes()
+    assert abs(mesh.V[outer]).max() == pytest.approx(1)
+    assert len(outer) > len(holes[0]) > len(holes[1]) > 0
+    named, others = mesh.outer_and_holes(int(holes[1][3]))
+    assert (named == holes[1]).all()
+    assert (others[0] == outer).all()
+    assert len(others) == 3
+
+
+@pytest.mark.parametrize(
+    ("vertex", "message"), [(10_000, "is no vertex"), (-1, "is no vertex"), (320, "lies on no")]
+)
+def test_an_outer_boundary_that_is_not_there(vertex, message):
+    mesh = gallery.three_holes(600)
+    assert 320 in mesh.interior
+    with pytest.raises(ParameterError, match=rf"outer={vertex}: .*{message}.*longest loops"):
+        mesh.outer_and_holes(vertex)

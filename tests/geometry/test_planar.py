@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 
-from cembench.geometry.planar import backward_arcs, fitted_circle, polygon_area, signed_areas
+from cembench.geometry.planar import (
+    backward_arcs,
+    crossing_segments,
+    fitted_circle,
+    polygon_area,
+    signed_areas,
+)
 
 
 def ring(k=12):
@@ -38,3 +44,48 @@ def test_arcs_that_run_backwards():
     assert backward_arcs(z[::-1]) == 12
     z[[3, 4]] = z[[4, 3]]
     assert backward_arcs(z) == 1
+
+
+def square(corner, side=1.0):
+    return corner + side * np.array([0, 1, 1 + 1j, 1j])
+
+
+@pytest.mark.parametrize(
+    ("curves", "answer"),
+    [
+        ([square(0), square(3)], None),
+        ([square(0), square(0.25 + 0.25j, 0.5)], None),  # one inside the other
+        ([square(0), square(5), square(0.5 + 0.5j)], (0, 2)),
+        ([square(0), square(1)], (0, 1)),  # side by side, sharing two corners and a side
+        ([np.array([0, 1 + 1j, 1, 1j])], (0, 0)),
+    ],
+)
+def test_polygons_that_cross_are_found(curves, answer):
+    assert crossing_segments(curves) == answer
+
+
+def test_crossings_agree_with_trying_every_pair():
+    rng = np.random.default_rng(5)
+    found = set()
+    for _ in range(60):
+        curves = [
+            complex(*rng.uniform(-2, 2, 2)) + rng.uniform(0.1, 1) * ring(9) * np.exp(1j * turn)
+            for turn in rng.uniform(0, 6, 3)
+        ]
+        expected = any(_polygons_cross(a, b) for k, a in enumerate(curves) for b in curves[:k])
+        found.add(expected)
+        assert (crossing_segments(curves) is not None) == expected
+    assert found == {True, False}
+
+
+def _polygons_cross(a, b):
+    """By solving for the crossing of every pair of sides."""
+    for p, q in zip(a, np.roll(a, -1), strict=True):
+        for r, s in zip(b, np.roll(b, -1), strict=True):
+            u, v = q - p, s - r
+            cross = (np.conj(u) * v).imag
+            t = (np.conj(r - p) * v).imag / cross
+            w = (np.conj(r - p) * u).imag / cross
+            if 0 <= t <= 1 and 0 <= w <= 1:
+                return True
+    return False

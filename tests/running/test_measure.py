@@ -1,0 +1,76 @@
+"""What the harness says of maps to the disk with circular holes."""
+
+import numpy as np
+import pytest
+
+from cembench import HoledMesh, Parameterization, algorithm
+from cembench.running.measure import check_cell, faults
+from cembench.running.plan import How, plan_cells
+from tests import gallery
+
+MESH = gallery.three_holes()
+FLAT = MESH.V[:, 0] + 1j * MESH.V[:, 1]
+
+
+def mapped(uv):
+    """The outcome of an algorithm that answers with this map."""
+
+    @algorithm("given", title="Given", target="circular holes")
+    def given(mesh: HoledMesh) -> Parameterization:
+        return Parameterization(uv)
+
+    spec = given.__cembench__
+    task = plan_cells([spec], [MESH], {}, How(repeats=1))[0]
+    return check_cell(spec, MESH, task.cell)[0], faults(spec, MESH, uv)
+
+
+def holes():
+    return [loop for loop in MESH.loops if abs(abs(FLAT[loop]) - 1).max() > 1e-6]
+
+
+def test_round_holes_are_ok_and_reported_with_centres_and_radii():
+    outcome, _ = mapped(FLAT)
+    assert (outcome.status, outcome.notes) == ("ok", ())
+    outer, *found = outcome.boundaries
+    assert outer.radius == pytest.approx(1)
+    assert sorted(b.radius for b in found) == pytest.approx(sorted(gallery.THREE_HOLES[1]))
+
+
+def test_a_hole_that_is_no_circle_is_told_but_no_fault():
+    uv = FLAT.copy()
+    loop = holes()[0]
+    middle = uv[loop].mean()
+    uv[loop] = middle + 0.999 * (uv[loop] - middle) + 0.02 * np.conj(uv[loop] - middle)
+    outcome, _ = mapped(uv)
+    assert outcome.status == "ok"
+    assert "1 of 3 holes are no circles" in outcome.notes[0]
+    assert outcome.metrics["boundary_circularity"] > 0.01
+
+
+def test_an_outer_boundary_off_the_unit_circle_is_invalid():
+    outcome, _ = mapped(0.9 * FLAT)
+    assert outcome.status == "invalid"
+    assert "outer boundary lies off the unit circle by up to 0.1" in outcome.cause
+
+
+def test_holes_that_cross_are_named():
+    uv = FLAT.copy()
+    one, other = holes()[:2]
+    uv[one] += uv[other].mean() - uv[one].mean() + 0.1
+    outcome, problems = mapped(uv)
+    assert outcome.status == "invalid"
+    assert f"boundary {one.min()} crosses boundary {other.min()}" in problems[0]
+    assert "triangles are folded" in outcome.cause
+
+
+def test_a_mirrored_map_is_invalid():
+    outcome, _ = mapped(np.conj(FLAT))
+    assert "reverses the surface's orientation" in outcome.cause
+
+
+def test_a_hole_turned_inside_out_crosses_itself():
+    uv = FLAT.copy()
+    loop = holes()[0]
+    uv[loop[: len(loop) // 2]] = uv[loop[: len(loop) // 2]][::-1]
+    _, problems = mapped(uv)
+    assert f"boundary {loop.min()} crosses itself" in problems[0]
