@@ -25,7 +25,7 @@ def two_squares_joined_by_a_strip():
     """Its interior vertices form two pieces."""
     V, F = gallery.flat_rectangle(4, 12)
     middle = V[F].mean(axis=1)
-    F = F[~((4 < middle[:, 0]) & (middle[:, 0] < 8) & (middle[:, 1] > 1))]
+    F = F[~((middle[:, 0] > 4) & (middle[:, 0] < 8) & (middle[:, 1] > 1))]
     used, F = np.unique(F, return_inverse=True)
     return DiskMesh.from_arrays(V[used], F.reshape(-1, 3))
 

@@ -1,0 +1,85 @@
+"""The conformal energy minimised directly over where the boundary lies on the unit circle."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.clock import phase
+from cembench.geometry.bordered import BorderedLaplacian
+from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
+from cembench.geometry.circle_domain import CircleDomain
+from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.folds import without_folds
+from cembench.geometry.gauge import Gauge, gauge_measure
+from cembench.geometry.harmonic import edge_lengths
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh
+from cembench.metrics import flipped_triangles
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+#: Harmonic measure per length is taken for at least this share of its largest value.
+LEAST_DENSITY = 1e-12
+
+Real = NDArray[np.float64]
+
+
+@algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
+def direct_cem(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
+    max_iterations: Annotated[int, Field(ge=0)] = 50,
+    gauge: Gauge = "boundary",
+    delaunay: bool = False,
+) -> Parameterization:
+    """Which boundary on the unit circle has the least conformal energy? Newton's method finds it."""
+    L = laplacian(mesh, delaunay=delaunay)
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    S = bordered.dirichlet_to_neumann()
+    with phase("start"):
+        middle = gauge_measure(mesh, "triangle", mesh.boundary)
+        centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
+    seen, weights = bordered.swept_to_boundary(S, np.stack([middle, centred], axis=1)).T
+    domain, begun = _start(mesh, S, seen, weights)
+    found = minimise(S, domain, weights, tolerance=tolerance, max_iterations=max_iterations)
+    uv = bordered.harmonic_extension(found.domain.points)
+    folded = flipped_triangles(mesh, uv)
+    uv, repairs = without_folds(mesh, L, uv) if folded else (uv, 0)
+    extras = {
+        "stopped": found.reason,
+        "gradient": None if found.reason == "crowded" else found.gradient,
+        "start": begun,
+        "hessian_products": found.products,
+        "held_arcs": found.held_arcs,
+        "folded_before_repair": folded,
+        "fold_repairs": repairs,
+    }
+    return Parameterization(uv, len(found.energies) - 1, found.energies, extras)
+
+
+def _start(
+    mesh: DiskMesh, S: DirichletToNeumann, seen: Real, weights: Real
+) -> tuple[CircleDomain, str]:
+    """Which start has the lower energy in the gauge: harmonic measure, or arc length? And its name.
+
+    A conformal map to the disk gives every piece of the boundary an arc of 2 pi times its harmonic
+    measure, `seen` from what goes to the origin.
+    """
+    lengths = edge_lengths(mesh, mesh.boundary)
+    around = (lengths + np.roll(lengths, 1)) / 2
+    density = np.maximum(seen / around, LEAST_DENSITY * np.max(seen / around))
+    arcs = {
+        "harmonic measure": lengths * (density + np.roll(density, -1)),
+        "arc length": lengths,
+    }
+    models = {}
+    for name in arcs:
+        domain = in_gauge(CircleDomain.of_arcs(arcs[name]), weights)
+        models[name] = EnergyModel(S, domain, weights)
+    best = min(models, key=lambda name: models[name].energy)
+    return models[best].domain, best
