@@ -13,6 +13,7 @@ from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.filled_start import arcs_of_measure
 from cembench.geometry.folds import without_folds
 from cembench.geometry.gauge import Gauge, gauge_measure
 from cembench.geometry.harmonic import edge_lengths
@@ -21,9 +22,6 @@ from cembench.geometry.mesh import DiskMesh
 from cembench.metrics import flipped_triangles
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
-
-#: Harmonic measure per length is taken for at least this share of its largest value.
-LEAST_DENSITY = 1e-12
 
 Real = NDArray[np.float64]
 
@@ -37,7 +35,7 @@ def direct_cem(
     gauge: Gauge = "boundary",
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which boundary on the unit circle has the least conformal energy? Newton's method finds it."""
+    """Which boundary on the unit circle has the least conformal energy?"""
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
     S = bordered.dirichlet_to_neumann()
@@ -67,16 +65,10 @@ def _start(
 ) -> tuple[CircleDomain, str]:
     """Which start has the lower energy in the gauge: harmonic measure, or arc length? And its name.
 
-    A conformal map to the disk gives every piece of the boundary an arc of 2 pi times its harmonic
-    measure, `seen` from what goes to the origin.
+    `seen` is the harmonic measure from the middle triangle.
     """
     lengths = edge_lengths(mesh, mesh.boundary)
-    around = (lengths + np.roll(lengths, 1)) / 2
-    density = np.maximum(seen / around, LEAST_DENSITY * np.max(seen / around))
-    arcs = {
-        "harmonic measure": lengths * (density + np.roll(density, -1)),
-        "arc length": lengths,
-    }
+    arcs = {"harmonic measure": arcs_of_measure(seen, lengths), "arc length": lengths}
     models = {}
     for name in arcs:
         domain = in_gauge(CircleDomain.of_arcs(arcs[name]), weights)

@@ -36,6 +36,8 @@ MODES = 8
 ROUNDING = 1e-16
 #: With more arcs than this held at their least length the boundary is too crowded to go on.
 MOST_HELD = 64
+#: Among radii and centres no curvature counts for less than this share of the largest.
+LEAST_CURVATURE = 1e-12
 #: How near to 0 the gauge brings sum w z, and in how many Newton steps at most.
 GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 100
 
@@ -95,14 +97,13 @@ def minimise(
             accuracy = float(np.clip(here.gradient_norm, 1e-3, 0.3))
             step = newton_step(here.gradient, here.hessian, here.precondition, radius, accuracy)
         products += step.products
-        candidate = in_gauge(here.moved(step.p), weights)
-        there = EnergyModel(S, candidate, weights)
-        agreement = (here.energy - there.energy) / step.decrease if candidate.apart else -np.inf
+        there = _tried(here, step.p, weights)
+        agreement = (here.energy - there.energy) / step.decrease if there else -np.inf
         if agreement > 0.75 and step.at_edge:
             radius *= 3
         elif not agreement > 0.25:
             radius = step.length / 4
-        if agreement > 1e-4 and there.energy < here.energy:
+        if there and agreement > 1e-4 and there.energy < here.energy:
             here = there
             energies.append(here.energy)
         elif step.decrease < ROUNDING * len(weights):
@@ -110,6 +111,17 @@ def minimise(
             break
     gradient = float("nan") if reason == "crowded" else here.gradient_norm
     return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
+
+
+def _tried(here: EnergyModel, step: Real, weights: Real) -> EnergyModel | None:
+    """What is the energy where this step leads? None where circles meet, or the gauge is lost."""
+    domain = here.moved(step)
+    if not domain.apart:
+        return None
+    try:
+        return EnergyModel(here.S, in_gauge(domain, weights), weights)
+    except AlgorithmFailed:
+        return None
 
 
 def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
@@ -131,8 +143,8 @@ def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
         a = (middle + second * np.conj(middle)) / bottom if bottom > 0 else middle
         domain = domain.through(a * min(1.0, 0.5 / abs(a)))
     raise AlgorithmFailed(
-        f"no Moebius map of the disk brings the gauge's mean to 0 (it remains at {abs(middle):.2g}):"
-        " the weight of a single boundary vertex is too large. Choose another gauge"
+        f"no Moebius map of the disk brings the gauge's mean to 0 (it stays at {abs(middle):.2g}): "
+        "a single boundary vertex has too much of the weight. Choose another gauge"
     )
 
 
@@ -144,7 +156,7 @@ class EnergyModel:
     """
 
     def __init__(self, S: DirichletToNeumann, domain: CircleDomain, weights: Real) -> None:
-        self._S, self.domain, self._weights = S, domain, weights
+        self.S, self.domain, self._weights = S, domain, weights
         with phase("energy"):
             self._G = self._gradient_of(domain.points)
             self.energy = 0.5 * float(np.vdot(domain.points, self._G).real)
@@ -152,13 +164,13 @@ class EnergyModel:
     def _gradient_of(self, z: Complex) -> Complex:
         """(S - A'') z for z (B,) or (B, k)."""
         domain = self.domain
-        return self._S(z) + 0.5j * (z[domain.following] - z[domain.previous])
+        return self.S(z) + 0.5j * (z[domain.following] - z[domain.previous])
 
     @cached_property
     def _holes(self) -> Complex:
         """Where does dz go as each radius grows, each centre moves right, and up? (B, 3 holes)."""
         domain = self.domain
-        inside = domain.loop[:, None] == np.arange(1, len(domain.sizes))
+        inside = domain.loop[:, None] == domain.holes
         grow = inside * domain.directions[:, None]
         return np.concatenate([grow, inside.astype(complex), 1j * inside], axis=1)
 
@@ -174,12 +186,11 @@ class EnergyModel:
 
     def moved(self, x: Real) -> CircleDomain:
         """The domain that a step leads to."""
-        B, h = len(self.domain.arcs), len(self.domain.sizes) - 1
-        growth, right, up = np.split(x[B:], 3)
-        outer = np.zeros(1)
-        shift = np.concatenate([outer, right]) + 1j * np.concatenate([outer, up])
-        assert len(growth) == h
-        return self.domain.moved(x[:B], np.concatenate([outer, growth]), shift)
+        B, K = len(self.domain.arcs), len(self.domain.sizes)
+        growth, shift = np.zeros(K), np.zeros(K, dtype=np.complex128)
+        grown, right, up = np.split(x[B:], 3)
+        growth[self.domain.holes], shift[self.domain.holes] = grown, right + 1j * up
+        return self.domain.moved(x[:B], growth, shift)
 
     @cached_property
     def gradient(self) -> Real:
@@ -188,24 +199,24 @@ class EnergyModel:
 
     def hessian(self, x: Real) -> Real:
         """Second derivative of E_C, applied to a step."""
-        domain, B = self.domain, len(self.domain.arcs)
-        h = len(domain.sizes) - 1
+        domain, B, h = self.domain, len(self.domain.arcs), len(self.domain.holes)
         result = self._pulled_back(self._gradient_of(self._velocity(x)))
         # d^2 z = exp(i theta) (-dx^2 + 2 i dx dr) / r
         outward = np.real(np.conj(self._G) * domain.directions) / domain.radius
         result[:B] -= outward * x[:B]
         if h:
             turning = self.gradient[:B] / domain.radius
-            grown = np.concatenate([np.zeros(1), x[B : B + h]])
-            result[:B] += turning * grown[domain.loop]
-            result[B : B + h] += np.asarray(domain.sums(turning * x[:B]))[1:]
+            grown = np.zeros(h + 1)
+            grown[domain.holes] = x[B : B + h]
+            result[:B] = result[:B] + turning * grown[domain.loop]
+            result[B : B + h] += domain.sums(turning * x[:B])[domain.holes]
         return result
 
     @cached_property
     def _modes(self) -> tuple[Real, Real]:
         """Fourier modes on the outer circle, and by how much 1 / (|k| - 1) exceeds 1 / |k|."""
         domain, k = self.domain, np.arange(2, MODES + 1)
-        powers = domain.directions[:, None] ** k * (domain.loop == 0)[:, None]
+        powers = domain.directions[:, None] ** k * (domain.loop == domain.outer)[:, None]
         weights = 1 / (np.pi * k * (k - 1))
         return np.concatenate([powers.real, powers.imag], axis=1), np.tile(weights, 2)
 
@@ -214,14 +225,14 @@ class EnergyModel:
         """Inverse of the Hessian's block of radii and centres."""
         block = np.real(np.conj(self._holes).T @ self._gradient_of(self._holes))
         values, vectors = np.linalg.eigh((block + block.T) / 2)
-        values = np.maximum(values, 1e-6 * values[-1:].sum())
-        return vectors / values @ vectors.T
+        values = np.maximum(values, LEAST_CURVATURE * values[-1])
+        return np.asarray(vectors / values @ vectors.T)
 
     def _unconstrained(self, g: Real) -> Real:
         """M^-1 g; g (N,) or (N, k)."""
         B = len(self.domain.arcs)
         modes, weights = self._modes
-        along = self._S.inverse(g[:B]) + (modes * weights) @ (modes.T @ g[:B])
+        along = self.S.inverse(g[:B]) + (modes * weights) @ (modes.T @ g[:B])
         if len(g) == B:
             return along
         return np.concatenate([along, self._hole_block @ g[B:]])
@@ -231,14 +242,16 @@ class EnergyModel:
         """Constraints, as :meth:`_constrained` has them: the mean and the outer circle stay."""
         domain, w = self.domain, self._weights
         along, holes = w * 1j * domain.directions, w @ self._holes
-        turn = np.concatenate([(domain.loop == 0) / domain.sizes[0], np.zeros(len(holes))])
+        turn = np.concatenate(
+            [(domain.loop == domain.outer) / domain.sizes[domain.outer], np.zeros(len(holes))]
+        )
         mean = np.concatenate([along, holes])
         return self._constrained(np.stack([mean.real, mean.imag, turn], axis=1))
 
     def _constrained(self, c: Real) -> tuple[Real, Real, Real]:
         """Columns c that a step must be orthogonal to, M^-1 c, and the inverse of c^T M^-1 c."""
         preconditioned = self._unconstrained(c)
-        return c, preconditioned, np.linalg.inv(c.T @ preconditioned)
+        return c, preconditioned, np.asarray(np.linalg.inv(c.T @ preconditioned), dtype=np.float64)
 
     @cached_property
     def held(self) -> NDArray[np.int64]:
@@ -272,7 +285,8 @@ class EnergyModel:
     def gradient_norm(self) -> float:
         """Norm of the gradient on these steps, (g M^-1 g)^(1/2)."""
         with phase("boundary step"):
-            return float(np.sqrt(max(0.0, self.gradient @ self.precondition(self.gradient))))
+            squared = float(self.gradient @ self.precondition(self.gradient))
+        return max(0.0, squared) ** 0.5
 
 
 def _projected(x: Real, constraints: tuple[Real, Real, Real]) -> Real:

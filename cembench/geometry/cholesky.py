@@ -146,10 +146,10 @@ class Cholesky:
     def schur_factor(self) -> NDArray[np.float64]:
         """What is the Cholesky factor of the Schur complement of the leading block?
 
-        With A = [[B, E^T], [E, D]], B the leading block, that is the lower triangular C, dense, with
-        C C^T = D - E B^-1 E^T. A factor of A holds it as its trailing block; where a library does
-        not show that, or under "backslash", it takes one solve with as many right-hand sides as E
-        has rows.
+        With A = [[B, E^T], [E, D]], B the leading block, that is the lower triangular C, dense,
+        with C C^T = D - E B^-1 E^T. A factor of A holds it as its trailing block; where a library
+        does not show that, or under "backslash", it takes one solve with as many right-hand sides
+        as E has rows.
         """
         if self._leading is None:
             raise ValueError("schur_factor needs the order of the leading block at construction")

@@ -30,7 +30,7 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
     else:
         a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-        measure = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
+        measure[:] = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
     return measure / measure.sum()
 
 
