@@ -11,11 +11,12 @@ from scipy import sparse
 
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
+from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.folds import without_folds
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import backward_arcs, polygon_area
+from cembench.geometry.planar import polygon_area
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -61,31 +62,23 @@ def cem(
     def dirichlet(f_b: Complex) -> Complex:
         return whole.solve_leading(-(L_ib @ f_b))  # Eq. 22
 
-    def boundary_step(f_i: Complex) -> Complex:
-        with phase("boundary step"):
-            return _on_circle(ring.solve(-(L_bi @ f_i)))  # Eqs. 23, 24, 25
+    def ring_solution(f_i: Complex) -> Complex:
+        return ring.solve(-(L_bi @ f_i))  # Eq. 23
 
     def energy(f_i: Complex, f_b: Complex) -> float:
         # f^* L f needs only the boundary rows, since f is harmonic inside.
         with phase("energy"):
             return 0.5 * float(np.vdot(f_b, L_bb @ f_b + L_bi @ f_i).real) - polygon_area(f_b)
 
-    f_b = _on_circle(_start(mesh, whole, order))
-    f_i = dirichlet(f_b)
-    history = [energy(f_i, f_b)]
-    order_kept = 0
-    for _ in range(max_iterations):
-        following = boundary_step(_inverted(f_i) if inversion else f_i)
-        if backward_arcs(following) > backward_arcs(f_b):
-            order_kept += 1
-            following = boundary_step(f_i)
-            if backward_arcs(following) > backward_arcs(f_b):
-                break
-        f_b = following
-        f_i = dirichlet(f_b)
-        history.append(energy(f_i, f_b))
-        if history[-2] - history[-1] < tolerance:
-            break
+    f_b, f_i, history, order_kept = iterate_boundary(
+        on_circle(_start(mesh, whole, order)),
+        dirichlet,
+        ring_solution,
+        energy,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        inversion=inversion,
+    )
     uv = np.empty(mesh.n, dtype=np.complex128)
     uv[order] = np.concatenate([f_i, f_b])
     uv, repairs = without_folds(mesh, L, uv)
@@ -95,40 +88,11 @@ def cem(
 
 def _start(mesh: DiskMesh, whole: Cholesky, order: NDArray[np.int64]) -> Complex:
     """Boundary values of the map with a pole at the middle triangle (Eqs. 13, 14, 18)."""
-    V, F = mesh.V, mesh.F
     with phase("start"):
-        middle = V.mean(axis=0)
-        corners = F[np.argmin(((V[F].mean(axis=1) - middle) ** 2).sum(axis=1))]
-        p_a, p_b, p_c = V[corners]
-        base = p_b - p_a
-        alpha = np.dot(p_c - p_a, base) / np.dot(base, base)
-        height = np.linalg.norm(p_c - (p_a + alpha * base))
-        length = np.linalg.norm(base)
+        corners, values = pole(mesh.V, mesh.F)
         rhs = np.zeros(mesh.n, dtype=np.complex128)
-        rhs[corners] = [
-            -1 / length + 1j * (1 - alpha) / height,
-            1 / length + 1j * alpha / height,
-            -1j / height,
-        ]
+        rhs[corners] = values
         f = np.append(whole.solve(rhs[order][:-1]), 0.0)
     f_b = f[len(mesh.interior) :]
     # The image is the outside of a curve, so the boundary runs clockwise round it.
     return np.conj(f_b) if polygon_area(f_b) < 0 else f_b
-
-
-def _on_circle(f_b: Complex) -> Complex:
-    """Centralise and normalise (Eqs. 24, 25)."""
-    f_b = f_b - f_b.mean()
-    modulus = np.abs(f_b)
-    if not modulus.min() > 0:
-        raise AlgorithmFailed(
-            f"boundary vertex number {int(np.argmin(modulus))} of the loop came to lie at the "
-            "centre of the boundary, so its place on the circle is undefined (Eq. 25)"
-        )
-    return f_b / modulus
-
-
-def _inverted(f: Complex) -> Complex:
-    """F / |f|^2 (Eq. 30); zero stays zero."""
-    squared = (f * np.conj(f)).real
-    return np.divide(f, squared, out=np.zeros_like(f), where=squared > 0)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from cembench import run_verbs
+from cembench import holes_verbs, run_verbs, theory_verbs
 from cembench.console import Json, complain, err, out, print_json, split
 from cembench.errors import CembenchError, ParameterError
 from cembench.paper.profiles import Profile
@@ -344,7 +344,7 @@ def doctor(*, as_json: Json = False) -> None:
 
 
 #: Modules whose verbs are not written in this one.
-_MORE = (run_verbs,)
+_MORE = (run_verbs, holes_verbs, theory_verbs)
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 

@@ -102,10 +102,11 @@ class BoundaryCircle:
 def boundary_circles(mesh: TriangleMesh, uv: Complex) -> tuple[BoundaryCircle, ...]:
     """Which circles are the boundary images nearly, and how nearly? That of largest area first."""
     loops = sorted(mesh.loops, key=lambda loop: polygon_area(uv[loop]), reverse=True)
-    return tuple(_circle_of(loop, uv[loop]) for loop in [*loops[:1], *sorted(loops[1:], key=min)])
+    return tuple(circle_of(loop, uv[loop]) for loop in [*loops[:1], *sorted(loops[1:], key=min)])
 
 
-def _circle_of(loop: NDArray[np.int64], z: Complex) -> BoundaryCircle:
+def circle_of(loop: NDArray[np.int64], z: Complex) -> BoundaryCircle:
+    """Which circle is the image z (k,) of a boundary loop (k,) nearly?"""
     centre, radius = fitted_circle(z)
     with np.errstate(divide="ignore", invalid="ignore"):
         off = float(np.max(np.abs(np.abs(z - centre) - radius) / np.float64(radius)))

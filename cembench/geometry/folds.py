@@ -9,7 +9,7 @@ from scipy import sparse
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.harmonic import harmonic_extension
-from cembench.geometry.mesh import DiskMesh
+from cembench.geometry.mesh import DiskMesh, TriangleMesh
 from cembench.geometry.planar import backward_arcs, signed_areas
 from cembench.geometry.topology import vertex_graph
 
@@ -53,7 +53,9 @@ def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Comp
     return z, rounds + more
 
 
-def interior_without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Complex, int]:
+def interior_without_folds(
+    mesh: TriangleMesh, L: sparse.csc_array, z: Complex
+) -> tuple[Complex, int]:
     """Which map has the boundary of the harmonic map z, but no folded triangle?
 
     A harmonic map to a convex polygon can fold only where an edge has a weight that is not positive
@@ -83,13 +85,14 @@ def interior_without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> t
                 if near.all():
                     break
             convex = _convexified(L, near)
-        z = harmonic_extension(convex, mesh.boundary, z[mesh.boundary])
+        boundary = np.concatenate(mesh.loops)
+        z = harmonic_extension(convex, boundary, z[boundary])
         folded = _folded(mesh, z)
         rounds, rings = rounds + 1, 2 * rings
     return z, rounds
 
 
-def _folded(mesh: DiskMesh, z: Complex) -> NDArray[np.int64]:
+def _folded(mesh: TriangleMesh, z: Complex) -> NDArray[np.int64]:
     with phase("folds"):
         return np.flatnonzero(~(signed_areas(z, mesh.F) > 0))
 

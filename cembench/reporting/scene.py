@@ -93,12 +93,16 @@ class Scene:
     refined: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, uv: Complex) -> Self:
-        """Place the surface before the viewer and the image into its frame, and light both."""
+    def of(cls, mesh: TriangleMesh, uv: Complex, board_uv: Complex | None = None) -> Self:
+        """Place the surface before the viewer and the image into its frame, and light both.
+
+        The checkerboard is that of the image, or of another map `board_uv` (n,).
+        """
         F = mesh.F
         space = _framed(mesh.V @ view_rotation(mesh).T)
         plane = image_in_window(uv)
-        board = plane[:, :2] * (SQUARES / 2 / FILL)
+        ruled = plane if board_uv is None else image_in_window(board_uv)
+        board = ruled[:, :2] * (SQUARES / 2 / FILL)
         fineness = _fineness(F, space, board)
         table = np.column_stack([space, plane, board, _brightness(F, space), fineness])[F]
         table, origin = _cut_at_whole_numbers(table)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from cembench.errors import MeshError, ParameterError
 from cembench.geometry.files import is_mesh_file, read_mesh
@@ -15,6 +15,8 @@ from cembench.geometry.laplacian import non_delaunay_share
 from cembench.geometry.mesh import TriangleMesh
 from cembench.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.registry import Algorithm, Registry
+
+M = TypeVar("M", bound=TriangleMesh)
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,26 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
     given = {} if faces is None else {"faces": faces}
     mesh: TriangleMesh = family.function(**family.arguments(given))
     return mesh
+
+
+def surface_named(registry: Registry, name: str, kind: type[M], faces: int | None = None) -> M:
+    """The surface that a user means by a name: a mesh file, or a registered surface of this kind.
+
+    Raises
+    ------
+    MeshError
+        There is neither, or the surface is of another kind.
+
+    """
+    if name in registry.surfaces and not Path(name).is_file():
+        made = generate_surface(registry, name, faces)
+        return made if isinstance(made, kind) else kind.from_arrays(made.V, made.F, name=made.name)
+    if not Path(name).suffix and not Path(name).exists():
+        raise MeshError(
+            f"{name!r} is no file and no registered surface; known surfaces: "
+            f"{', '.join(sorted(registry.surfaces)) or 'none'}."
+        )
+    return read_mesh(Path(name), kind)
 
 
 def standing_of(registry: Registry, names: Iterable[str]) -> dict[str, Standing]:

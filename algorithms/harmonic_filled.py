@@ -1,0 +1,39 @@
+"""The harmonic map of a surface with holes, its holes filled for the purpose."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from cembench.geometry.folds import without_folds
+from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import HoledMesh
+from cembench.geometry.patches import filled
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+
+@algorithm(
+    "harmonic-filled",
+    title="Harmonic, filled",
+    target="circular holes",
+    source="Eq. (10) on the filled surface; Floater & Hormann 2005, Sec. 3",
+)
+def harmonic_filled(
+    mesh: HoledMesh, *, outer: Annotated[int, Field(ge=0)] | None = None
+) -> Parameterization:
+    """What does one Dirichlet solve give when the holes are filled first, and opened again?
+
+    What one does without Koebe's method, and the yardstick for it: every hole gets a fan to its
+    centroid, the outer boundary (that of the vertex `outer`, or the longest) keeps its arc length
+    on the unit circle. Nothing makes the holes round: the record's circularity says how far from
+    circles they are. Folds are mended on the filled surface (`fold_repairs`).
+    """
+    _, holes = mesh.outer_and_holes(outer)
+    disk = filled(mesh, holes)
+    L = laplacian(disk)
+    z = harmonic_extension(L, disk.boundary, arc_length_circle(disk))
+    z, repairs = without_folds(disk, L, z)
+    return Parameterization(z[: mesh.n].copy(), extras={"fold_repairs": repairs})
