@@ -44,7 +44,8 @@ def direct_cem(
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
     seen, weights = bordered.swept_to_boundary(S, np.stack([middle, centred], axis=1)).T
     domain, begun = _start(mesh, S, seen, weights)
-    found = minimise(S, domain, weights, tolerance=tolerance, max_iterations=max_iterations)
+    held = weights if gauge == "triangle" else domain.outer_measure
+    found = minimise(S, domain, held, tolerance=tolerance, max_iterations=max_iterations)
     uv = bordered.harmonic_extension(found.domain.points)
     folded = flipped_triangles(mesh, uv)
     uv, repairs = without_folds(mesh, L, uv) if folded else (uv, 0)

@@ -32,13 +32,13 @@ def direct_cem_holes(
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=0)] = 100,
     gauge: Gauge = "boundary",
-    outer: Annotated[int, Field(ge=-1)] = -1,
+    outer: Annotated[int, Field(ge=0)] | None = None,
     delaunay: bool = False,
 ) -> Parameterization:
     """Which circles, and which places on them, have the least conformal energy?"""
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
-        longest, holes = mesh.outer_and_holes(None if outer < 0 else outer)
+        longest, holes = mesh.outer_and_holes(outer)
     bordered = BorderedLaplacian(mesh, L, (longest, *holes))
     S = bordered.dirichlet_to_neumann()
     with phase("start"):
@@ -48,10 +48,9 @@ def direct_cem_holes(
         lengths = [edge_lengths(mesh, loop) for loop in (longest, *holes)]
         start = widest_start(S, seen, lengths)
     chart = start.outer
-    centred = weights
-    if chart:
-        centred = np.where(start.loop == chart, 1 / start.sizes[chart], 0.0)
-    found = minimise(S, start, centred, tolerance=tolerance, max_iterations=max_iterations)
+    start = start if chart else in_gauge(start, weights)
+    held = weights if gauge == "triangle" and not chart else start.outer_measure
+    found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
     uv = bordered.harmonic_extension(domain.points)
     extras = {

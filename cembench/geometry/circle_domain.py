@@ -24,6 +24,8 @@ Indices = NDArray[np.int64]
 LEAST_SHARE = 0.1
 #: From this arc on (radians) an angle is as exact as what a chord says.
 _WIDE = 1.0
+#: Below this an angle between points of a circle may be rounding.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,15 @@ class CircleDomain:
         return cls(
             (len(arcs),), arcs, np.zeros(1), np.zeros(1, complex), np.ones(1), LEAST_SHARE * arcs
         )
+
+    @property
+    def outer_measure(self) -> Real:
+        """What share of the unit circle belongs to each vertex? Shape (B,), 0 on holes, 1 in sum.
+
+        Nearly the boundary's harmonic measure from what lies at the origin.
+        """
+        share = (self.arcs + self.arcs[self.previous]) / (4 * np.pi)
+        return np.where(self.loop == self.outer, share, 0.0)
 
     @property
     def shortest(self) -> NDArray[np.bool_]:
@@ -140,8 +151,12 @@ class CircleDomain:
         """
         angle = along / self.radius
         change = self.sense * (angle[self.following] - angle)
-        arcs = np.maximum(self.arcs * _growth(change / self.arcs), self.least)
+        arcs = self.arcs * _growth(change / self.arcs)
         arcs *= (2 * np.pi / self.sums(arcs))[self.loop]
+        spare = np.maximum(arcs - self.least, 0.0)
+        arcs = (
+            self.least + spare * ((2 * np.pi - self.sums(self.least)) / self.sums(spare))[self.loop]
+        )
         radii = self.radii * np.clip(_growth(growth / self.radii), 0.5, 2.0)
         moved = replace(self, arcs=arcs, radii=radii, centres=self.centres + shift)
         # The first vertex turns so that all together turn as they should.
@@ -180,7 +195,10 @@ class CircleDomain:
         )
         step = (np.angle(turned[self.following] / turned) * moved.sense) % (2 * np.pi)
         short = (self.arcs < _WIDE) & (half < _WIDE / 2)
-        arcs = np.where(short, 2 * np.arcsin(half), step)
+        small = 2 * np.arcsin(half)
+        # A chord belongs to two arcs; rounding may turn one that is nearly 0 into nearly 2 pi.
+        small = np.where((step > np.pi) & (small > _ROUNDING), 2 * np.pi - small, small)
+        arcs = np.where(short, small, step)
         arcs *= (2 * np.pi / np.add.reduceat(arcs, self.starts))[self.loop]
         return replace(moved, arcs=arcs, least=self.least * (arcs / self.arcs))
 
