@@ -11,6 +11,7 @@ from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.boundary_energy import in_gauge, minimise
 from cembench.geometry.filled_start import widest_start
+from cembench.geometry.folds import interior_without_folds
 from cembench.geometry.gauge import Gauge, gauge_measure
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
@@ -53,12 +54,15 @@ def direct_cem_holes(
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
     uv = bordered.harmonic_extension(domain.points)
+    folded = flipped_triangles(mesh, uv)
+    uv, repairs = interior_without_folds(mesh, L, uv) if folded else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
         "outside_while_minimised": int(longest[0] if not chart else holes[chart - 1][0]),
-        "folded": flipped_triangles(mesh, uv),
+        "folded_before_repair": folded,
+        "fold_repairs": repairs,
     }
     return Parameterization(uv, len(found.energies) - 1, found.energies, extras)

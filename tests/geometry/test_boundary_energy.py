@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cembench import AlgorithmFailed, HoledMesh
+from cembench.geometry import boundary_energy
 from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
 from cembench.geometry.circle_domain import CircleDomain
@@ -87,6 +90,28 @@ def test_energy_falls_at_every_step_down_to_a_stationary_point(ring):
         x = model.precondition(rng.standard_normal(len(model.gradient)))
         near = in_gauge(model.moved(1e-3 * x / np.linalg.norm(x)), weights)
         assert EnergyModel(S, near, weights).energy > found.energies[-1]
+
+
+def test_arcs_at_their_least_length_do_not_become_shorter(ring):
+    _, _, S, domain, weights = ring
+    start = in_gauge(domain, weights)
+    stuck = replace(start, least=start.arcs)
+    model = EnergyModel(S, stuck, weights)
+    assert 0 < len(model.held) < len(stuck.arcs)
+    step = model.precondition(-model.gradient)
+    free = replace(start, least=0.1 * start.arcs)
+    change = EnergyModel(S, free, weights).moved(1e-6 * step).arcs - free.arcs
+    assert abs(change[model.held]).max() < 1e-10 < abs(change).max()
+
+
+def test_with_too_many_arcs_at_their_least_length_it_stops(ring, monkeypatch):
+    _, _, S, domain, weights = ring
+    monkeypatch.setattr(boundary_energy, "MOST_HELD", 0)
+    stuck = replace(in_gauge(domain, weights), least=0.999 * in_gauge(domain, weights).arcs)
+    found = minimise(S, stuck, weights, tolerance=1e-7, max_iterations=50)
+    assert found.reason == "crowded"
+    assert np.isnan(found.gradient)
+    assert found.held_arcs > 0
 
 
 def test_a_limit_on_iterations_is_kept_and_told(ring):
