@@ -10,7 +10,7 @@ from pydantic import Field
 
 from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
+from cembench.geometry.boundary_energy import EnergyModel, in_gauge, leashed, minimise
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
 from cembench.geometry.filled_start import arcs_of_measure
@@ -25,6 +25,9 @@ from cembench.registry import algorithm
 
 Real = NDArray[np.float64]
 
+#: How far the gauge "boundary" lets the mean go for less energy.
+LEASH = 0.03
+
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
 def direct_cem(
@@ -35,17 +38,41 @@ def direct_cem(
     gauge: Gauge = "boundary",
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which boundary on the unit circle has the least conformal energy?"""
+    """Which boundary on the unit circle has the least conformal energy? Newton's method finds it.
+
+    E_C of the harmonic map (Eqs. 5, 7, 8) is a function of the boundary's angles alone,
+    z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first,
+    boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block:
+    Newton steps (trust region, preconditioned by S^-1) touch nothing but the boundary.
+
+    Decided here: the start is the harmonic measure of the boundary from the triangle nearest to the
+    mean vertex, or arc length where that has lower energy (`start`); it is brought into the
+    `gauge`, that is, a mean comes to lie at 0: of the boundary by length, of that triangle, or of
+    the surface by area; from there Moebius maps are held by the start's arcs; with "boundary" the
+    mean may at last go up to 0.03 away from 0 where that lowers E_C. Iteration ends when the
+    gradient's norm, whose square is about twice what E_C can still fall, is at most `tolerance`
+    (`stopped`: "gradient"), when nothing is left but rounding ("rounding"), after `max_iterations`
+    ("iterations"), or when too many arcs would fall below a tenth of their length at the start
+    ("crowded"; `held_arcs` counts those held). Folds are mended as in CEM (`fold_repairs`).
+    `delaunay` takes the weights of the intrinsic Delaunay triangulation; `folded_before_repair`
+    then counts the folds that the original edges force.
+    """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
     S = bordered.dirichlet_to_neumann()
     with phase("start"):
         middle = gauge_measure(mesh, "triangle", mesh.boundary)
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
-    seen, weights = bordered.swept_to_boundary(S, np.stack([middle, centred], axis=1)).T
+    seen, weights = bordered.swept_to_boundary(np.stack([middle, centred], axis=1)).T
     domain, begun = _start(mesh, S, seen, weights)
     held = weights if gauge == "triangle" else domain.outer_measure
     found = minimise(S, domain, held, tolerance=tolerance, max_iterations=max_iterations)
+    if gauge == "boundary" and found.reason == "gradient":
+        nearby = leashed(S, found.domain, LEASH)
+        again = minimise(
+            S, nearby, nearby.outer_measure, tolerance=tolerance, max_iterations=max_iterations
+        )
+        found = found.followed_by(again)
     uv = bordered.harmonic_extension(found.domain.points)
     folded = flipped_triangles(mesh, uv)
     uv, repairs = without_folds(mesh, L, uv) if folded else (uv, 0)

@@ -36,7 +36,16 @@ def direct_cem_holes(
     outer: Annotated[int, Field(ge=0)] | None = None,
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which circles, and which places on them, have the least conformal energy?"""
+    """Which circles, and which places on them, have the least conformal energy?
+
+    As `direct-cem`, with the centre and the radius of every hole as further unknowns; the holes are
+    open in every step, and their circles exact. The outer boundary is that of the vertex `outer`,
+    or the longest. Decided here: the start fills the holes with fans and takes circles of the
+    images' centroids and areas; where one of these has a radius below 1e-3, each boundary is tried
+    as the outer one, the one that leaves the smallest circle largest is outside while E_C is
+    minimised (`outside_while_minimised`; the energy history is that of this domain), and a Moebius
+    map brings the outer one out; folds are mended with the boundary kept (`fold_repairs`).
+    """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
         longest, holes = mesh.outer_and_holes(outer)
@@ -44,7 +53,7 @@ def direct_cem_holes(
     S = bordered.dirichlet_to_neumann()
     with phase("start"):
         measures = [gauge_measure(mesh, name, longest) for name in ("triangle", gauge)]
-    seen, weights = bordered.swept_to_boundary(S, np.stack(measures, axis=1)).T
+    seen, weights = bordered.swept_to_boundary(np.stack(measures, axis=1)).T
     with phase("start"):
         lengths = [edge_lengths(mesh, loop) for loop in (longest, *holes)]
         start = widest_start(S, seen, lengths)

@@ -50,7 +50,6 @@ class BorderedLaplacian:
         with phase("assembly"):
             self._order = np.concatenate([mesh.interior, *loops])
             ordered = sparse.csc_array(sparse.csr_array(L)[self._order][:, self._order])
-            self._L_ib = sparse.csr_array(ordered[: self._n_i, self._n_i :])
             pinned = ordered[:-1, :-1]
         self._whole = Cholesky(pinned, leading=self._n_i)
 
@@ -58,23 +57,19 @@ class BorderedLaplacian:
         """S = L_bb - L_bi L_ii^-1 L_ib."""
         return DirichletToNeumann(self._whole.schur_factor())
 
-    def swept_to_boundary(
-        self, S: DirichletToNeumann, measure: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def swept_to_boundary(self, measure: NDArray[np.float64]) -> NDArray[np.float64]:
         """Which weights on the boundary give every harmonic map the mean that the measure gives?
 
-        `measure` is (n, k), each column 1 in sum; the result (B, k) is its harmonic measure: S f_b
-        for the solution f of L f = measure with the last boundary vertex at 0, but for the 1 that
-        flows out there.
+        `measure` is (n, k), each column 1 in sum; the result (B, k) is its harmonic measure, 1 in
+        sum too.
         """
-        f = self._whole.solve(measure[self._order][:-1])[self._n_i :]
-        weights = S(np.concatenate([f, np.zeros((1, f.shape[1]))]))
-        weights[-1] += 1
-        return np.asarray(weights)
+        weights = self._whole.condensed(measure[self._order][:-1])
+        return np.concatenate([weights, 1 - weights.sum(axis=0, keepdims=True)])
 
     def harmonic_extension(self, f_b: Complex) -> Complex:
         """The map with these boundary values and L_ii f_i = -L_ib f_b (Eq. 22); (n,)."""
         f = np.empty(len(self._order), dtype=np.complex128)
-        f_i: Any = self._whole.solve_leading(-(self._L_ib @ f_b))
+        # Constants are harmonic: so the last vertex can be taken to 0 and back.
+        f_i: Any = self._whole.extended((f_b - f_b[-1])[:-1]) + f_b[-1]
         f[self._order] = np.concatenate([f_i, f_b])
         return f

@@ -15,7 +15,7 @@ So they are held fixed by a *gauge*: weights w, 1 in sum, for which sum w z = 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,6 +25,7 @@ from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.planar import polygon_area
 from cembench.geometry.trust_region import newton_step
 
 Real = NDArray[np.float64]
@@ -60,6 +61,14 @@ class Minimum:
     reason: str
     products: int
     held_arcs: int
+
+    def followed_by(self, other: Minimum) -> Minimum:
+        """Both as one, or only the first where the other, begun elsewhere, is no lower."""
+        lower = tuple(energy for energy in other.energies if energy < self.energies[-1])
+        if not lower or lower[-1] != other.energies[-1]:
+            return self
+        energies, products = self.energies + lower, self.products + other.products
+        return replace(other, energies=energies, products=products)
 
 
 def minimise(
@@ -111,6 +120,49 @@ def minimise(
             break
     gradient = float("nan") if reason == "crowded" else here.gradient_norm
     return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
+
+
+def leashed(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> CircleDomain:
+    """Which of its nearest Moebius images, |a| <= `leash`, has the least energy?
+
+    By a quadratic model from seven energies; the domain itself where that promises too much.
+    """
+
+    def energy(a: complex) -> float:
+        z = domain.through(a).points
+        return conformal_energy(S, domain, z)
+
+    h = leash
+    middle, right, left = energy(0), energy(h), energy(-h)
+    up, down, both, neither = (
+        energy(1j * h),
+        energy(-1j * h),
+        energy(h + 1j * h),
+        energy(-h - 1j * h),
+    )
+    g = np.array([right - left, up - down]) / 2
+    xx, yy = right - 2 * middle + left, up - 2 * middle + down
+    xy = (both - 2 * middle + neither - xx - yy) / 2
+    curvatures, axes = np.linalg.eigh([[xx, xy], [xy, yy]])
+    along = axes.T @ g
+    # In units of the leash: the model's minimum in the unit disk (More and Sorensen 1983).
+    damping = max(0.0, -curvatures[0])
+    x = along / np.maximum(curvatures + damping, np.finfo(float).tiny)
+    if damping or np.linalg.norm(x) > 1:
+        low, high = damping, damping + float(np.linalg.norm(g))
+        for _ in range(60):
+            damping = (low + high) / 2
+            x = along / (curvatures + damping)
+            low, high = (damping, high) if np.linalg.norm(x) > 1 else (low, damping)
+        x = along / (curvatures + high)
+    a = h * complex(*(-(axes @ x)))
+    return domain.through(a) if energy(a) < middle else domain
+
+
+def conformal_energy(S: DirichletToNeumann, domain: CircleDomain, z: Complex) -> float:
+    """E_C of the harmonic map whose boundary loops, those of the domain, lie at z (B,)."""
+    area = sum(polygon_area(z[domain.loop == k]) for k in range(len(domain.sizes)))
+    return 0.5 * float(np.vdot(z, S(z)).real) - area
 
 
 def _tried(here: EnergyModel, step: Real, weights: Real) -> EnergyModel | None:

@@ -93,6 +93,8 @@ class _Factor(Protocol):
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def schur_factor(self) -> NDArray[np.float64] | None: ...
+    def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
+    def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
 
 
 class Cholesky:
@@ -156,6 +158,31 @@ class Cholesky:
         with phase("schur complement"):
             C = self._kept.schur_factor() if self._kept is not None else None
         return self._schur_factor_by_solves() if C is None else C
+
+    def condensed(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What is left of a right-hand side b = (c, d) when the leading block is eliminated?
+
+        d - E B^-1 c, in the letters of :meth:`schur_factor`; b (n, k), the result
+        (n - leading, k). With a factor that shows its trailing block that is half a solve.
+        """
+        k = self._leading
+        if self._kept is not None:
+            with phase("solves"):
+                found = self._kept.condensed(b)
+            if found is not None:
+                return found
+        return b[k:] - sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
+
+    def extended(self, x: NDArray[Any]) -> NDArray[Any]:
+        """Which solution of B y + E^T x = 0 has these trailing values x, real or complex?
+
+        x (n - leading,) or (n - leading, k), y alike; half a solve as in :meth:`condensed`.
+        """
+        k = self._leading
+        if self._kept is not None and self._kept.schur_factor() is not None:
+            with phase("solves"):
+                return _by_real_columns(self._kept.extended, x)
+        return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
 
     def _schur_factor_by_solves(self) -> NDArray[np.float64]:
         k = self._leading
@@ -250,6 +277,12 @@ class _SeparateFactors:
     def schur_factor(self) -> None:
         """These libraries do not show their factors."""
 
+    def condensed(self, B: NDArray[np.float64]) -> None:
+        """Nor half a solve."""
+
+    def extended(self, B: NDArray[np.float64]) -> None:
+        """Nor half a solve."""
+
 
 def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:
     """Let a solver for real columns (n, k) take vectors and complex numbers too."""
@@ -257,5 +290,5 @@ def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:
     k = columns.shape[1]
     if np.iscomplexobj(b):
         x = solve(np.concatenate([columns.real, columns.imag], axis=1))
-        return (x[:, :k] + 1j * x[:, k:]).reshape(b.shape)
-    return np.asarray(solve(columns.astype(np.float64, copy=False))).reshape(b.shape)
+        return (x[:, :k] + 1j * x[:, k:]).reshape((-1, *b.shape[1:]))
+    return np.asarray(solve(columns.astype(np.float64, copy=False))).reshape((-1, *b.shape[1:]))

@@ -12,6 +12,7 @@ import numpy as np
 from cvxopt import amd, cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg.blas import dtrmm
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
@@ -43,6 +44,7 @@ class CholmodFactor:
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
 
     def _factor(self) -> None:
+        self._trailing: NDArray[np.float64] | None = None
         with phase("factorisation"):
             _set_options()
             try:
@@ -84,7 +86,31 @@ class CholmodFactor:
     def schur_factor(self) -> NDArray[np.float64] | None:
         """The factor's own trailing block, after the leading one; None where it cannot be seen."""
         assert self._leading is not None
-        return trailing_block(self._symbolic, self._lower.size[0], self._leading)
+        if self._trailing is None:
+            self._trailing = trailing_block(self._symbolic, self._lower.size[0], self._leading)
+        return self._trailing
+
+    def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """B_t - A_tl A_ll^-1 B_l for B (n, k): L y = B ends in y_t with C y_t the result."""
+        C = self.schur_factor()
+        if C is None:
+            return None
+        x = matrix(np.asfortranarray(B))
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE)
+        cholmod.solve(self._symbolic, x, sys=_FORWARD)
+        return np.asarray(dtrmm(1.0, C, np.array(x)[self._leading :], lower=1))
+
+    def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """-A_ll^-1 A_lt B for B (n - leading, k): L^T x = (0, C^T B) ends in B."""
+        C = self.schur_factor()
+        if C is None:
+            return None
+        padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
+        padded[self._leading :] = dtrmm(1.0, C, B, lower=1, trans_a=1)
+        x = matrix(padded)
+        cholmod.solve(self._symbolic, x, sys=_BACKWARD)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
+        return np.array(x)[: self._leading]
 
 
 def _set_options() -> None:

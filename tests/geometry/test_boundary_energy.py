@@ -6,7 +6,13 @@ import pytest
 from cembench import AlgorithmFailed, HoledMesh
 from cembench.geometry import boundary_energy
 from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
+from cembench.geometry.boundary_energy import (
+    EnergyModel,
+    conformal_energy,
+    in_gauge,
+    leashed,
+    minimise,
+)
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.trust_region import newton_step
@@ -127,6 +133,27 @@ def test_every_moebius_image_has_the_same_one_in_the_gauge(ring):
     other = in_gauge(domain.through(0.4 - 0.5j), weights)
     np.testing.assert_allclose(np.sort(other.arcs), np.sort(expected.arcs), rtol=1e-9)
     assert other.radii == pytest.approx(expected.radii)
+
+
+def test_a_leash_lets_the_energy_fall_and_no_more_than_it_is_long(ring):
+    _, _, S, domain, weights = ring
+    here = in_gauge(domain, weights)
+    near = leashed(S, here, 0.03)
+    assert conformal_energy(S, near, near.points) < conformal_energy(S, here, here.points)
+    for k in range(12):  # nor does any other direction lead lower
+        other = here.through(0.03 * np.exp(1j * k * np.pi / 6))
+        lowest = conformal_energy(S, near, near.points)
+        assert lowest < conformal_energy(S, other, other.points) + 1e-4 * lowest
+
+
+def test_a_second_minimum_counts_only_where_it_is_lower(ring):
+    _, _, S, domain, weights = ring
+    first = minimise(S, domain, weights, tolerance=1e-7, max_iterations=2)
+    second = minimise(S, first.domain, weights, tolerance=1e-7, max_iterations=50)
+    both = first.followed_by(second)
+    assert both.energies[-1] == second.energies[-1]
+    assert (np.diff(both.energies) < 0).all()
+    assert second.followed_by(first) is second
 
 
 def test_a_gauge_whose_weight_lies_on_one_vertex_is_refused():

@@ -32,7 +32,7 @@ def pieces(mesh):
     loops = (outer, *holes)
     bordered = BorderedLaplacian(mesh, laplacian(mesh), loops)
     S = bordered.dirichlet_to_neumann()
-    seen = bordered.swept_to_boundary(S, gauge_measure(mesh, "triangle", outer)[:, None])[:, 0]
+    seen = bordered.swept_to_boundary(gauge_measure(mesh, "triangle", outer)[:, None])[:, 0]
     return S, seen, [edge_lengths(mesh, loop) for loop in loops]
 
 

@@ -88,3 +88,28 @@ def test_an_indefinite_schur_complement_is_refused():
 def test_it_needs_a_leading_block():
     with pytest.raises(ValueError, match="at construction"):
         Cholesky(sparse.csc_array(np.eye(3))).schur_factor()
+
+
+@pytest.mark.parametrize("backend", available_backends())
+@pytest.mark.parametrize("solves", ["reuse", "backslash"])
+def test_half_solves_condense_a_right_hand_side_and_extend_a_boundary(system, backend, solves):
+    A, k = system
+    rng = np.random.default_rng(1)
+    b, x = rng.standard_normal((A.shape[0], 3)), rng.standard_normal(A.shape[0] - k) * (1 + 2j)
+    dense = A.toarray()
+    with linear_algebra(solves, backend):
+        factor = Cholesky(A, leading=k)
+        condensed, extended = factor.condensed(b), factor.extended(x)
+    left = b[k:] - dense[k:, :k] @ np.linalg.solve(dense[:k, :k], b[:k])
+    np.testing.assert_allclose(condensed, left, atol=1e-10)
+    np.testing.assert_allclose(dense[:k, :k] @ extended, -dense[:k, k:] @ x, atol=1e-10)
+
+
+def test_half_solves_do_without_a_factor_that_can_be_seen(system, monkeypatch):
+    A, k = system
+    b = np.random.default_rng(1).standard_normal((A.shape[0], 2))
+    expected = Cholesky(A, leading=k).condensed(b), Cholesky(A, leading=k).extended(b[k:])
+    monkeypatch.setattr(cholmod, "trailing_block", lambda *_: None)
+    found = Cholesky(A, leading=k).condensed(b), Cholesky(A, leading=k).extended(b[k:])
+    for one, other in zip(expected, found, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-10)
