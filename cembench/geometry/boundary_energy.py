@@ -25,7 +25,6 @@ from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
-from cembench.geometry.planar import polygon_area
 from cembench.geometry.trust_region import newton_step
 
 Real = NDArray[np.float64]
@@ -123,46 +122,33 @@ def minimise(
 
 
 def leashed(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> CircleDomain:
-    """Which of its nearest Moebius images, |a| <= `leash`, has the least energy?
+    """Which Moebius image of a disk's boundary, |a| <= `leash`, has the least energy?
 
-    By a quadratic model from seven energies; the domain itself where that promises too much.
+    By the second-order model of E_C in a: the map z -> (z - a) / (1 - conj(a) z) moves z by
+    -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + .... The domain itself where that leads no lower.
     """
-
-    def energy(a: complex) -> float:
-        z = domain.through(a).points
-        return conformal_energy(S, domain, z)
-
-    h = leash
-    middle, right, left = energy(0), energy(h), energy(-h)
-    up, down, both, neither = (
-        energy(1j * h),
-        energy(-1j * h),
-        energy(h + 1j * h),
-        energy(-h - 1j * h),
-    )
-    g = np.array([right - left, up - down]) / 2
-    xx, yy = right - 2 * middle + left, up - 2 * middle + down
-    xy = (both - 2 * middle + neither - xx - yy) / 2
-    curvatures, axes = np.linalg.eigh([[xx, xy], [xy, yy]])
-    along = axes.T @ g
+    here = EnergyModel(S, domain, np.zeros(len(domain.arcs)))
+    z, G = domain.points, here.residual
+    fields = np.stack([z**2 - 1, -1j * (z**2 + 1)], axis=1)  # for real and for imaginary a
+    bends = [[2 * (z**3 - z), -2j * z**3], [-2j * z**3, -2 * (z**3 + z)]]
+    g = leash * np.real(np.conj(fields).T @ G)
+    H = np.real(np.conj(fields).T @ here.residual_of(fields))
+    H = leash**2 * (H + [[float(np.vdot(bend, G).real) for bend in row] for row in bends])
+    curvatures, axes = np.linalg.eigh((H + H.T) / 2)
     # In units of the leash: the model's minimum in the unit disk (More and Sorensen 1983).
-    damping = max(0.0, -curvatures[0])
-    x = along / np.maximum(curvatures + damping, np.finfo(float).tiny)
-    if damping or np.linalg.norm(x) > 1:
-        low, high = damping, damping + float(np.linalg.norm(g))
+    along = axes.T @ g
+    rounding = np.finfo(float).eps * float(np.abs(curvatures).max()) + np.finfo(float).tiny
+    low = max(0.0, -float(curvatures[0])) + rounding
+    high = low + float(np.linalg.norm(g))
+    if np.linalg.norm(along / (curvatures + low)) > 1:
         for _ in range(60):
-            damping = (low + high) / 2
-            x = along / (curvatures + damping)
-            low, high = (damping, high) if np.linalg.norm(x) > 1 else (low, damping)
-        x = along / (curvatures + high)
-    a = h * complex(*(-(axes @ x)))
-    return domain.through(a) if energy(a) < middle else domain
-
-
-def conformal_energy(S: DirichletToNeumann, domain: CircleDomain, z: Complex) -> float:
-    """E_C of the harmonic map whose boundary loops, those of the domain, lie at z (B,)."""
-    area = sum(polygon_area(z[domain.loop == k]) for k in range(len(domain.sizes)))
-    return 0.5 * float(np.vdot(z, S(z)).real) - area
+            middle = (low + high) / 2
+            outside = np.linalg.norm(along / (curvatures + middle)) > 1
+            low, high = (middle, high) if outside else (low, middle)
+        low = high
+    a = -leash * complex(*(axes @ (along / (curvatures + low))))
+    image = domain.through(a)
+    return image if EnergyModel(S, image, here.weights).energy < here.energy else domain
 
 
 def _tried(here: EnergyModel, step: Real, weights: Real) -> EnergyModel | None:
@@ -208,12 +194,12 @@ class EnergyModel:
     """
 
     def __init__(self, S: DirichletToNeumann, domain: CircleDomain, weights: Real) -> None:
-        self.S, self.domain, self._weights = S, domain, weights
+        self.S, self.domain, self.weights = S, domain, weights
         with phase("energy"):
-            self._G = self._gradient_of(domain.points)
-            self.energy = 0.5 * float(np.vdot(domain.points, self._G).real)
+            self.residual = self.residual_of(domain.points)
+            self.energy = 0.5 * float(np.vdot(domain.points, self.residual).real)
 
-    def _gradient_of(self, z: Complex) -> Complex:
+    def residual_of(self, z: Complex) -> Complex:
         """(S - A'') z for z (B,) or (B, k)."""
         domain = self.domain
         return self.S(z) + 0.5j * (z[domain.following] - z[domain.previous])
@@ -247,14 +233,14 @@ class EnergyModel:
     @cached_property
     def gradient(self) -> Real:
         """Derivative of E_C along each entry of a step."""
-        return self._pulled_back(self._G)
+        return self._pulled_back(self.residual)
 
     def hessian(self, x: Real) -> Real:
         """Second derivative of E_C, applied to a step."""
         domain, B, h = self.domain, len(self.domain.arcs), len(self.domain.holes)
-        result = self._pulled_back(self._gradient_of(self._velocity(x)))
+        result = self._pulled_back(self.residual_of(self._velocity(x)))
         # d^2 z = exp(i theta) (-dx^2 + 2 i dx dr) / r
-        outward = np.real(np.conj(self._G) * domain.directions) / domain.radius
+        outward = np.real(np.conj(self.residual) * domain.directions) / domain.radius
         result[:B] -= outward * x[:B]
         if h:
             turning = self.gradient[:B] / domain.radius
@@ -275,7 +261,7 @@ class EnergyModel:
     @cached_property
     def _hole_block(self) -> Real:
         """Inverse of the Hessian's block of radii and centres."""
-        block = np.real(np.conj(self._holes).T @ self._gradient_of(self._holes))
+        block = np.real(np.conj(self._holes).T @ self.residual_of(self._holes))
         values, vectors = np.linalg.eigh((block + block.T) / 2)
         values = np.maximum(values, LEAST_CURVATURE * values[-1])
         return np.asarray(vectors / values @ vectors.T)
@@ -292,7 +278,7 @@ class EnergyModel:
     @cached_property
     def _gauge(self) -> tuple[Real, Real, Real]:
         """Constraints, as :meth:`_constrained` has them: the mean and the outer circle stay."""
-        domain, w = self.domain, self._weights
+        domain, w = self.domain, self.weights
         along, holes = w * 1j * domain.directions, w @ self._holes
         turn = np.concatenate(
             [(domain.loop == domain.outer) / domain.sizes[domain.outer], np.zeros(len(holes))]
