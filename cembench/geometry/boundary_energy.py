@@ -32,7 +32,7 @@ Complex = NDArray[np.complex128]
 
 #: Fourier modes from 2 to this one get the Hessian's own weight in the preconditioner.
 MODES = 8
-#: A promised decrease below this share of the area is rounding.
+#: A promised decrease below this, times the number of boundary vertices, is rounding.
 ROUNDING = 1e-16
 #: With more arcs than this held at their least length the boundary is too crowded to go on.
 MOST_HELD = 64
@@ -105,6 +105,9 @@ def minimise(
             accuracy = float(np.clip(here.gradient_norm, 1e-3, 0.3))
             step = newton_step(here.gradient, here.hessian, here.precondition, radius, accuracy)
         products += step.products
+        if not step.decrease >= ROUNDING * len(weights):
+            reason = "rounding"
+            break
         there = _tried(here, step.p, weights)
         agreement = (here.energy - there.energy) / step.decrease if there else -np.inf
         if agreement > 0.75 and step.at_edge:
@@ -114,9 +117,6 @@ def minimise(
         if there and agreement > 1e-4 and there.energy < here.energy:
             here = there
             energies.append(here.energy)
-        elif step.decrease < ROUNDING * len(weights):
-            reason = "rounding"
-            break
     gradient = float("nan") if reason == "crowded" else here.gradient_norm
     return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
 
