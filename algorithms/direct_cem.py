@@ -54,8 +54,8 @@ def direct_cem(
     (`stopped`: "gradient"), when nothing is left but rounding ("rounding"), after `max_iterations`
     ("iterations"), or when too many arcs would fall below a tenth of their length at the start
     ("crowded"; `held_arcs` counts those held). Folds are mended as in CEM (`fold_repairs`).
-    `delaunay` takes the weights of the intrinsic Delaunay triangulation; `folded_before_repair`
-    then counts the folds that the original edges force.
+    `delaunay` takes the weights of the intrinsic Delaunay triangulation, in the energy history too;
+    `folded_before_repair` then counts the folds that the original edges force, and they stay.
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
@@ -75,7 +75,7 @@ def direct_cem(
         found = found.followed_by(again)
     uv = bordered.harmonic_extension(found.domain.points)
     folded = flipped_triangles(mesh, uv)
-    uv, repairs = without_folds(mesh, L, uv) if folded else (uv, 0)
+    uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,

@@ -64,7 +64,7 @@ def direct_cem_holes(
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
     uv = bordered.harmonic_extension(domain.points)
     folded = flipped_triangles(mesh, uv)
-    uv, repairs = interior_without_folds(mesh, L, uv) if folded else (uv, 0)
+    uv, repairs = interior_without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,

@@ -131,6 +131,13 @@ def test_on_a_boundary_crowded_far_below_1e_6_vertices_keep_their_places(gauge):
     assert all_metrics(mesh, found.uv)["angle_error_mean_deg"] < 8  # coarse: eight cells across
 
 
+def test_with_intrinsic_delaunay_weights_folds_that_the_edges_force_stay_and_are_counted():
+    mesh = read_mesh(real_mesh("canonical_face.obj"))
+    found = direct_cem(mesh, delaunay=True)
+    assert found.extras["folded_before_repair"] == flipped_triangles(mesh, found.uv) > 0
+    assert found.extras["fold_repairs"] == 0
+
+
 def test_corners_and_boundary_triangles_without_interior_vertices_are_no_obstacle():
     V, F = gallery.flat_rectangle(6, 9)  # two corners are ears
     mesh = DiskMesh.from_arrays(V, F)
