@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from cembench.clock import phase
-from cembench.errors import ParameterError
+from cembench.errors import NotPositiveDefinite, ParameterError
 
 Solves = Literal["reuse", "backslash"]
 Backend = Literal["cvxopt", "superlu", "pardiso"]
@@ -37,6 +37,9 @@ class LinearAlgebra:
     solves: Solves = "reuse"
     backend: Backend = "cvxopt"
 
+
+#: Right-hand sides that are solved for together: enough to be fast, few enough to need no memory.
+_COLUMNS_AT_ONCE = 64
 
 _DEFAULT = LinearAlgebra()
 _current: ContextVar[LinearAlgebra] = ContextVar("cembench_linear_algebra", default=_DEFAULT)
@@ -89,6 +92,9 @@ class _Factor(Protocol):
     def update(self, A: sparse.csc_array) -> None: ...
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def schur_factor(self) -> NDArray[np.float64] | None: ...
+    def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
+    def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
 
 
 class Cholesky:
@@ -135,10 +141,68 @@ class Cholesky:
         if self._kept is not None:
             with phase("solves"):
                 return _by_real_columns(self._kept.solve_leading, b)
-        block = sparse.csc_array(self._A[: self._leading, : self._leading])
-        factor = _factor(self._how.backend, block, None)
+        factor = self._leading_factor()
         with phase("solves"):
             return _by_real_columns(factor.solve, b)
+
+    def schur_factor(self) -> NDArray[np.float64]:
+        """What is the Cholesky factor of the Schur complement of the leading block?
+
+        With A = [[B, E^T], [E, D]], B the leading block, that is the lower triangular C, dense,
+        with C C^T = D - E B^-1 E^T. A factor of A holds it as its trailing block; where a library
+        does not show that, or under "backslash", it takes one solve with as many right-hand sides
+        as E has rows.
+        """
+        if self._leading is None:
+            raise ValueError("schur_factor needs the order of the leading block at construction")
+        with phase("schur complement"):
+            C = self._kept.schur_factor() if self._kept is not None else None
+        return self._schur_factor_by_solves() if C is None else C
+
+    def condensed(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
+        """What is left of a right-hand side b = (c, d) when the leading block is eliminated?
+
+        d - E B^-1 c, in the letters of :meth:`schur_factor`; b (n, k), the result
+        (n - leading, k). With a factor that shows its trailing block that is half a solve.
+        """
+        k = self._leading
+        if self._kept is not None:
+            with phase("solves"):
+                found = self._kept.condensed(b)
+            if found is not None:
+                return found
+        return b[k:] - sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
+
+    def extended(self, x: NDArray[Any]) -> NDArray[Any]:
+        """Which solution of B y + E^T x = 0 has these trailing values x, real or complex?
+
+        x (n - leading,) or (n - leading, k), y alike; half a solve as in :meth:`condensed`.
+        """
+        k = self._leading
+        if self._kept is not None and self._kept.schur_factor() is not None:
+            with phase("solves"):
+                return _by_real_columns(self._kept.extended, x)
+        return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
+
+    def _schur_factor_by_solves(self) -> NDArray[np.float64]:
+        k = self._leading
+        solve = self._kept.solve_leading if self._kept else self._leading_factor().solve
+        with phase("schur complement"):
+            E = sparse.csr_array(self._A[k:, :k])
+            S = self._A[k:, k:].toarray()
+            for first in range(0, E.shape[0], _COLUMNS_AT_ONCE):
+                chosen = slice(first, first + _COLUMNS_AT_ONCE)
+                S[:, chosen] -= E @ solve(E[chosen].toarray().T)
+            try:
+                return np.asfortranarray(np.linalg.cholesky((S + S.T) / 2))
+            except np.linalg.LinAlgError:
+                raise NotPositiveDefinite(
+                    f"the Schur complement, of order {len(S)}, is not positive definite"
+                ) from None
+
+    def _leading_factor(self) -> _Factor:
+        block = sparse.csc_array(self._A[: self._leading, : self._leading])
+        return _factor(self._how.backend, block, None)
 
 
 def schur_complement(A: sparse.sparray, leading: int) -> NDArray[np.float64]:
@@ -210,6 +274,15 @@ class _SeparateFactors:
             self._solve_leading = self._solver_of(sparse.csc_array(self._A[:k, :k]))
         return self._solve_leading(B)
 
+    def schur_factor(self) -> None:
+        """These libraries do not show their factors."""
+
+    def condensed(self, B: NDArray[np.float64]) -> None:
+        """Nor half a solve."""
+
+    def extended(self, B: NDArray[np.float64]) -> None:
+        """Nor half a solve."""
+
 
 def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:
     """Let a solver for real columns (n, k) take vectors and complex numbers too."""
@@ -217,5 +290,5 @@ def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:
     k = columns.shape[1]
     if np.iscomplexobj(b):
         x = solve(np.concatenate([columns.real, columns.imag], axis=1))
-        return (x[:, :k] + 1j * x[:, k:]).reshape(b.shape)
-    return np.asarray(solve(columns.astype(np.float64, copy=False))).reshape(b.shape)
+        return (x[:, :k] + 1j * x[:, k:]).reshape((-1, *b.shape[1:]))
+    return np.asarray(solve(columns.astype(np.float64, copy=False))).reshape((-1, *b.shape[1:]))

@@ -1,8 +1,9 @@
 """Sparse Cholesky by cvxopt's CHOLMOD: the default, the fastest that installs as a wheel.
 
 cvxopt keeps its options in one dictionary for the process, so they are set before each use:
-``supernodal = 2`` (which also makes an indefinite matrix an error) and ``nmethods = 1`` (without it
-a permutation handed over may be ignored).
+``supernodal = 2`` (which also makes an indefinite matrix an error), ``nmethods = 1`` (without it a
+permutation handed over may be ignored) and ``postorder``, which would mix a leading block that is
+not connected with what follows it.
 """
 
 from __future__ import annotations
@@ -11,9 +12,11 @@ import numpy as np
 from cvxopt import amd, cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.linalg.blas import dtrmm
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
+from cembench.geometry.supernodes import trailing_block
 
 # Codes of `cholmod.solve`: the whole system, and its four steps.
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
@@ -37,9 +40,11 @@ class CholmodFactor:
     def _analyse(self) -> None:
         with phase("symbolic"):
             _set_options()
+            cholmod.options["postorder"] = self._leading is None
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
 
     def _factor(self) -> None:
+        self._trailing: NDArray[np.float64] | None = None
         with phase("factorisation"):
             _set_options()
             try:
@@ -74,6 +79,35 @@ class CholmodFactor:
         cholmod.solve(self._symbolic, x, sys=_PERMUTE)
         cholmod.solve(self._symbolic, x, sys=_FORWARD)
         x[self._leading :, :] = 0.0
+        cholmod.solve(self._symbolic, x, sys=_BACKWARD)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
+        return np.array(x)[: self._leading]
+
+    def schur_factor(self) -> NDArray[np.float64] | None:
+        """The factor's own trailing block, after the leading one; None where it cannot be seen."""
+        assert self._leading is not None
+        if self._trailing is None:
+            self._trailing = trailing_block(self._symbolic, self._lower.size[0], self._leading)
+        return self._trailing
+
+    def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """B_t - A_tl A_ll^-1 B_l for B (n, k): L y = B ends in y_t with C y_t the result."""
+        C = self.schur_factor()
+        if C is None:
+            return None
+        x = matrix(np.asfortranarray(B))
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE)
+        cholmod.solve(self._symbolic, x, sys=_FORWARD)
+        return np.asarray(dtrmm(1.0, C, np.array(x)[self._leading :], lower=1))
+
+    def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """-A_ll^-1 A_lt B for B (n - leading, k): L^T x = (0, C^T B) ends in B."""
+        C = self.schur_factor()
+        if C is None:
+            return None
+        padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
+        padded[self._leading :] = dtrmm(1.0, C, B, lower=1, trans_a=1)
+        x = matrix(padded)
         cholmod.solve(self._symbolic, x, sys=_BACKWARD)
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
         return np.array(x)[: self._leading]

@@ -10,7 +10,13 @@ from scipy import sparse
 
 from cembench.clock import phase
 from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.mesh import DiskMesh
+from cembench.geometry.mesh import DiskMesh, TriangleMesh
+
+
+def edge_lengths(mesh: TriangleMesh, loop: NDArray[np.int64]) -> NDArray[np.float64]:
+    """How long is the edge from each vertex of a boundary loop to the next? Shape (k,)."""
+    corners = mesh.V[loop]
+    return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
 
 
 def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
@@ -18,8 +24,7 @@ def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
 
     Shape (k,), in the order of ``mesh.boundary``, counter-clockwise, the first vertex at 1.
     """
-    loop = mesh.V[mesh.boundary]
-    lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
+    lengths = edge_lengths(mesh, mesh.boundary)
     travelled = np.concatenate([[0.0], np.cumsum(lengths)])
     return np.exp(2j * np.pi * travelled[:-1] / travelled[-1])
 

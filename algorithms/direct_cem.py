@@ -1,0 +1,105 @@
+"""The conformal energy minimised directly over where the boundary lies on the unit circle."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.clock import phase
+from cembench.geometry.bordered import BorderedLaplacian
+from cembench.geometry.boundary_energy import EnergyModel, in_gauge, leashed, minimise
+from cembench.geometry.circle_domain import CircleDomain
+from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.filled_start import arcs_of_measure
+from cembench.geometry.folds import without_folds
+from cembench.geometry.gauge import Gauge, gauge_measure
+from cembench.geometry.harmonic import edge_lengths
+from cembench.geometry.laplacian import laplacian
+from cembench.geometry.mesh import DiskMesh
+from cembench.metrics import flipped_triangles
+from cembench.parameterization import Parameterization
+from cembench.registry import algorithm
+
+Real = NDArray[np.float64]
+
+#: How far the gauge "boundary" lets the mean go for less energy.
+LEASH = 0.03
+
+
+@algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
+def direct_cem(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
+    max_iterations: Annotated[int, Field(ge=0)] = 50,
+    gauge: Gauge = "boundary",
+    delaunay: bool = False,
+) -> Parameterization:
+    """Which boundary on the unit circle has the least conformal energy? Newton's method finds it.
+
+    E_C of the harmonic map (Eqs. 5, 7, 8) is a function of the boundary's angles alone,
+    z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first,
+    boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block:
+    Newton steps (trust region, preconditioned by S^-1) touch nothing but the boundary.
+
+    Decided here: the start is the harmonic measure of the boundary from the triangle nearest to the
+    mean vertex, or arc length where that has lower energy (`start`); it is brought into the
+    `gauge`, that is, a mean comes to lie at 0: of the boundary by length, of that triangle, or of
+    the surface by area; from there Moebius maps are held by the start's arcs; with "boundary" the
+    mean may at last go up to 0.03 away from 0 where that lowers E_C. Iteration ends when the
+    gradient's norm, whose square is about twice what E_C can still fall, is at most `tolerance`
+    (`stopped`: "gradient"), when nothing is left but rounding ("rounding"), after `max_iterations`
+    ("iterations"), or when too many arcs would fall below a tenth of their length at the start
+    ("crowded"; `held_arcs` counts those held). Folds are mended as in CEM (`fold_repairs`).
+    `delaunay` takes the weights of the intrinsic Delaunay triangulation, in the energy history too;
+    `folded_before_repair` then counts the folds that the original edges force, and they stay.
+    """
+    L = laplacian(mesh, delaunay=delaunay)
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    S = bordered.dirichlet_to_neumann()
+    with phase("start"):
+        middle = gauge_measure(mesh, "triangle", mesh.boundary)
+        centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
+    seen, weights = bordered.swept_to_boundary(np.stack([middle, centred], axis=1)).T
+    domain, begun = _start(mesh, S, seen, weights)
+    held = weights if gauge == "triangle" else domain.outer_measure
+    found = minimise(S, domain, held, tolerance=tolerance, max_iterations=max_iterations)
+    if gauge == "boundary" and found.reason == "gradient":
+        nearby = leashed(S, found.domain, LEASH)
+        again = minimise(
+            S, nearby, nearby.outer_measure, tolerance=tolerance, max_iterations=max_iterations
+        )
+        found = found.followed_by(again)
+    uv = bordered.harmonic_extension(found.domain.points)
+    folded = flipped_triangles(mesh, uv)
+    uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
+    extras = {
+        "stopped": found.reason,
+        "gradient": None if found.reason == "crowded" else found.gradient,
+        "start": begun,
+        "hessian_products": found.products,
+        "held_arcs": found.held_arcs,
+        "folded_before_repair": folded,
+        "fold_repairs": repairs,
+    }
+    return Parameterization(uv, len(found.energies) - 1, found.energies, extras)
+
+
+def _start(
+    mesh: DiskMesh, S: DirichletToNeumann, seen: Real, weights: Real
+) -> tuple[CircleDomain, str]:
+    """Which start has the lower energy in the gauge: harmonic measure, or arc length? And its name.
+
+    `seen` is the harmonic measure from the middle triangle.
+    """
+    lengths = edge_lengths(mesh, mesh.boundary)
+    arcs = {"harmonic measure": arcs_of_measure(seen, lengths), "arc length": lengths}
+    models = {}
+    for name in arcs:
+        domain = in_gauge(CircleDomain.of_arcs(arcs[name]), weights)
+        models[name] = EnergyModel(S, domain, weights)
+    best = min(models, key=lambda name: models[name].energy)
+    return models[best].domain, best

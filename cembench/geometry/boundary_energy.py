@@ -1,0 +1,332 @@
+"""The conformal energy of harmonic maps to a circle domain, minimised over where the boundary lies.
+
+A map that is harmonic inside has E_C = z^* S z / 2 - A(z), z its boundary values: S is the
+Dirichlet-to-Neumann matrix, A the area of the boundary polygons (Eqs. 5, 7, 8). Free are the angle
+of every vertex on its circle, and the centre and the radius of every hole. With G = S z - grad A,
+grad A at vertex j being -(i/2) (z_next - z_previous), E_C = Re(z^* G) / 2, its derivative along dz
+is Re(dz^* G), and the second one Re(dz^* (S - A'') dz) + Re(G^* d^2 z). So steps are Newton's.
+
+S and its inverse cost B^2 operations for B boundary vertices. S is also what preconditions: on the
+disk the Hessian's Fourier mode k has |k| - 1 where S has |k|.
+
+The Moebius maps of the disk leave conformality as it is, but the energy of a polygon only nearly.
+So they are held fixed by a *gauge*: weights w, 1 in sum, for which sum w z = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.clock import phase
+from cembench.errors import AlgorithmFailed
+from cembench.geometry.circle_domain import CircleDomain
+from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.trust_region import newton_step
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Fourier modes from 2 to this one get the Hessian's own weight in the preconditioner.
+MODES = 8
+#: A promised decrease below this, times the number of boundary vertices, is rounding.
+ROUNDING = 1e-16
+#: With more arcs than this held at their least length the boundary is too crowded to go on.
+MOST_HELD = 64
+#: Among radii and centres no curvature counts for less than this share of the largest.
+LEAST_CURVATURE = 1e-12
+#: How near to 0 the gauge brings sum w z, and in how many Newton steps at most.
+GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 100
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where the minimisation ended.
+
+    `energies` are E_C of the start and after every step; `gradient` is the gradient's norm, whose
+    square is about twice what E_C could still fall; `reason` tells what ended it: "gradient" (it is
+    below the tolerance), "rounding" (nothing more to gain in floating point), "iterations", or
+    "crowded" (more than `MOST_HELD` arcs at their least length; then `gradient` is NaN); `products`
+    counts those with the Hessian, `held_arcs` the arcs that would have to become shorter than they
+    may be for the energy to fall further.
+    """
+
+    domain: CircleDomain
+    energies: tuple[float, ...]
+    gradient: float
+    reason: str
+    products: int
+    held_arcs: int
+
+    def followed_by(self, other: Minimum) -> Minimum:
+        """Both as one, or only the first where the other, begun elsewhere, is no lower."""
+        lower = tuple(energy for energy in other.energies if energy < self.energies[-1])
+        if not lower or lower[-1] != other.energies[-1]:
+            return self
+        energies, products = self.energies + lower, self.products + other.products
+        return replace(other, energies=energies, products=products)
+
+
+def minimise(
+    S: DirichletToNeumann,
+    start: CircleDomain,
+    weights: Real,
+    *,
+    tolerance: float,
+    max_iterations: int,
+) -> Minimum:
+    """Which boundary on circles has the least conformal energy, in the gauge `weights` (B,)?
+
+    Ends when the gradient's norm is at most `tolerance`; never above the energy of the start,
+    which is brought into the gauge first.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The gauge cannot be reached.
+
+    """
+    here = EnergyModel(S, in_gauge(start, weights), weights)
+    energies, radius, products = [here.energy], 1.0, 0
+    while True:
+        if len(here.held) > MOST_HELD:
+            reason = "crowded"
+            break
+        if here.gradient_norm <= tolerance:
+            reason = "gradient"
+            break
+        if len(energies) > max_iterations:
+            reason = "iterations"
+            break
+        with phase("boundary step"):
+            accuracy = float(np.clip(here.gradient_norm, 1e-3, 0.3))
+            step = newton_step(here.gradient, here.hessian, here.precondition, radius, accuracy)
+        products += step.products
+        if not step.decrease >= ROUNDING * len(weights):
+            reason = "rounding"
+            break
+        there = _tried(here, step.p, weights)
+        agreement = (here.energy - there.energy) / step.decrease if there else -np.inf
+        if agreement > 0.75 and step.at_edge:
+            radius *= 3
+        elif not agreement > 0.25:
+            radius = step.length / 4
+        if there and agreement > 1e-4 and there.energy < here.energy:
+            here = there
+            energies.append(here.energy)
+    gradient = float("nan") if reason == "crowded" else here.gradient_norm
+    return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
+
+
+def leashed(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> CircleDomain:
+    """Which Moebius image of a disk's boundary, |a| <= `leash`, has the least energy?
+
+    By the second-order model of E_C in a: the map z -> (z - a) / (1 - conj(a) z) moves z by
+    -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + .... The domain itself where that leads no lower.
+    """
+    here = EnergyModel(S, domain, np.zeros(len(domain.arcs)))
+    z, G = domain.points, here.residual
+    fields = np.stack([z**2 - 1, -1j * (z**2 + 1)], axis=1)  # for real and for imaginary a
+    bends = [[2 * (z**3 - z), -2j * z**3], [-2j * z**3, -2 * (z**3 + z)]]
+    g = leash * np.real(np.conj(fields).T @ G)
+    H = np.real(np.conj(fields).T @ here.residual_of(fields))
+    H = leash**2 * (H + [[float(np.vdot(bend, G).real) for bend in row] for row in bends])
+    curvatures, axes = np.linalg.eigh((H + H.T) / 2)
+    # In units of the leash: the model's minimum in the unit disk (More and Sorensen 1983).
+    along = axes.T @ g
+    rounding = np.finfo(float).eps * float(np.abs(curvatures).max()) + np.finfo(float).tiny
+    low = max(0.0, -float(curvatures[0])) + rounding
+    high = low + float(np.linalg.norm(g))
+    if np.linalg.norm(along / (curvatures + low)) > 1:
+        for _ in range(60):
+            middle = (low + high) / 2
+            outside = np.linalg.norm(along / (curvatures + middle)) > 1
+            low, high = (middle, high) if outside else (low, middle)
+        low = high
+    a = -leash * complex(*(axes @ (along / (curvatures + low))))
+    image = domain.through(a)
+    return image if EnergyModel(S, image, here.weights).energy < here.energy else domain
+
+
+def _tried(here: EnergyModel, step: Real, weights: Real) -> EnergyModel | None:
+    """What is the energy where this step leads? None where circles meet, or the gauge is lost."""
+    domain = here.moved(step)
+    if not domain.apart:
+        return None
+    try:
+        return EnergyModel(here.S, in_gauge(domain, weights), weights)
+    except AlgorithmFailed:
+        return None
+
+
+def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
+    """Which Moebius image of this domain has sum w z = 0?
+
+    Raises
+    ------
+    AlgorithmFailed
+        Newton's method finds none: a single vertex has too much of the weight.
+
+    """
+    for _ in range(GAUGE_STEPS):
+        z = domain.points
+        middle, second = complex(weights @ z), complex(weights @ z**2)
+        if abs(middle) < GAUGE_ACCURACY:
+            return domain
+        # A small a moves sum w z by -a + conj(a) sum w z^2.
+        bottom = 1 - abs(second) ** 2
+        a = (middle + second * np.conj(middle)) / bottom if bottom > 0 else middle
+        domain = domain.through(a * min(1.0, 0.5 / abs(a)))
+    raise AlgorithmFailed(
+        f"no Moebius map of the disk brings the gauge's mean to 0 (it stays at {abs(middle):.2g}): "
+        "a single boundary vertex has too much of the weight. Choose another gauge"
+    )
+
+
+class EnergyModel:
+    """E_C at a domain, its gradient, Hessian and preconditioner on steps that keep the gauge.
+
+    A step is a real vector: by how much every vertex moves along its circle (B), then for the holes
+    by how much the radii grow, and the centres move right, and up.
+    """
+
+    def __init__(self, S: DirichletToNeumann, domain: CircleDomain, weights: Real) -> None:
+        self.S, self.domain, self.weights = S, domain, weights
+        with phase("energy"):
+            self.residual = self.residual_of(domain.points)
+            self.energy = 0.5 * float(np.vdot(domain.points, self.residual).real)
+
+    def residual_of(self, z: Complex) -> Complex:
+        """(S - A'') z for z (B,) or (B, k)."""
+        domain = self.domain
+        return self.S(z) + 0.5j * (z[domain.following] - z[domain.previous])
+
+    @cached_property
+    def _holes(self) -> Complex:
+        """Where does dz go as each radius grows, each centre moves right, and up? (B, 3 holes)."""
+        domain = self.domain
+        inside = domain.loop[:, None] == domain.holes
+        grow = inside * domain.directions[:, None]
+        return np.concatenate([grow, inside.astype(complex), 1j * inside], axis=1)
+
+    def _velocity(self, x: Real) -> Complex:
+        """Dz of a step."""
+        B = len(self.domain.arcs)
+        return 1j * self.domain.directions * x[:B] + self._holes @ x[B:]
+
+    def _pulled_back(self, u: Complex) -> Real:
+        """Re(dz^* u) as a function of the step."""
+        along = np.imag(np.conj(self.domain.directions) * u)
+        return np.concatenate([along, np.real(np.conj(self._holes).T @ u)])
+
+    def moved(self, x: Real) -> CircleDomain:
+        """The domain that a step leads to."""
+        B, K = len(self.domain.arcs), len(self.domain.sizes)
+        growth, shift = np.zeros(K), np.zeros(K, dtype=np.complex128)
+        grown, right, up = np.split(x[B:], 3)
+        growth[self.domain.holes], shift[self.domain.holes] = grown, right + 1j * up
+        return self.domain.moved(x[:B], growth, shift)
+
+    @cached_property
+    def gradient(self) -> Real:
+        """Derivative of E_C along each entry of a step."""
+        return self._pulled_back(self.residual)
+
+    def hessian(self, x: Real) -> Real:
+        """Second derivative of E_C, applied to a step."""
+        domain, B, h = self.domain, len(self.domain.arcs), len(self.domain.holes)
+        result = self._pulled_back(self.residual_of(self._velocity(x)))
+        # d^2 z = exp(i theta) (-dx^2 + 2 i dx dr) / r
+        outward = np.real(np.conj(self.residual) * domain.directions) / domain.radius
+        result[:B] -= outward * x[:B]
+        if h:
+            turning = self.gradient[:B] / domain.radius
+            grown = np.zeros(h + 1)
+            grown[domain.holes] = x[B : B + h]
+            result[:B] = result[:B] + turning * grown[domain.loop]
+            result[B : B + h] += domain.sums(turning * x[:B])[domain.holes]
+        return result
+
+    @cached_property
+    def _modes(self) -> tuple[Real, Real]:
+        """Fourier modes on the outer circle, and by how much 1 / (|k| - 1) exceeds 1 / |k|."""
+        domain, k = self.domain, np.arange(2, MODES + 1)
+        powers = domain.directions[:, None] ** k * (domain.loop == domain.outer)[:, None]
+        weights = 1 / (np.pi * k * (k - 1))
+        return np.concatenate([powers.real, powers.imag], axis=1), np.tile(weights, 2)
+
+    @cached_property
+    def _hole_block(self) -> Real:
+        """Inverse of the Hessian's block of radii and centres."""
+        block = np.real(np.conj(self._holes).T @ self.residual_of(self._holes))
+        values, vectors = np.linalg.eigh((block + block.T) / 2)
+        values = np.maximum(values, LEAST_CURVATURE * values[-1])
+        return np.asarray(vectors / values @ vectors.T)
+
+    def _unconstrained(self, g: Real) -> Real:
+        """M^-1 g; g (N,) or (N, k)."""
+        B = len(self.domain.arcs)
+        modes, weights = self._modes
+        along = self.S.inverse(g[:B]) + (modes * weights) @ (modes.T @ g[:B])
+        if len(g) == B:
+            return along
+        return np.concatenate([along, self._hole_block @ g[B:]])
+
+    @cached_property
+    def _gauge(self) -> tuple[Real, Real, Real]:
+        """Constraints, as :meth:`_constrained` has them: the mean and the outer circle stay."""
+        domain, w = self.domain, self.weights
+        along, holes = w * 1j * domain.directions, w @ self._holes
+        turn = np.concatenate(
+            [(domain.loop == domain.outer) / domain.sizes[domain.outer], np.zeros(len(holes))]
+        )
+        mean = np.concatenate([along, holes])
+        return self._constrained(np.stack([mean.real, mean.imag, turn], axis=1))
+
+    def _constrained(self, c: Real) -> tuple[Real, Real, Real]:
+        """Columns c that a step must be orthogonal to, M^-1 c, and the inverse of c^T M^-1 c."""
+        preconditioned = self._unconstrained(c)
+        return c, preconditioned, np.asarray(np.linalg.inv(c.T @ preconditioned), dtype=np.float64)
+
+    @cached_property
+    def held(self) -> NDArray[np.int64]:
+        """Which arcs are as short as they may be, and would become shorter downhill?"""
+        domain = self.domain
+        short = np.flatnonzero(domain.shortest)
+        if not len(short):
+            return short
+        downhill = -_projected(self._unconstrained(self.gradient), self._gauge)
+        change = domain.sense * (
+            downhill[: len(domain.arcs)][domain.following] - downhill[: len(domain.arcs)]
+        )
+        return short[change[short] < 0]
+
+    @cached_property
+    def _constraints(self) -> tuple[Real, Real, Real]:
+        """Those of the gauge, and that held arcs keep their length."""
+        if not len(self.held):
+            return self._gauge
+        c, k = self._gauge[0], np.arange(len(self.held))
+        keep = np.zeros((len(c), len(k)))
+        keep[self.domain.following[self.held], k] = 1
+        keep[self.held, k] = -1
+        return self._constrained(np.concatenate([c, keep], axis=1))
+
+    def precondition(self, g: Real) -> Real:
+        """What is M^-1 g, projected onto the steps that keep the gauge?"""
+        return _projected(self._unconstrained(g), self._constraints)
+
+    @cached_property
+    def gradient_norm(self) -> float:
+        """Norm of the gradient on these steps, (g M^-1 g)^(1/2)."""
+        with phase("boundary step"):
+            squared = float(self.gradient @ self.precondition(self.gradient))
+        return max(0.0, squared) ** 0.5
+
+
+def _projected(x: Real, constraints: tuple[Real, Real, Real]) -> Real:
+    c, preconditioned, inverse = constraints
+    return x - preconditioned @ (inverse @ (c.T @ x))

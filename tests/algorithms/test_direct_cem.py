@@ -1,0 +1,175 @@
+import numpy as np
+import pytest
+
+from algorithms.cem import cem
+from algorithms.direct_cem import LEASH, direct_cem
+from cembench import AlgorithmFailed, DiskMesh
+from cembench.geometry.boundary_energy import EnergyModel
+from cembench.geometry.cholesky import Cholesky, available_backends, linear_algebra
+from cembench.geometry.cholmod import CholmodFactor
+from cembench.geometry.files import read_mesh
+from cembench.geometry.harmonic import edge_lengths
+from cembench.geometry.planar import backward_arcs
+from cembench.metrics import all_metrics, flipped_triangles
+from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from meshes_gen.spherical_cap import spherical_cap
+from tests import gallery
+from tests.real_meshes import DISKS, real_mesh
+
+
+def uneven_half_ellipsoid(faces=1500):
+    mesh = hemi_ellipsoid(faces, x=2.0)
+    V = mesh.V + 0.01 * np.random.default_rng(7).standard_normal(mesh.V.shape)
+    return DiskMesh.from_arrays(V, mesh.F)
+
+
+def test_one_factorisation_half_a_solve_for_the_start_and_half_of_one_at_the_end(count_calls):
+    factored = count_calls(CholmodFactor, "_factor")
+    halves = count_calls(CholmodFactor, "condensed"), count_calls(CholmodFactor, "extended")
+    whole = count_calls(Cholesky, "solve"), count_calls(Cholesky, "solve_leading")
+    found = direct_cem(uneven_half_ellipsoid())
+    assert found.iterations > 0
+    assert len(factored) == 1
+    assert [len(calls) for calls in (*halves, *whole)] == [1, 1, 0, 0]
+
+
+@pytest.mark.parametrize("gauge", ["boundary", "triangle", "area"])
+def test_energy_falls_from_step_to_step_and_is_that_of_the_map(gauge):
+    mesh = uneven_half_ellipsoid()
+    found = direct_cem(mesh, gauge=gauge)
+    assert (np.diff(found.energy_history) < 0).all()
+    energy = all_metrics(mesh, found.uv)["conformal_energy"]
+    assert found.energy_history[-1] == pytest.approx(energy, abs=1e-12)
+    assert found.extras["stopped"] == "gradient"
+    assert found.extras["gradient"] <= 1e-6
+
+
+def test_it_is_below_cem_however_many_iterations_cem_takes():
+    mesh = uneven_half_ellipsoid()
+    least = all_metrics(mesh, direct_cem(mesh).uv)
+    for iterations in (20, 400):
+        other = all_metrics(mesh, cem(mesh, tolerance=0, max_iterations=iterations).uv)
+        assert least["conformal_energy"] < 1.001 * other["conformal_energy"]
+    assert least["angle_error_mean_deg"] < 1.001 * other["angle_error_mean_deg"]
+
+
+def test_the_gauge_brings_what_it_names_to_the_origin():
+    mesh = uneven_half_ellipsoid()
+    uv = direct_cem(mesh, gauge="triangle").uv
+    middle = np.linalg.norm(mesh.V[mesh.F].mean(axis=1) - mesh.V.mean(axis=0), axis=1).argmin()
+    assert abs(uv[mesh.F[middle]].mean()) < 1e-10
+    # Of the others the mean is that of the start, as it was brought into the gauge.
+    uv = direct_cem(mesh, gauge="area").uv
+    a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    assert abs((area * uv[mesh.F].mean(axis=1)).sum() / area.sum()) < 5e-3
+    uv = direct_cem(mesh, gauge="boundary").uv[mesh.boundary]
+    lengths = edge_lengths(mesh, mesh.boundary)
+    mean = (lengths * (uv + np.roll(uv, -1))).sum() / (2 * lengths.sum())
+    assert abs(mean) < 1.1 * LEASH
+
+
+def test_gauges_differ_by_nearly_a_moebius_map():
+    mesh = spherical_cap(6000)
+    z, w = direct_cem(mesh, gauge="triangle").uv, direct_cem(mesh, gauge="area").uv
+    system = np.stack([z, np.ones_like(z), -z * w, -w], axis=1)
+    assert np.linalg.svd(system, compute_uv=False)[-1] / np.sqrt(mesh.n) < 2e-4
+
+
+def test_a_flat_disk_stays_as_it_is_and_positions_on_a_cap_converge_at_second_order():
+    errors = []
+    for faces in (400, 6400):
+        mesh = spherical_cap(faces)
+        z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / (1 + mesh.V[:, 2] / np.linalg.norm(mesh.V[0]))
+        z = z / abs(z[mesh.boundary]).mean()
+        uv = direct_cem(mesh).uv
+        errors.append(abs(uv * np.exp(-1j * np.angle(np.vdot(z, uv))) - z).max())
+    assert np.log2(errors[0] / errors[1]) / 2 > 1.7, errors
+
+
+@pytest.mark.parametrize("backend", available_backends())
+def test_every_backend_gives_the_same_map(backend):
+    mesh = hemi_ellipsoid(1500, x=2.0)
+    with linear_algebra(backend=backend):
+        assert abs(direct_cem(mesh).uv - direct_cem(hemi_ellipsoid(1500, x=2.0)).uv).max() < 1e-9
+
+
+def test_no_iteration_leaves_the_start():
+    found = direct_cem(uneven_half_ellipsoid(), max_iterations=0)
+    assert found.iterations == 0
+    assert found.extras["stopped"] == "iterations"
+    assert found.extras["start"] in ("harmonic measure", "arc length")
+
+
+def test_the_start_is_the_better_of_two(monkeypatch):
+    mesh = uneven_half_ellipsoid()
+    energy = direct_cem(mesh, max_iterations=0).energy_history[0]
+    uv = direct_cem(mesh, max_iterations=0).uv
+    assert energy == pytest.approx(all_metrics(mesh, uv)["conformal_energy"])
+    monkeypatch.setattr("algorithms.direct_cem.arcs_of_measure", lambda seen, lengths: lengths)
+    assert energy <= direct_cem(mesh, max_iterations=0).energy_history[0]
+
+
+def test_intrinsic_delaunay_weights_are_an_option_that_tells_of_folds():
+    mesh = hemi_ellipsoid(3000, z=6.0)
+    found = direct_cem(mesh, delaunay=True)
+    assert abs(found.uv - direct_cem(mesh).uv).max() > 1e-6
+    assert found.extras["folded_before_repair"] == flipped_triangles(mesh, found.uv) == 0
+
+
+@pytest.mark.parametrize("gauge", ["boundary", "triangle", "area"])
+def test_on_a_boundary_crowded_far_below_1e_6_vertices_keep_their_places(gauge):
+    V, F = gallery.flat_rectangle(8, 80)  # ten times as long as wide
+    V[:, 1] += 0.3 * np.sin(V[:, 0] / 7)
+    mesh = DiskMesh.from_arrays(V, F)
+    found = direct_cem(mesh, gauge=gauge)
+    b = found.uv[mesh.boundary]
+    assert 0 < np.angle(np.roll(b, -1) / b).min() < 1e-7
+    assert flipped_triangles(mesh, found.uv) == 0
+    assert found.extras["stopped"] == "gradient"
+    assert found.extras["held_arcs"] == 0
+    assert all_metrics(mesh, found.uv)["angle_error_mean_deg"] < 8  # coarse: eight cells across
+
+
+def test_with_intrinsic_delaunay_weights_folds_that_the_edges_force_stay_and_are_counted():
+    mesh = read_mesh(real_mesh("canonical_face.obj"))
+    found = direct_cem(mesh, delaunay=True)
+    assert found.extras["folded_before_repair"] == flipped_triangles(mesh, found.uv) > 0
+    assert found.extras["fold_repairs"] == 0
+
+
+def test_corners_and_boundary_triangles_without_interior_vertices_are_no_obstacle():
+    V, F = gallery.flat_rectangle(6, 9)  # two corners are ears
+    mesh = DiskMesh.from_arrays(V, F)
+    found = direct_cem(mesh)
+    assert flipped_triangles(mesh, found.uv) == 0
+    assert found.extras["stopped"] in ("gradient", "rounding")
+
+
+def test_a_mesh_without_interior_is_a_failure_with_its_cause():
+    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
+        direct_cem(DiskMesh.from_arrays(*gallery.flat_rectangle(1, 5)))
+
+
+@pytest.mark.parametrize("name", [d for d in DISKS if not d.startswith("jacksboro")])
+def test_on_real_disks_it_ends_below_cem_without_folds(name):
+    mesh = read_mesh(real_mesh(name))
+    found = direct_cem(mesh)
+    figures, other = (all_metrics(mesh, uv) for uv in (found.uv, cem(mesh).uv))
+    assert figures["flipped_triangles"] == 0
+    assert figures["conformal_energy"] < 1.001 * other["conformal_energy"]
+    assert found.iterations <= 8
+
+
+def test_half_of_the_vertices_on_the_boundary():
+    mesh = read_mesh(real_mesh("stress/maze.obj"))
+    found = direct_cem(mesh)
+    assert backward_arcs(found.uv[mesh.boundary]) == 0
+    assert flipped_triangles(mesh, found.uv) == 0
+    assert found.energy_history[-1] < found.energy_history[0]
+
+
+def test_products_with_the_hessian_are_few(count_calls):
+    calls = count_calls(EnergyModel, "hessian")
+    found = direct_cem(uneven_half_ellipsoid())
+    assert len(calls) == found.extras["hessian_products"] <= 20
