@@ -76,3 +76,13 @@ def test_a_mesh_without_interior_is_refused():
     strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6))
     with pytest.raises(AlgorithmFailed, match="no interior vertex"):
         fdm(strip)
+
+
+def test_iterations_that_diverge_on_a_coarse_mesh_are_dropped():
+    mesh = hemi_ellipsoid(200, z=8.0)
+    found = fdm(mesh)
+    assert found.extras["iterations_dropped"] > 0
+    assert found.iterations + found.extras["iterations_dropped"] == 5
+    energy = all_metrics(mesh, found.uv)["conformal_energy"]
+    assert found.energy_history[-1] == pytest.approx(energy)
+    assert energy == min(found.energy_history)
