@@ -239,7 +239,12 @@ def run(
     ] = [],  # noqa: B006
     faces: Annotated[int | None, typer.Option(help="Triangles of the generated surfaces.")] = None,
     algorithms: Annotated[
-        list[str], typer.Option("-a", "--algorithms", help="Comma-separated; default: all.")
+        list[str],
+        typer.Option(
+            "-a",
+            "--algorithms",
+            help="Comma-separated; default: all, and the paper's four for `--profile quick`.",
+        ),
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006
     plugin: Plugins = [],  # noqa: B006
@@ -275,7 +280,7 @@ def run(
     -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
     docs/measuring.md tells what is timed, and what an interval means.
     """
-    from cembench.paper.profiles import surfaces_of
+    from cembench.paper.profiles import algorithms_of, surfaces_of
     from cembench.registry import load_registry
     from cembench.running.local import Options
     from cembench.running.plan import (
@@ -292,8 +297,8 @@ def run(
     policies = _policies(solves)
     options = Options(timeout, _memory_bytes(memory), fresh, rerun_failed, seed)
     registry = load_registry(plugin)
-    names = split(algorithms) or list(registry.algorithms)
-    chosen = [registry.algorithm(name) for name in names]
+    usual = algorithms_of(profile, registry) if profile else list(registry.algorithms)
+    chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
     files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
     generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]

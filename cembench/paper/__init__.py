@@ -17,6 +17,9 @@ Row: TypeAlias = "MappingProxyType[str, float | None]"
 
 SOURCE = "An Efficient Energy Minimization for Conformal Parameterizations, Tables 1-4"
 
+#: The algorithms that the tables compare, by the names they have here, in the order of the columns.
+ALGORITHMS = ("qiem", "fdm", "ldm", "cem")
+
 _FILES = {
     1: "table1_time_seconds.csv",
     2: "table2_speedup_rate.csv",

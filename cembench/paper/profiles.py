@@ -1,4 +1,4 @@
-"""Which surfaces does a profile name?"""
+"""Which surfaces does a profile name, and which algorithms?"""
 
 from __future__ import annotations
 
@@ -61,3 +61,13 @@ def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
                 "Leave out a --plugin, or name --surfaces."
             )
     return [standing[model][0] for model in wanted]
+
+
+def algorithms_of(profile: Profile, registry: Registry) -> list[str]:
+    """The algorithms that a run of the profile takes if none are named.
+
+    `quick` takes those of the paper's tables, so that it stays quick; the others take all.
+    """
+    if profile is Profile.quick:
+        return [name for name in paper.ALGORITHMS if name in registry.algorithms]
+    return list(registry.algorithms)

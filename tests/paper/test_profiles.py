@@ -1,8 +1,8 @@
 import pytest
 
 from cembench import DiskMesh, RegistryError, paper, surface
-from cembench.paper.profiles import Profile, models, surfaces_of
-from cembench.registry import Registry
+from cembench.paper.profiles import Profile, algorithms_of, models, surfaces_of
+from cembench.registry import Registry, load_registry
 
 
 def registry_of(rows):
@@ -42,3 +42,10 @@ def test_a_model_without_a_surface_is_said():
 def test_a_model_with_two_surfaces_is_said():
     with pytest.raises(RegistryError, match=r"two surfaces stand for Foot: .*, again; only one"):
         surfaces_of(Profile.quick, registry_of(ALL | {"again": "Foot"}))
+
+
+def test_quick_takes_the_paper_s_algorithms_and_the_others_all():
+    known = load_registry()
+    assert algorithms_of(Profile.quick, known) == ["qiem", "fdm", "ldm", "cem"]
+    assert algorithms_of(Profile.paper, known) == list(known.algorithms)
+    assert set(paper.ALGORITHMS) < set(paper.table(1)["Foot"])

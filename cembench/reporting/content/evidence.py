@@ -23,8 +23,6 @@ from cembench.reporting import frame
 from cembench.reporting.palette import Look, looks
 from cembench.store import Store
 
-#: The algorithms that the paper's tables compare, by their columns there.
-PAPER_ALGORITHMS = ("qiem", "fdm", "ldm", "cem")
 REFERENCE = frame.REFERENCE
 DISK = "disk"
 Row = Mapping[str, Any]
@@ -158,7 +156,7 @@ class Evidence:
             variants.setdefault(name, Counter())[_variant(record.cell)] += 1
             about[name] = record
         found = []
-        for name in sorted(variants, key=lambda n: (n not in PAPER_ALGORITHMS, _place(n), n)):
+        for name in sorted(variants, key=lambda n: (n not in paper.ALGORITHMS, _place(n), n)):
             choices = [choice for choice, _ in variants[name].most_common()]
             for k, choice in enumerate(choices):
                 title, target = about[name].title, about[name].target
@@ -257,8 +255,8 @@ def model_surface(model: str) -> str:
 
 
 def _place(algorithm: str) -> int:
-    known = algorithm in PAPER_ALGORITHMS
-    return PAPER_ALGORITHMS.index(algorithm) if known else len(PAPER_ALGORITHMS)
+    known = algorithm in paper.ALGORITHMS
+    return paper.ALGORITHMS.index(algorithm) if known else len(paper.ALGORITHMS)
 
 
 def _variant(cell: Cell) -> str:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from cembench import paper
 from cembench.reporting.content.beside import (
     Footer,
     Quantity,
@@ -16,7 +17,7 @@ from cembench.reporting.content.beside import (
     slug,
     table_beside,
 )
-from cembench.reporting.content.evidence import PAPER_ALGORITHMS, Evidence, Series
+from cembench.reporting.content.evidence import Evidence, Series
 from cembench.reporting.document import Table
 
 #: The quantities of one algorithm; the second argument is its column in the paper, or None.
@@ -32,7 +33,7 @@ def three_kinds(
     policy: str | None = None,
     caption: str = "",
     footers: Sequence[Footer] = (),
-    algorithms: Sequence[str] = PAPER_ALGORITHMS,
+    algorithms: Sequence[str] = paper.ALGORITHMS,
     notes: Sequence[str] = (),
 ) -> list[Table]:
     """The paper's table `number`, then other algorithms, then other surfaces, as far as there."""
@@ -50,7 +51,7 @@ def three_kinds(
                 policy=policy, caption=caption, footers=footers, notes=said,
             )
         )  # fmt: skip
-    others = [s for s in evidence.disk_series if not (s.algorithm in PAPER_ALGORITHMS and s.main)]
+    others = [s for s in evidence.disk_series if not (s.algorithm in paper.ALGORITHMS and s.main)]
     if evidence.models and others:
         columns = [q for s in others for q in quantities(s, None)]
         tables.append(
@@ -64,7 +65,7 @@ def three_kinds(
         columns = [
             q
             for s in evidence.disk_series
-            if s.algorithm in algorithms or s.algorithm not in PAPER_ALGORITHMS
+            if s.algorithm in algorithms or s.algorithm not in paper.ALGORITHMS
             for q in quantities(s, None)
         ]
         tables.append(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cembench import paper
-from cembench.reporting.content.evidence import PAPER_ALGORITHMS, Evidence
+from cembench.reporting.content.evidence import Evidence
 from cembench.reporting.document import Column, Table, Value, missing, words
 from cembench.reporting.palette import Look, looks
 from cembench.reporting.plots import Axis, Panel, Plot, Point, Series, through
@@ -68,8 +68,8 @@ def cost_by_faces(evidence: Evidence) -> Plot:
             for s in evidence.disk_series
         ]
         panels.append(_panel(groups, f"measured here, solves: {policy}"))
-    usual = looks(PAPER_ALGORITHMS)
-    groups = [(a.upper(), usual[a], printed_points(a)) for a in PAPER_ALGORITHMS]
+    usual = looks(paper.ALGORITHMS)
+    groups = [(a.upper(), usual[a], printed_points(a)) for a in paper.ALGORITHMS]
     panels.append(_panel(groups, "printed in the paper (Table 1)"))
     return Plot(
         "figure-10",
@@ -106,7 +106,7 @@ def exponents_table(evidence: Evidence) -> Table:
     rows = []
     for series in evidence.disk_series:
         printed = (
-            fit(printed_points(series.algorithm)) if series.algorithm in PAPER_ALGORITHMS else None
+            fit(printed_points(series.algorithm)) if series.algorithm in paper.ALGORITHMS else None
         )
         cells = [words(series.label), *_fit_cells(printed)]
         for policy in evidence.policies:

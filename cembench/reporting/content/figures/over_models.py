@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cembench import paper
-from cembench.reporting.content.evidence import PAPER_ALGORITHMS, Evidence
+from cembench.reporting.content.evidence import Evidence
 from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot, Series
 
@@ -48,9 +48,9 @@ def _pair(
     evidence: Evidence, metric: str, axis: Axis, table: int, column: Callable[[str], str]
 ) -> tuple[Panel, Panel]:
     """Measured and printed side by side, for the same models."""
-    style = looks(PAPER_ALGORITHMS)
+    style = looks(paper.ALGORITHMS)
     measured, printed = [], []
-    for algorithm in PAPER_ALGORITHMS:
+    for algorithm in paper.ALGORITHMS:
         series = evidence.series_of(algorithm)
         names = [s.title for s in evidence.models]
         values = []
