@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-import tempfile
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, TypeVar
@@ -38,6 +38,8 @@ def write_model(path: Path, model: BaseModel) -> None:
 def write(path: Path, fill: Callable[[BinaryIO], object]) -> None:
     """Let `fill` write a draft, flush it to disk, and only then give it its name.
 
+    Who may read it is up to the user's umask, as for any file.
+
     Raises
     ------
     RecordError
@@ -46,15 +48,15 @@ def write(path: Path, fill: Callable[[BinaryIO], object]) -> None:
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, draft = tempfile.mkstemp(dir=path.parent, prefix=DRAFT)
+        draft = path.parent / f"{DRAFT}{uuid.uuid4().hex}"
         try:
-            with os.fdopen(handle, "wb") as file:
+            with draft.open("xb") as file:
                 fill(file)
                 file.flush()
                 os.fsync(file.fileno())
-            Path(draft).replace(path)
+            draft.replace(path)
         finally:
-            Path(draft).unlink(missing_ok=True)
+            draft.unlink(missing_ok=True)
     except OSError as error:
         raise unwritable(path, error) from error
 

@@ -78,7 +78,6 @@ def _move(draft: Path, folder: Path) -> None:
     for name in files:
         target = folder / name
         target.parent.mkdir(parents=True, exist_ok=True)
-        (draft / name).chmod(0o644)  # drafts are for their owner alone, a report is to be read
         (draft / name).replace(target)
     (folder / CONTENTS).write_text(json.dumps(files, indent=1) + "\n", encoding="utf-8")
     for name in before:

@@ -78,7 +78,7 @@ def cost_by_faces(evidence: Evidence) -> Plot:
         "Seconds against triangles on logarithmic axes; straight lines are fitted powers, whose "
         "exponents stand in the table below. Here all surfaces of the run count, also those that "
         "are not in the paper; the printed seconds are of another machine.",
-        "list[Point] along straight lines that rise from left to right, one for each algorithm.",
+        "Points along straight lines that rise from left to right, one for each algorithm.",
         "Figure 10",
     )
 
@@ -100,9 +100,9 @@ def _panel(groups: Sequence[tuple[str, Look, list[Point]]], title: str) -> Panel
 
 def exponents_table(evidence: Evidence) -> Table:
     """The fitted exponents, printed and here, with standard errors and n."""
-    columns = [Column("algorithm", numeric=False), Column("printed"), Column("n", "printed")]
-    for policy in evidence.policies:
-        columns += [Column("here", policy), Column("n", policy)]
+    columns = [Column("algorithm", numeric=False)]
+    for group in ("printed", *(f"here, {policy}" for policy in evidence.policies)):
+        columns += [Column("exponent", group), Column("n", group)]
     rows = []
     for series in evidence.disk_series:
         printed = (
