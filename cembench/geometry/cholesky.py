@@ -205,32 +205,6 @@ class Cholesky:
         return _factor(self._how.backend, block, None)
 
 
-def schur_complement(A: sparse.sparray, leading: int) -> NDArray[np.float64]:
-    """What is left of A when its leading block is eliminated: S = A_tt - A_tl A_ll^-1 A_lt, dense?
-
-    A (n, n) symmetric positive definite, both triangles stored; S (n - leading, n - leading). With
-    CHOLMOD under "reuse" it comes out of one factorisation of A; else it takes n - leading solves.
-
-    Raises
-    ------
-    NotPositiveDefinite
-        A is not.
-
-    """
-    A = sparse.csc_array(A)
-    how = _current.get()
-    if how.backend == "cvxopt" and how.solves == "reuse" and leading:
-        from cembench.geometry.cholmod import schur_complement as by_cholmod
-
-        return by_cholmod(A, leading)
-    rows = sparse.csr_array(A)
-    S: NDArray[np.float64] = rows[leading:, leading:].toarray()
-    if leading:
-        across = rows[leading:, :leading]
-        S -= across @ Cholesky(rows[:leading, :leading]).solve(across.T.toarray())
-    return S
-
-
 def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
     return _factor_class(backend)(A, leading)
 

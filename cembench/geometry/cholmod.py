@@ -133,22 +133,3 @@ def _fill_reducing_order(A: sparse.csc_array, lower: spmatrix, leading: int | No
     first = amd.order(_lower_triangle(A[:leading, :leading])) if leading else matrix(0, (0, 1))
     last = np.arange(leading, A.shape[0])
     return matrix(np.concatenate([np.array(first).ravel(), last]), (A.shape[0], 1), "i")
-
-
-def schur_complement(A: sparse.csc_array, leading: int) -> NDArray[np.float64]:
-    """What is left of A, dense, when its leading block is eliminated?
-
-    A (n, n) symmetric positive definite. With the leading block first in the order, the trailing
-    block R of the Cholesky factor holds it already: S = R R^T.
-    """
-    factor = CholmodFactor(A, leading)
-    with phase("condensation"):
-        n = A.shape[0]
-        place = matrix(np.arange(n, dtype=np.float64).reshape(-1, 1))
-        cholmod.solve(factor._symbolic, place, sys=_PERMUTE)
-        order = np.array(place).ravel().astype(np.int64)[leading:] - leading
-        lower = cholmod.getfactor(factor._symbolic)
-        R = np.tril(np.array(matrix(lower[leading:, leading:])))
-        S = np.empty((n - leading, n - leading))
-        S[np.ix_(order, order)] = R @ R.T
-    return S

@@ -16,7 +16,7 @@ from scipy import linalg, sparse
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
-from cembench.geometry.cholesky import Cholesky, schur_complement
+from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.mesh import TriangleMesh
 
 Loop = NDArray[np.int64]
@@ -47,15 +47,15 @@ class Condensed:
     S: Real
     L_bi: sparse.csr_array
     L_bb: sparse.csr_array
-    _inside: Cholesky
+    _bordered: Cholesky
 
     def solve_interior(self, rhs: NDArray[Any]) -> NDArray[Any]:
         """L_ii x = rhs."""
-        return self._inside.solve(rhs)
+        return self._bordered.solve_leading(rhs)
 
     def extension(self, f_b: Complex) -> Complex:
         """The interior of the map that is harmonic on the surface for boundary values f_b."""
-        return self._inside.solve(-(self.L_bi.T @ f_b))
+        return self._bordered.solve_leading(-(self.L_bi.T @ f_b))
 
     def whole(self, f_b: Complex, f_i: Complex) -> Complex:
         """Both parts in the order of the vertices."""
@@ -67,8 +67,8 @@ class Condensed:
 def condensed(mesh: TriangleMesh, L: sparse.sparray, loops: Sequence[Loop]) -> Condensed:
     """Eliminate the interior of a surface with Laplacian L; `loops` are all of its boundaries.
 
-    Two factorisations: of L pinned at one boundary vertex, boundary last, which yields S, and of
-    L_ii, for the interior's values.
+    One factorisation: that of L pinned at one boundary vertex, boundary last, holds the factors of
+    L_ii and of S pinned.
 
     Raises
     ------
@@ -81,9 +81,10 @@ def condensed(mesh: TriangleMesh, L: sparse.sparray, loops: Sequence[Loop]) -> C
         order = np.concatenate([i, b])
         ordered = sparse.csr_array(sparse.csr_array(L)[order][:, order])
         n_i, ends = len(i), np.cumsum([0, *map(len, loops)])
-        inside = ordered[:n_i, :n_i]
-    pinned = schur_complement(ordered[:-1, :-1], n_i)
+    bordered = Cholesky(ordered[:-1, :-1], leading=n_i)
+    C = bordered.schur_factor()
     with phase("condensation"):
+        pinned = C @ C.T
         # The last row and column follow from sums of zero (Theorem 1).
         S = np.zeros((len(b), len(b)))
         S[:-1, :-1] = pinned
@@ -96,7 +97,7 @@ def condensed(mesh: TriangleMesh, L: sparse.sparray, loops: Sequence[Loop]) -> C
         S,
         ordered[n_i:, :n_i],
         ordered[n_i:, n_i:],
-        Cholesky(inside),
+        bordered,
     )
 
 

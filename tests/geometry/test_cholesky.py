@@ -7,7 +7,6 @@ from cembench.geometry.cholesky import (
     Cholesky,
     available_backends,
     linear_algebra,
-    schur_complement,
 )
 from cembench.geometry.cholmod import CholmodFactor
 from cembench.geometry.laplacian import laplacian
@@ -138,19 +137,3 @@ def test_after_an_indefinite_matrix_the_next_is_solved_again(matrix, backend, so
 def solved_after_update(factor, A, b):
     factor.update(A)
     return factor.solve(b)
-
-
-@pytest.mark.parametrize("backend", BACKENDS)
-@pytest.mark.parametrize("solves", BOTH)
-def test_the_schur_complement_is_what_elimination_leaves(matrix, backend, solves):
-    A, k = matrix
-    dense = A.toarray()
-    expected = dense[k:, k:] - dense[k:, :k] @ np.linalg.solve(dense[:k, :k], dense[:k, k:])
-    with linear_algebra(solves, backend):
-        np.testing.assert_allclose(schur_complement(A, k), expected, atol=1e-10)
-
-
-def test_the_schur_complement_takes_one_factorisation(matrix, count_calls):
-    calls = count_calls(CholmodFactor, "_factor")
-    schur_complement(*matrix)
-    assert len(calls) == 1
