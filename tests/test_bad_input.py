@@ -1,3 +1,5 @@
+import json
+
 """Bad files at the command line: each its own message, exit code 2, nothing written."""
 
 import re
@@ -45,12 +47,10 @@ FILES = {
 @pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize("verb", ["map", "run"])
 def test_each_bad_file_has_its_own_message(name, verb, cli, tmp_path):
-    if (name, verb) == ("tube.obj", "run"):
-        pytest.skip("`run` takes it: there are algorithms for surfaces with holes")
     text, message = FILES[name]
     (tmp_path / name).write_text(text)
     where = [tmp_path / name] if verb == "map" else ["--mesh", tmp_path / name]
-    more = ["-o", "out.obj", "--preview"] if verb == "map" else ["-o", "out"]
+    more = ["-o", "out.obj", "--preview"] if verb == "map" else ["-a", "cem", "-o", "out"]
     code, out, err = cli(verb, *where, *more)
     assert code == 2
     assert out == ""
@@ -107,3 +107,11 @@ def test_two_surfaces_of_one_name(cli, tmp_path):
         (tmp_path / folder / "same.obj").write_text(obj(size * np.asarray(V), F))
     code, _, err = cli("run", "--mesh", tmp_path / "a/same.obj", "--mesh", tmp_path / "b/same.obj")
     assert (code, "two surfaces are called 'same'" in err) == (2, True)
+
+
+def test_a_tube_goes_to_the_algorithms_that_take_holes(cli, tmp_path):
+    (tmp_path / "tube.obj").write_text(FILES["tube.obj"][0])
+    code, out, _ = cli("run", "--mesh", tmp_path / "tube.obj", "--dry-run", "--json")
+    assert code == 0
+    assert {cell["algorithm"] for cell in json.loads(out)["cells"]} >= {"koebe-cem"}
+    assert "cem" not in {cell["algorithm"] for cell in json.loads(out)["cells"]}

@@ -57,7 +57,7 @@ def three_kinds(
         tables.append(
             table_beside(
                 evidence, f"{name}-other-algorithms",
-                f"{title}: algorithms that are not in the paper{add}", evidence.models, columns,
+                f"{_capitalised(title)}: algorithms that are not in the paper{add}", evidence.models, columns,
                 policy=policy, footers=footers,
             )
         )  # fmt: skip
@@ -71,8 +71,12 @@ def three_kinds(
         tables.append(
             table_beside(
                 evidence, f"{name}-other-surfaces",
-                f"{title}: surfaces that are not in the paper{add}", evidence.others, columns,
+                f"{_capitalised(title)}: surfaces that are not in the paper{add}", evidence.others, columns,
                 policy=policy, footers=footers,
             )
         )  # fmt: skip
     return tables
+
+
+def _capitalised(title: str) -> str:
+    return title[0].upper() + title[1:]
