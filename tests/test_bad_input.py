@@ -1,7 +1,6 @@
-import json
-
 """Bad files at the command line: each its own message, exit code 2, nothing written."""
 
+import json
 import re
 
 import numpy as np

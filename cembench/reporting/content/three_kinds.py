@@ -57,7 +57,8 @@ def three_kinds(
         tables.append(
             table_beside(
                 evidence, f"{name}-other-algorithms",
-                f"{_capitalised(title)}: algorithms that are not in the paper{add}", evidence.models, columns,
+                f"{_capitalised(title)}: algorithms that are not in the paper{add}",
+                evidence.models, columns,
                 policy=policy, footers=footers,
             )
         )  # fmt: skip
@@ -71,7 +72,8 @@ def three_kinds(
         tables.append(
             table_beside(
                 evidence, f"{name}-other-surfaces",
-                f"{_capitalised(title)}: surfaces that are not in the paper{add}", evidence.others, columns,
+                f"{_capitalised(title)}: surfaces that are not in the paper{add}",
+                evidence.others, columns,
                 policy=policy, footers=footers,
             )
         )  # fmt: skip
