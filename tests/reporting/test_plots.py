@@ -5,11 +5,14 @@ import json
 import numpy as np
 import pytest
 
+from cembench.reporting.content.evidence import Evidence
 from cembench.reporting.content.figures.cost_by_faces import cost_by_faces, fit, printed_points
+from cembench.reporting.content.figures.energy_by_iteration import energy_by_iteration
 from cembench.reporting.content.figures.performance_profile import performance_profile, ratios
 from cembench.reporting.content.figures.time_by_phase import time_by_phase
 from cembench.reporting.palette import looks
 from cembench.reporting.plots import Axis, Panel, Plot, Point, Series, plotly_of, write_plot
+from tests.reporting.small_run import meshes, ok, record, write_run
 
 
 @pytest.fixture
@@ -103,3 +106,15 @@ def test_cost_is_shown_by_policy_beside_the_printed(evidence):
         "measured here, solves: backslash",
         "printed in the paper (Table 1)",
     ]
+
+
+def test_energies_of_algorithms_not_in_the_paper_stand_beside_those_of_cem(tmp_path):
+    store = write_run(tmp_path, ("reuse",))
+    vase = meshes()["Chinese Vase"]
+    outcome, uv = ok("direct-cem", vase, 1.0)
+    rival = record("direct-cem", vase, "Chinese Vase", "reuse", outcome)
+    store.save(rival, uv, {"id": "machine", "cpu": "x"})
+    plot, _ = energy_by_iteration(Evidence.of(tmp_path))
+    (panel,) = plot.panels
+    assert [series.name for series in panel.series] == ["CEM", "Direct CEM"]
+    assert panel.series[1].y[-1] < panel.series[0].y[0]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cembench import paper
 from cembench.reporting.content.evidence import REFERENCE, Evidence, SurfaceFacts, model_surface
 from cembench.reporting.document import Gap
 from cembench.reporting.plots import Axis, Panel, Plot, Series
@@ -28,7 +29,8 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
         "Conformal energy against iterations of CEM",
         tuple(panels),
         "E_C of the start (0) and after each iteration. The last value need not be the smallest: "
-        "iteration ends after the first step that lowers E_C by less than the tolerance.",
+        "CEM's iteration ends after the first step that lowers E_C by less than the tolerance. "
+        "Curves other than CEM's are not in the paper.",
         "For each surface, a curve of the conformal energy that falls with the iterations.",
         "Figure 8",
     )
@@ -36,15 +38,30 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
 
 
 def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Panel | None:
-    """The energies of CEM's iterations on a surface; None where there are none."""
-    series = evidence.series_of(REFERENCE)
-    record = series and evidence.find(surface, series)
-    if not series or not record or not record.outcome.energy_history:
+    """The energies of CEM's iterations on a surface; None where there are none.
+
+    CEM with other parameters, and algorithms that are not in the paper and tell E_C after each
+    iteration, have curves of their own.
+    """
+    shown = []
+    for series in evidence.disk_series:
+        record = evidence.find(surface, series)
+        if not record or not record.outcome.energy_history:
+            continue
+        is_cem = series.algorithm == REFERENCE
+        if not is_cem and (
+            series.algorithm in paper.ALGORITHMS or "energy_of" in record.outcome.extras
+        ):
+            continue
+        history = record.outcome.energy_history
+        look = evidence.looks[series.label]
+        shown.append(Series(series.label, list(range(len(history))), history, "both", look))
+        if is_cem and series.main:
+            shown.insert(0, shown.pop())
+    main = evidence.series_of(REFERENCE)
+    if not main or not any(s.name == main.label for s in shown):
         return None
-    history = record.outcome.energy_history
-    steps = list(range(len(history)))
-    drawn = Series(series.title, steps, history, "both", evidence.looks[series.label])
-    return Panel(Axis("iteration"), Axis("conformal energy E_C"), (drawn,), title)
+    return Panel(Axis("iteration"), Axis("conformal energy E_C"), tuple(shown), title)
 
 
 def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
