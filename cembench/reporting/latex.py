@@ -56,6 +56,8 @@ PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
 \usepackage{booktabs}
 \usepackage{graphicx}
 \usepackage{array}
+\usepackage{caption}
+\captionsetup{labelformat=empty} % titles carry the paper's own numbers
 \usepackage[hidelinks]{hyperref}
 \setlength{\parindent}{0pt}
 \setlength{\parskip}{4pt}
