@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 
 import numpy as np
 
@@ -23,25 +23,42 @@ from cembench.reporting.content.claims.verdicts import OURS, tested_on, under, v
 from cembench.reporting.content.evidence import REFERENCE, Evidence
 from cembench.reporting.content.inspection import Inspection
 from cembench.reporting.content.table_2 import measured_rates
-from cembench.reporting.document import Claim
+from cembench.reporting.document import Claim, Verdict
 
 Inspections = Mapping[str, Inspection]
 #: A figure agrees with a stated one where it reaches this share of it.
 ABOUT = 0.9
 
 
+def _compared(evidence: Evidence) -> Iterator[tuple[str, str, list[float]]]:
+    """Name, words for a list, and rates of each algorithm under each policy that has any."""
+    for policy in evidence.policies:
+        for algorithm in COMPARED:
+            rates, _ = measured_rates(evidence, algorithm, policy)
+            if rates:
+                yield algorithm, f"{algorithm.upper()}{under(policy, evidence)}", rates
+
+
+def _tally(
+    evidence: Evidence,
+    holds: Callable[[str, list[float]], bool],
+    told: Callable[[list[float]], str],
+) -> tuple[str, Verdict]:
+    """What is found of the average rates, and for how many of them does it hold?"""
+    found = list(_compared(evidence))
+    words = [f"{label}: {told(rates)} (n = {len(rates)})" for _, label, rates in found]
+    held = sum(holds(algorithm, rates) for algorithm, _, rates in found)
+    return "; ".join(words) or "No pair of times in this run.", verdict_of(held, len(found))
+
+
 def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
     """Is CEM faster than QIEM, FDM and LDM on every model?"""
     held = tested = sure = 0
     parts = []
-    for policy in evidence.policies:
-        for algorithm in COMPARED:
-            rates, _ = measured_rates(evidence, algorithm, policy)
-            faster = sum(rate > 0 for rate in rates)
-            held, tested = held + faster, tested + len(rates)
-            if rates:
-                words = f"{algorithm.upper()}{under(policy, evidence)}: {faster} of {len(rates)}"
-                parts.append(f"{words}, lowest rate {min(rates):.2f}")
+    for _, label, rates in _compared(evidence):
+        faster = sum(rate > 0 for rate in rates)
+        held, tested = held + faster, tested + len(rates)
+        parts.append(f"{label}: {faster} of {len(rates)}, lowest rate {min(rates):.2f}")
     for record in evidence.records:
         compared = record.cell.algorithm in COMPARED and record.mesh.paper_row
         sure += bool(compared) and evidence.row(record)["verdict"] == "slower"
@@ -60,27 +77,19 @@ def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
 
 def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
     """Is the average rate of speedup 8.5 / 17.2 / 4.1?"""
-    held = tested = 0
-    parts = []
-    for policy in evidence.policies:
-        for algorithm in COMPARED:
-            rates, _ = measured_rates(evidence, algorithm, policy)
-            if not rates:
-                continue
-            tested += 1
-            held += mean_rate(rates) >= ABOUT * STATED_RATE[algorithm]
-            parts.append(
-                f"{algorithm.upper()}{under(policy, evidence)}: mean {mean_rate(rates):.1f}, "
-                f"geometric {geometric_rate(rates):.1f} (n = {len(rates)})"
-            )
+    found, verdict = _tally(
+        evidence,
+        lambda algorithm, rates: mean_rate(rates) >= ABOUT * STATED_RATE[algorithm],
+        lambda rates: f"mean {mean_rate(rates):.1f}, geometric {geometric_rate(rates):.1f}",
+    )
     return Claim(
         "average-rates",
         "with the average rate of the speedup 8.5/17.2/4.1",
         "Section 5, below Eq. (33)",
         f"The arithmetic mean of the rates, as the paper takes it, reaches {ABOUT:.0%} of the "
         "stated value for each algorithm; the geometric mean is given beside it.",
-        "; ".join(parts) or "No pair of times in this run.",
-        verdict_of(held, tested),
+        found,
+        verdict,
         f"{tested_on(evidence.models)} {OURS} In print the geometric means are 6.8 / 12.4 / 3.5, "
         "and n is 20 / 18 / 20.",
     )
@@ -88,28 +97,22 @@ def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
 
 def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
     """Does CEM save 89 / 94 / 80 % of the time?"""
-    held = tested = 0
-    parts = []
-    for policy in evidence.policies:
-        for algorithm in COMPARED:
-            rates, _ = measured_rates(evidence, algorithm, policy)
-            if not rates:
-                continue
-            tested += 1
-            held += saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm]
-            parts.append(
-                f"{algorithm.upper()}{under(policy, evidence)}: "
-                f"{percent(saving_of_mean(rates))} of the mean rate, "
-                f"{percent(mean_saving(rates))} in the mean (n = {len(rates)})"
-            )
+    found, verdict = _tally(
+        evidence,
+        lambda algorithm, rates: saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm],
+        lambda rates: (
+            f"{percent(saving_of_mean(rates))} of the mean rate, "
+            f"{percent(mean_saving(rates))} in the mean"
+        ),
+    )
     return Claim(
         "average-savings",
         "CEM algorithm saves about 89%/94%/80% of the computational time of QIEM/FDM/LDM in "
         "average",
         "Section 5, below Eq. (33)",
         f"1 - 1/(1 + mean rate), as the paper takes it, reaches {ABOUT:.0%} of the stated value.",
-        "; ".join(parts) or "No pair of times in this run.",
-        verdict_of(held, tested),
+        found,
+        verdict,
         f"{tested_on(evidence.models)} {OURS} The mean of the savings on each model, which the "
         "words suggest, is 83 / 89 / 73 % in print.",
     )
@@ -117,25 +120,18 @@ def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
 
 def more_than_80_percent(evidence: Evidence, inspections: Inspections) -> Claim:
     """Does CEM save more than 80 % of the cost on average?"""
-    held = tested = 0
-    parts = []
-    for policy in evidence.policies:
-        for algorithm in COMPARED:
-            rates, _ = measured_rates(evidence, algorithm, policy)
-            if rates:
-                tested += 1
-                held += mean_saving(rates) > 0.8
-                parts.append(
-                    f"{algorithm.upper()}{under(policy, evidence)}: "
-                    f"{percent(mean_saving(rates))} (n = {len(rates)})"
-                )
+    found, verdict = _tally(
+        evidence,
+        lambda _, rates: mean_saving(rates) > 0.8,
+        lambda rates: percent(mean_saving(rates)),
+    )
     return Claim(
         "more-than-80-percent",
         "saves more than 80% of computational cost on average",
         "Section 5, summary",
         "The mean over the models of 1 - t_CEM / t is above 80 % for each of the three algorithms.",
-        "; ".join(parts) or "No pair of times in this run.",
-        verdict_of(held, tested),
+        found,
+        verdict,
         f"{tested_on(evidence.models)} {OURS} By the printed times themselves this mean is 83 / 89 "
         "/ 73 %: for LDM it does not reach 80 %.",
     )
