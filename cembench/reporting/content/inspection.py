@@ -27,7 +27,7 @@ from cembench.reporting.content.evidence import (
 from cembench.reporting.document import Figure
 
 #: Pixels of one panel of a picture.
-SIDE = 280
+SIDE = 236
 #: Degrees of a bin of the histograms, and where they end.
 BIN, LAST = 0.1, 10.0
 #: Recomputed angles may differ from the record's mean by this share, from rounding.
