@@ -15,7 +15,7 @@ from cembench.errors import RenderError
 
 #: Pixels of all pictures of a page together: at 0.13 bytes each (small pictures of meshes and
 #: checkerboards; large and smooth ones take half) about 2.5 MB, and a third more as text.
-PIXELS = 16_000_000
+PIXELS = 12_000_000
 #: Pixels along the longer side of one picture, and what a thumbnail has.
 LONGEST, THUMBNAIL = 1600, 360
 #: Quality of WebP at which a checkerboard's edges are still clean.
