@@ -30,7 +30,7 @@ Picture = NDArray[np.uint8]
 #: White between panels that stand side by side, in pixels.
 GAP = 12
 #: JPEG quality: a picture of two panels stays near 30 kB.
-QUALITY = 78
+QUALITY = 70
 #: Half the width of a drawn edge, in samples; colours of edges and of what lies between them.
 EDGE, EDGE_COLOUR, BETWEEN = 0.5 * SAMPLES, (0.16, 0.25, 0.36), (0.93, 0.94, 0.95)
 #: Curvature from inwards over flat to outwards: blue, white, orange; also apart in grey and for
