@@ -7,6 +7,7 @@ from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.cholmod import CholmodFactor
 from cembench.geometry.files import read_mesh
 from cembench.metrics import all_metrics, boundary_circles
+from meshes_gen.holed_disk import disk_with_holes
 from meshes_gen.sheets import catenoid_ring
 from tests import gallery
 from tests.real_meshes import real_mesh
@@ -31,7 +32,7 @@ def moebius_distance(z, w):
 
 def warped(centres, radii, faces):
     """A disk with round holes, and what exp made of it: a domain whose conformal image is known."""
-    V, F = gallery.rings_with_holes(centres, radii, faces)
+    V, F = disk_with_holes(np.asarray(centres), np.asarray(radii), faces)
     z = V[:, 0] + 1j * V[:, 1]
     w = np.exp(0.8 * z)
     return z, HoledMesh.from_arrays(np.stack([w.real, w.imag, 0 * w.real], axis=1), F)
