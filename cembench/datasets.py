@@ -1,19 +1,20 @@
 """Surfaces in files that can be fetched: once, checked, and kept.
 
 `CEMBENCH_CACHE` says where they are kept. `CEMBENCH_DATA_URL` points to a mirror: a directory that
-holds the files under their own names.
+holds the files under their own names. The libraries that download load when something is fetched:
+every process that measures reads this file.
 """
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-import pooch
-import requests
+from platformdirs import user_cache_dir
 
 from cembench.errors import DatasetError
 
@@ -25,7 +26,7 @@ MIRROR_VARIABLE = "CEMBENCH_DATA_URL"
 
 def cache_directory() -> Path:
     """Where are surfaces and downloads kept? `CEMBENCH_CACHE`, or the user's cache directory."""
-    return Path(os.environ.get(CACHE_VARIABLE) or pooch.os_cache("cembench"))
+    return Path(os.environ.get(CACHE_VARIABLE) or user_cache_dir("cembench"))
 
 
 class Progress(Protocol):
@@ -100,7 +101,7 @@ class Dataset:
 
 def is_fetched(dataset: Dataset) -> bool:
     """Does the file lie in the cache, whole? Nothing is fetched."""
-    return dataset.path.is_file() and pooch.file_hash(str(dataset.path)) == dataset.sha256
+    return dataset.path.is_file() and _sha256(dataset.path) == dataset.sha256
 
 
 def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None = None) -> Path:
@@ -115,6 +116,9 @@ def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None 
         the message names file and URL.
 
     """
+    import pooch
+    import requests
+
     d = dataset
     pooch.get_logger().setLevel("WARNING")  # it would tell of every download
     try:
@@ -145,8 +149,13 @@ def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None 
 
 def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:
     """Which dataset is it that was read from this file? Known by its bytes, or by its mesh."""
-    checksum = pooch.file_hash(str(path))
+    checksum = _sha256(path)
     for dataset in datasets:
         if mesh_hash == dataset.mesh_hash or checksum == dataset.sha256:
             return dataset
     return None
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
