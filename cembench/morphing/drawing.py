@@ -9,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
@@ -21,6 +21,7 @@ from cembench.geometry.mesh import TriangleMesh
 from cembench.morphing.path import position
 from cembench.reporting.camera import viewpoints
 from cembench.reporting.draw_numpy import SAMPLES, shrunk
+from cembench.reporting.hand_over import HandedOver
 from cembench.reporting.rasterizer import rasterize
 from cembench.reporting.scene import FILL, INSIDE, brightness_of, doubled_areas
 
@@ -34,7 +35,7 @@ CLAY = (0.90, 0.80, 0.71)
 
 
 @dataclass(frozen=True)
-class Film:
+class Film(HandedOver):
     """All that is needed to draw the frames of a path.
 
     Parameters
@@ -99,16 +100,6 @@ class Film:
     def in_window(self, frame: int, view: int) -> Real:
         """Window coordinates (n, 3) of the vertices: x right, y up, -1 to 1, z to the viewer."""
         return position(self.stops, self.times[frame]) @ self.rotations[view].T
-
-    def save(self, path: Path) -> None:
-        """Write to an ``.npz`` file, for a renderer in another process."""
-        np.savez(path, **{field.name: getattr(self, field.name) for field in fields(self)})
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read what :meth:`save` wrote."""
-        with np.load(path) as arrays:
-            return cls(**{field.name: arrays[field.name] for field in fields(cls)})
 
 
 def check_views(views: Sequence[str]) -> None:

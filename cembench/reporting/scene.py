@@ -6,8 +6,7 @@ viewer. A **square** of the checkerboard has side 1 in the coordinates `board`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from cembench.geometry.mesh import TriangleMesh
 from cembench.geometry.planar import signed_areas
 from cembench.reporting.camera import view_rotation
+from cembench.reporting.hand_over import HandedOver
 
 Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,7 +64,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(HandedOver):
     """A surface and its image, ready to be drawn side by side under one checkerboard.
 
     All triangles stand alone, their corners in turn. They are those of the mesh, except that some
@@ -138,16 +138,6 @@ class Scene:
         corners = self.plane[:, :2]
         small = self.folded & (np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2)
         return corners.reshape(-1, 3, 2)[small].mean(axis=1)
-
-    def save(self, path: Path) -> None:
-        """Write to an ``.npz`` file, for a renderer in another process."""
-        np.savez(path, **{field.name: getattr(self, field.name) for field in fields(self)})
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read what :meth:`save` wrote."""
-        with np.load(path) as arrays:
-            return cls(**{field.name: arrays[field.name] for field in fields(cls)})
 
 
 def image_in_window(uv: Complex) -> Real:

@@ -141,6 +141,10 @@ class Evidence:
         """The surfaces that are, or stand for, models of the paper."""
         return tuple(s for s in self.surfaces if s.paper_row)
 
+    def standing_for(self, model: str) -> SurfaceFacts | None:
+        """The first surface that is, or stands for, this model of the paper; None if none does."""
+        return next((s for s in self.models if s.paper_row == model), None)
+
     @property
     def others(self) -> tuple[SurfaceFacts, ...]:
         """The surfaces that are not in the paper."""

@@ -189,7 +189,7 @@ def _pictures(
     evidence: Evidence, inspections: Inspections, figure: str, model: str
 ) -> list[Figure]:
     """CEM's pictures of a model, as the paper shows them."""
-    surface = next((s for s in evidence.models if s.paper_row == model), None)
+    surface = evidence.standing_for(model)
     series = evidence.series_of(REFERENCE)
     if surface is None or series is None:
         return []

@@ -26,7 +26,7 @@ def angle_histograms(
     series = evidence.series_of(REFERENCE)
     panels, gaps = [], []
     for model in MODELS:
-        surface = next((s for s in evidence.models if s.paper_row == model), None)
+        surface = evidence.standing_for(model)
         seen = inspections[surface.mesh_hash] if surface else None
         angles = seen.angles.get(series.label) if seen and series else None
         if angles and surface:

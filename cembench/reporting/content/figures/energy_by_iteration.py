@@ -16,7 +16,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
     panels = []
     gaps = []
     for model in MODELS:
-        surface = next((s for s in evidence.models if s.paper_row == model), None)
+        surface = evidence.standing_for(model)
         panel = surface and history_panel(evidence, surface, f"{model} ({surface.origin})")
         if panel:
             panels.append(panel)
@@ -66,7 +66,7 @@ def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Pane
 
 def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
     """What is missing where a run does not have a model's map by CEM."""
-    surface = next((s for s in evidence.models if s.paper_row == model), None)
+    surface = evidence.standing_for(model)
     series = evidence.series_of(REFERENCE)
     record = evidence.find(surface, series) if surface and series else None
     why = evidence.why_not(record) if surface else "no surface of this run is or stands for it"
