@@ -7,11 +7,10 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import sparse
 
 from cembench.clock import phase
-from cembench.errors import AlgorithmFailed
-from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole
+from cembench.geometry.bordered import BorderedLaplacian
+from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole_start
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.folds import without_folds
 from cembench.geometry.laplacian import laplacian
@@ -46,21 +45,10 @@ def cem(
     Cholesky factor serves the start, and its leading block all Dirichlet solves. `delaunay` takes
     the weights of the intrinsic Delaunay triangulation.
     """
-    n_i = len(mesh.interior)
-    if n_i == 0:
-        raise AlgorithmFailed("the mesh has no interior vertex, so no harmonic map has any freedom")
     L = laplacian(mesh, delaunay=delaunay)
-    with phase("assembly"):
-        order = np.concatenate([mesh.interior, mesh.boundary])
-        ordered = sparse.csc_array(sparse.csr_array(L)[order][:, order])
-        pinned = ordered[:-1, :-1]
-        L_bi, L_bb = sparse.csr_array(ordered)[n_i:, :n_i], ordered[n_i:, n_i:]
-        L_ib = sparse.csr_array(L_bi.T)
-    whole = Cholesky(pinned, leading=n_i)
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    L_bi, L_bb = bordered.L_bi, bordered.L_bb
     ring = Cholesky(L_bb)
-
-    def dirichlet(f_b: Complex) -> Complex:
-        return whole.solve_leading(-(L_ib @ f_b))  # Eq. 22
 
     def ring_solution(f_i: Complex) -> Complex:
         return ring.solve(-(L_bi @ f_i))  # Eq. 23
@@ -71,28 +59,14 @@ def cem(
             return 0.5 * float(np.vdot(f_b, L_bb @ f_b + L_bi @ f_i).real) - polygon_area(f_b)
 
     f_b, f_i, history, order_kept = iterate_boundary(
-        on_circle(_start(mesh, whole, order)),
-        dirichlet,
+        on_circle(pole_start(mesh.V, mesh.F, bordered.solved_boundary)),
+        bordered.dirichlet,
         ring_solution,
         energy,
         tolerance=tolerance,
         max_iterations=max_iterations,
         inversion=inversion,
     )
-    uv = np.empty(mesh.n, dtype=np.complex128)
-    uv[order] = np.concatenate([f_i, f_b])
-    uv, repairs = without_folds(mesh, L, uv)
+    uv, repairs = without_folds(mesh, L, bordered.in_order(f_i, f_b))
     extras = {"order_kept": order_kept, "fold_repairs": repairs}
     return Parameterization(uv, len(history) - 1, tuple(history), extras)
-
-
-def _start(mesh: DiskMesh, whole: Cholesky, order: NDArray[np.int64]) -> Complex:
-    """Boundary values of the map with a pole at the middle triangle (Eqs. 13, 14, 18)."""
-    with phase("start"):
-        corners, values = pole(mesh.V, mesh.F)
-        rhs = np.zeros(mesh.n, dtype=np.complex128)
-        rhs[corners] = values
-        f = np.append(whole.solve(rhs[order][:-1]), 0.0)
-    f_b = f[len(mesh.interior) :]
-    # The image is the outside of a curve, so the boundary runs clockwise round it.
-    return np.conj(f_b) if polygon_area(f_b) < 0 else f_b

@@ -19,9 +19,9 @@ from scipy.sparse import csgraph
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from cembench.errors import AlgorithmFailed
-from cembench.geometry.boundary_iteration import inverted, on_circle, pole
+from cembench.geometry.bordered import BorderedLaplacian
+from cembench.geometry.boundary_iteration import inverted, on_circle, pole_start
 from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.condensed import Condensed, condensed
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.planar import backward_arcs, polygon_area
@@ -110,12 +110,10 @@ class BoundaryOperator:
         if not len(mesh.interior):
             raise AlgorithmFailed("the mesh has no interior vertex, so K is zero")
         self.mesh = mesh
-        b, i = mesh.boundary, mesh.interior
         self.L = laplacian(mesh)
-        rows = sparse.csr_array(self.L)
-        self.L_bb, self.L_bi = rows[b][:, b], rows[b][:, i]
-        self.L_ib = sparse.csr_array(self.L_bi.T)
-        self._inside, self._ring = Cholesky(rows[i][:, i]), Cholesky(self.L_bb)
+        self._bordered = BorderedLaplacian(mesh, self.L, (mesh.boundary,))
+        self.L_bb, self.L_bi = self._bordered.L_bb, self._bordered.L_bi
+        self._ring = Cholesky(self.L_bb)
 
     @property
     def size(self) -> int:
@@ -124,7 +122,7 @@ class BoundaryOperator:
 
     def extension(self, f_b: NDArray[Any]) -> NDArray[Any]:
         """Eq. 22: the harmonic values inside."""
-        return self._inside.solve(-(self.L_ib @ f_b))
+        return self._bordered.dirichlet(f_b)
 
     def ring(self, f_i: NDArray[Any]) -> NDArray[Any]:
         """Eq. 23: the boundary values that follow."""
@@ -160,31 +158,25 @@ class BoundaryOperator:
         order = np.argsort(values)[::-1]
         return values[order], vectors[:, order]
 
-    @cached_property
-    def condensed(self) -> Condensed:
-        """S = L_bb - G, dense."""
-        return condensed(self.mesh, self.L, [self.mesh.boundary])
+    @property
+    def S(self) -> Real:
+        """L_bb - G, dense."""
+        return self._bordered.S
 
     @cached_property
     def dense(self) -> Real:
         """K itself, I - L_bb^-1 S."""
-        return np.eye(self.size) - self._ring.solve(self.condensed.S)
+        return np.eye(self.size) - self._ring.solve(self.S)
 
     def spectrum(self) -> Real:
         """All eigenvalues, descending, by a dense symmetric solver."""
         L_bb = self.L_bb.toarray()
-        return 1 - linalg.eigh(self.condensed.S, L_bb, eigvals_only=True)
+        return 1 - linalg.eigh(self.S, L_bb, eigvals_only=True)
 
     def start(self) -> Complex:
         """CEM's start on the circle (Eqs. 13 to 18)."""
-        order = np.concatenate([self.mesh.interior, self.mesh.boundary])
-        corners, values = pole(self.mesh.V, self.mesh.F)
-        rhs = np.zeros(self.mesh.n, dtype=np.complex128)
-        rhs[corners] = values
-        ordered = sparse.csr_array(self.L)[order][:, order]
-        f = np.append(Cholesky(ordered[:-1, :-1]).solve(rhs[order][:-1]), 0.0)
-        f_b: Complex = f[len(self.mesh.interior) :]
-        return on_circle(np.conj(f_b) if polygon_area(f_b) < 0 else f_b)
+        mesh = self.mesh
+        return on_circle(pole_start(mesh.V, mesh.F, self._bordered.solved_boundary))
 
 
 def trajectory(K: BoundaryOperator, iterations: int, *, inversion: bool) -> Trajectory:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
-from cembench.geometry.planar import backward_arcs
+from cembench.geometry.gauge import middle_triangle
+from cembench.geometry.planar import backward_arcs, polygon_area
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -21,8 +22,7 @@ def pole(V: Real, F: NDArray[np.int64]) -> tuple[NDArray[np.int64], Complex]:
     V is (n, 2 or 3). The triangle is the one whose barycentre is nearest to the mean vertex; its
     corners (3,) come back with their values (3,), all others are zero.
     """
-    middle = V.mean(axis=0)
-    corners = F[np.argmin(((V[F].mean(axis=1) - middle) ** 2).sum(axis=1))]
+    corners = middle_triangle(V, F)
     p_a, p_b, p_c = V[corners]
     base = p_b - p_a
     alpha = np.dot(p_c - p_a, base) / np.dot(base, base)
@@ -34,6 +34,20 @@ def pole(V: Real, F: NDArray[np.int64]) -> tuple[NDArray[np.int64], Complex]:
         -1j / height,
     ]
     return corners, np.array(values)
+
+
+def pole_start(V: Real, F: NDArray[np.int64], solve: Callable[[Complex], Complex]) -> Complex:
+    """Where does the boundary lie in the map with a pole in the middle (Eqs. 13, 14, 18)?
+
+    `solve` gives f_b of L f = rhs (n,).
+    """
+    with phase("start"):
+        corners, values = pole(V, F)
+        rhs = np.zeros(len(V), dtype=np.complex128)
+        rhs[corners] = values
+        f_b = solve(rhs)
+    # The image is the outside of a curve, so the boundary runs clockwise round it.
+    return np.conj(f_b) if polygon_area(f_b) < 0 else f_b
 
 
 def on_circle(f_b: Complex) -> Complex:

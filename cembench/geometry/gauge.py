@@ -26,7 +26,7 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
         lengths = edge_lengths(mesh, outer)
         measure[outer] = lengths + np.roll(lengths, 1)
     elif gauge == "triangle":
-        measure[middle_triangle(mesh)] = 1
+        measure[middle_triangle(mesh.V, mesh.F)] = 1
     else:
         a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -34,7 +34,6 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
     return measure / measure.sum()
 
 
-def middle_triangle(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """Which triangle's barycentre is nearest to the mean vertex? Its three corners."""
-    barycentres = mesh.V[mesh.F].mean(axis=1)
-    return mesh.F[np.argmin(((barycentres - mesh.V.mean(axis=0)) ** 2).sum(axis=1))]
+def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Which triangle's barycentre is nearest to the mean vertex? V is (n, 2 or 3); its corners."""
+    return F[np.argmin(((V[F].mean(axis=1) - V.mean(axis=0)) ** 2).sum(axis=1))]

@@ -19,8 +19,9 @@ from scipy import sparse
 
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
+from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole
-from cembench.geometry.condensed import Condensed, DenseCholesky, condensed
+from cembench.geometry.dense_cholesky import DenseCholesky
 from cembench.geometry.folds import in_order, interior_without_folds
 from cembench.geometry.laplacian import cotangent_laplacian, laplacian
 from cembench.geometry.mesh import HoledMesh
@@ -56,8 +57,8 @@ class Step:
         E_C of the filled surface, before and after each iteration of CEM.
     order_kept : int
         How often a step of CEM was changed so that the boundary kept its order.
-    surface : Condensed
-        The surface with its own weights, its interior eliminated.
+    surface : BorderedLaplacian
+        The surface with its own weights, factored.
 
     """
 
@@ -67,7 +68,7 @@ class Step:
     uv: Complex
     energies: tuple[float, ...]
     order_kept: int
-    surface: Condensed
+    surface: BorderedLaplacian
 
 
 def koebe_steps(
@@ -95,9 +96,7 @@ def koebe_steps(
     """
     first, holes = mesh.outer_and_holes(outer)
     loops = (first, *holes)
-    if not len(mesh.interior):
-        raise AlgorithmFailed("the mesh has no interior vertex, so no harmonic map has any freedom")
-    own = surface = condensed(mesh, laplacian(mesh), loops)
+    own = surface = BorderedLaplacian(mesh, laplacian(mesh), loops)
     uv: Complex | None = None
     kept: dict[int, Complex] = {}
     for sweep in range(1, sweeps + 1):
@@ -105,7 +104,7 @@ def koebe_steps(
             before = None if uv is None else _outside_in(uv, loops[k])
             points = mesh.V if before is None else np.stack([before.real, before.imag], axis=1)
             if weights == "plane" and before is not None:
-                surface = condensed(mesh, _planar_laplacian(points, mesh.F), loops)
+                surface = BorderedLaplacian(mesh, _planar_laplacian(points, mesh.F), loops)
             with phase("patches"):
                 glued = {j: _patch(points[loop], patches) for j, loop in enumerate(loops) if j != k}
             disk = _FilledSurface(surface, glued, k)
@@ -141,7 +140,7 @@ def finished(
             centre, radius = fitted_circle(uv[hole])
             uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
         f_b = uv[step.surface.boundary]
-        uv = step.surface.whole(f_b, step.surface.extension(f_b))
+        uv = step.surface.in_order(step.surface.dirichlet(f_b), f_b)
     if (signed_areas(uv, mesh.F) > 0).all():
         return uv, 0
     return interior_without_folds(mesh, laplacian(mesh), uv)
@@ -154,7 +153,7 @@ class _FilledSurface:
     boundary o and the interior: f_c = -W f_o, and half of f_o^* S f_o is the Dirichlet energy.
     """
 
-    def __init__(self, surface: Condensed, patches: dict[int, Real], k: int) -> None:
+    def __init__(self, surface: BorderedLaplacian, patches: dict[int, Real], k: int) -> None:
         self._surface = surface
         o = self._open = surface.parts[k]
         with phase("patches"):
@@ -208,7 +207,7 @@ class _FilledSurface:
 
         def dirichlet(f_o: Complex) -> Complex:
             f_b = on_boundaries(f_o)
-            return np.concatenate([f_b[self._closed], surface.extension(f_b)])
+            return np.concatenate([f_b[self._closed], surface.dirichlet(f_b)])
 
         def ring(f: Complex) -> Complex:
             return self._ring.solve(-(self._to_interior @ f[m:] + self._to_closed @ f[:m]))
@@ -222,7 +221,7 @@ class _FilledSurface:
             max_iterations=max_iterations,
             inversion=inversion,
         )
-        uv = surface.whole(on_boundaries(f_o), f[m:])
+        uv = surface.in_order(f[m:], on_boundaries(f_o))
         return f_o, uv, tuple(history), order_kept
 
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cembench import HoledMesh, MeshError
-from cembench.geometry.condensed import condensed
+from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.laplacian import cotangent_laplacian
 from cembench.geometry.patches import disk_patch, fan_patch, filled, sum_of_cosines
 from meshes_gen.flat_disk import flat_disk
@@ -47,7 +47,7 @@ def test_a_patch_is_symmetric_semidefinite_and_does_not_feel_constants():
 def test_a_disk_patch_is_what_a_fine_triangulation_of_the_disk_condenses_to():
     mesh = flat_disk(4000)
     rim = mesh.boundary
-    S = condensed(mesh, cotangent_laplacian(mesh.V, mesh.F), [rim]).S
+    S = BorderedLaplacian(mesh, cotangent_laplacian(mesh.V, mesh.F), [rim]).S
     t = np.unwrap(np.angle(mesh.V[rim, 0] + 1j * mesh.V[rim, 1]))
     P = disk_patch(t)
     for m in (1, 2, 3):
