@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -10,23 +11,28 @@ from pydantic import Field
 
 from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_energy import EnergyModel, in_gauge, leashed, minimise
+from cembench.geometry.boundary_energy import (
+    EnergyModel,
+    in_gauge,
+    minimise,
+)
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
 from cembench.geometry.filled_start import arcs_of_measure
 from cembench.geometry.folds import without_folds
 from cembench.geometry.gauge import Gauge, gauge_measure
+from cembench.geometry.gauge_walk import STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.metrics import flipped_triangles
+from cembench.metrics import flipped_triangles, mean_angle_error
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
 Real = NDArray[np.float64]
 
-#: How far the gauge "boundary" lets the mean go for less energy.
-LEASH = 0.03
+#: What share of E_C the way back towards harmonic measure may cost.
+MOST_COST = 0.01
 
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
@@ -36,6 +42,7 @@ def direct_cem(
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=0)] = 50,
     gauge: Gauge = "boundary",
+    back: Annotated[float, Field(ge=0, le=1)] = 0.3,
     delaunay: bool = False,
 ) -> Parameterization:
     """Which boundary on the unit circle has the least conformal energy? Newton's method finds it.
@@ -48,14 +55,19 @@ def direct_cem(
     Decided here: the start is the harmonic measure of the boundary from the triangle nearest to the
     mean vertex, or arc length where that has lower energy (`start`); it is brought into the
     `gauge`, that is, a mean comes to lie at 0: of the boundary by length, of that triangle, or of
-    the surface by area; from there Moebius maps are held by the start's arcs; with "boundary" the
-    mean may at last go up to 0.03 away from 0 where that lowers E_C. Iteration ends when the
-    gradient's norm, whose square is about twice what E_C can still fall, is at most `tolerance`
+    the surface by area; from there Moebius maps are held by the start's arcs. Iteration ends when
+    the gradient's norm, whose square is about twice what E_C can still fall, is at most `tolerance`
     (`stopped`: "gradient"), when nothing is left but rounding ("rounding"), after `max_iterations`
     ("iterations"), or when too many arcs would fall below a tenth of their length at the start
-    ("crowded"; `held_arcs` counts those held). Folds are mended as in CEM (`fold_repairs`).
-    `delaunay` takes the weights of the intrinsic Delaunay triangulation, in the energy history too;
-    `folded_before_repair` then counts the folds that the original edges force, and they stay.
+    ("crowded"; `held_arcs` counts those held). Near its minimum E_C is flat, angles are not: so the
+    boundary then goes the share `back` of the way to harmonic measure, whose angles are better on
+    coarse boundaries. Of what E_C fell that costs the share back^2; less of the way is gone where
+    that would be more than 1 % of E_C, and none with 0. With the gauge "boundary" the mean then
+    leaves 0, by 0.05 at a time and five times at most (`gauge_steps`), while E_C falls by 0.2 % at
+    least, and by twenty times the share by which the mean angle error grows. Folds are mended as in
+    CEM (`fold_repairs`). `delaunay` takes the weights of the intrinsic Delaunay triangulation, in
+    the energy history too; `folded_before_repair` then counts the folds that the original edges
+    force, and they stay.
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
@@ -64,28 +76,39 @@ def direct_cem(
         middle = gauge_measure(mesh, "triangle", mesh.boundary)
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
     seen, weights = bordered.swept_to_boundary(np.stack([middle, centred], axis=1)).T
-    domain, begun = _start(mesh, S, seen, weights)
-    held = weights if gauge == "triangle" else domain.outer_measure
-    found = minimise(S, domain, held, tolerance=tolerance, max_iterations=max_iterations)
-    if gauge == "boundary" and found.reason == "gradient":
-        nearby = leashed(S, found.domain, LEASH)
-        again = minimise(
-            S, nearby, nearby.outer_measure, tolerance=tolerance, max_iterations=max_iterations
-        )
-        found = found.followed_by(again)
-    uv = bordered.harmonic_extension(found.domain.points)
+    start, begun = _start(mesh, S, seen, weights)
+
+    held = weights if gauge == "triangle" else start.outer_measure
+    found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
+    domain, energies = found.domain, found.energies
+    share = _share(back, energies) if begun == "harmonic measure" else 0.0
+    if share:
+        domain = in_gauge(domain.towards(start, share), held)
+        energies += (EnergyModel(S, domain, held).energy,)
+    steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
+    uv, walked = gauge_walk(
+        S, domain, bordered.harmonic_extension, partial(mean_angle_error, mesh), steps
+    )
+    energies += walked[1:]
     folded = flipped_triangles(mesh, uv)
     uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
         "start": begun,
+        "gauge_steps": len(walked[1:]),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
         "folded_before_repair": folded,
         "fold_repairs": repairs,
     }
-    return Parameterization(uv, len(found.energies) - 1, found.energies, extras)
+    return Parameterization(uv, len(energies) - 1, energies, extras)
+
+
+def _share(back: float, energies: tuple[float, ...]) -> float:
+    """Which share of the way back costs no more than it may, E_C being a parabola on it?"""
+    fallen = energies[0] - energies[-1]
+    return min(back, (MOST_COST * energies[-1] / fallen) ** 0.5) if fallen > 0 else 0.0
 
 
 def _start(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -13,10 +14,11 @@ from cembench.geometry.boundary_energy import in_gauge, minimise
 from cembench.geometry.filled_start import widest_start
 from cembench.geometry.folds import interior_without_folds
 from cembench.geometry.gauge import Gauge, gauge_measure
+from cembench.geometry.gauge_walk import STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import HoledMesh
-from cembench.metrics import flipped_triangles
+from cembench.metrics import flipped_triangles, mean_angle_error
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -38,13 +40,14 @@ def direct_cem_holes(
 ) -> Parameterization:
     """Which circles, and which places on them, have the least conformal energy?
 
-    As `direct-cem`, with the centre and the radius of every hole as further unknowns; the holes are
-    open in every step, and their circles exact. The outer boundary is that of the vertex `outer`,
-    or the longest. Decided here: the start fills the holes with fans and takes circles of the
-    images' centroids and areas; where one of these has a radius below 1e-3, each boundary is tried
-    as the outer one, the one that leaves the smallest circle largest is outside while E_C is
-    minimised (`outside_while_minimised`; the energy history is that of this domain), and a Moebius
-    map brings the outer one out; folds are mended with the boundary kept (`fold_repairs`).
+    As `direct-cem`, without its way back, with the centre and the radius of every hole as further
+    unknowns; the holes are open in every step, and their circles exact. The outer boundary is that
+    of the vertex `outer`, or the longest. Decided here: the start fills the holes with fans and
+    takes circles of the images' centroids and areas; where one of these has a radius below 1e-3,
+    each boundary is tried as the outer one, the one that leaves the smallest circle largest is
+    outside while E_C is minimised (`outside_while_minimised`; the energy history is that of this
+    domain), and a Moebius map brings the outer one out; folds are mended with the boundary kept
+    (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
@@ -62,16 +65,21 @@ def direct_cem_holes(
     held = weights if gauge == "triangle" and not chart else start.outer_measure
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
-    uv = bordered.harmonic_extension(domain.points)
+    steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
+    uv, walked = gauge_walk(
+        S, domain, bordered.harmonic_extension, partial(mean_angle_error, mesh), steps
+    )
+    energies = found.energies if chart else found.energies + walked[1:]
     folded = flipped_triangles(mesh, uv)
     uv, repairs = interior_without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
+        "gauge_steps": len(walked[1:]),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
         "outside_while_minimised": int(longest[0] if not chart else holes[chart - 1][0]),
         "folded_before_repair": folded,
         "fold_repairs": repairs,
     }
-    return Parameterization(uv, len(found.energies) - 1, found.energies, extras)
+    return Parameterization(uv, len(energies) - 1, energies, extras)

@@ -60,6 +60,11 @@ def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:
     return np.abs(corner_angles(mesh.V, mesh.F) - corner_angles(uv, mesh.F))
 
 
+def mean_angle_error(mesh: TriangleMesh, uv: Complex) -> float:
+    """By how many degrees does a corner's angle change in the mean (Table 4)?"""
+    return float(angle_errors(mesh, uv).mean())
+
+
 def flipped_triangles(mesh: TriangleMesh, uv: Complex) -> int:
     """How many triangles are folded over or collapsed: image area not positive?"""
     return int(np.count_nonzero(~(signed_areas(uv, mesh.F) > 0)))

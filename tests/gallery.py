@@ -107,3 +107,10 @@ def three_holes(faces=1200):
 
 #: Centres and radii of three holes in the unit disk.
 THREE_HOLES = ((0.45 + 0.1j, -0.3 + 0.4j, -0.15 - 0.45j), (0.2, 0.15, 0.25))
+
+
+def hill_in_a_corner(rows=8, columns=14):
+    """A flat rectangle with a hill near a corner: few boundary vertices for what they hold."""
+    V, F = flat_rectangle(rows, columns)
+    V[:, 2] = 8 * np.exp(-((V[:, 0] - 3) ** 2 + (V[:, 1] - 3) ** 2) / 4)
+    return V, F

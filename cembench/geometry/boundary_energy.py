@@ -15,7 +15,7 @@ So they are held fixed by a *gauge*: weights w, 1 in sum, for which sum w z = 0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -60,14 +60,6 @@ class Minimum:
     reason: str
     products: int
     held_arcs: int
-
-    def followed_by(self, other: Minimum) -> Minimum:
-        """Both as one, or only the first where the other, begun elsewhere, is no lower."""
-        lower = tuple(energy for energy in other.energies if energy < self.energies[-1])
-        if not lower or lower[-1] != other.energies[-1]:
-            return self
-        energies, products = self.energies + lower, self.products + other.products
-        return replace(other, energies=energies, products=products)
 
 
 def minimise(
@@ -121,11 +113,11 @@ def minimise(
     return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
 
 
-def leashed(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> CircleDomain:
-    """Which Moebius image of a disk's boundary, |a| <= `leash`, has the least energy?
+def moebius_descent(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> complex:
+    """Which Moebius map z -> (z - a) / (1 - conj(a) z), |a| <= `leash`, lowers the energy most?
 
-    By the second-order model of E_C in a: the map z -> (z - a) / (1 - conj(a) z) moves z by
-    -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + .... The domain itself where that leads no lower.
+    By the second-order model of E_C in a: z moves by -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3
+    + ....
     """
     here = EnergyModel(S, domain, np.zeros(len(domain.arcs)))
     z, G = domain.points, here.residual
@@ -146,9 +138,7 @@ def leashed(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> Circle
             outside = np.linalg.norm(along / (curvatures + middle)) > 1
             low, high = (middle, high) if outside else (low, middle)
         low = high
-    a = -leash * complex(*(axes @ (along / (curvatures + low))))
-    image = domain.through(a)
-    return image if EnergyModel(S, image, here.weights).energy < here.energy else domain
+    return -leash * complex(*(axes @ (along / (curvatures + low))))
 
 
 def _tried(here: EnergyModel, step: Real, weights: Real) -> EnergyModel | None:

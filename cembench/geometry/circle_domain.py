@@ -164,6 +164,10 @@ class CircleDomain:
         turns = self.turns + self.sums(angle - ahead) / np.array(self.sizes)
         return replace(moved, turns=turns)
 
+    def towards(self, other: CircleDomain, share: float) -> CircleDomain:
+        """The domain on this share of the way to the arcs of another one, on the same circles."""
+        return replace(self, arcs=(1 - share) * self.arcs + share * other.arcs)
+
     def through(self, a: complex) -> CircleDomain:
         """Where does the Moebius map (z - a) / (1 - conj(a) z) of the disk take this domain?"""
         return self._image(Moebius(1, -a, -np.conj(a), 1), self.outer) if a else self

@@ -1,0 +1,48 @@
+import numpy as np
+import pytest
+
+from cembench import DiskMesh
+from cembench.geometry.bordered import BorderedLaplacian
+from cembench.geometry.circle_domain import CircleDomain
+from cembench.geometry.gauge_walk import LEAST_GAIN, STEPS, gauge_walk
+from cembench.geometry.harmonic import edge_lengths
+from cembench.geometry.laplacian import laplacian
+from cembench.metrics import all_metrics
+from tests import gallery
+
+
+@pytest.fixture(scope="module")
+def hill():
+    mesh = DiskMesh.from_arrays(*gallery.hill_in_a_corner())
+    bordered = BorderedLaplacian(mesh, laplacian(mesh), (mesh.boundary,))
+    domain = CircleDomain.of_arcs(edge_lengths(mesh, mesh.boundary))
+    return mesh, bordered, bordered.dirichlet_to_neumann(), domain
+
+
+def test_energy_falls_while_angles_stay(hill):
+    mesh, bordered, S, domain = hill
+    uv, energies = gauge_walk(S, domain, bordered.harmonic_extension, lambda uv: 1.0)
+    assert 1 < len(energies) <= STEPS + 1
+    assert (-np.diff(energies) > LEAST_GAIN * np.array(energies[:-1])).all()
+    assert energies[-1] == pytest.approx(all_metrics(mesh, uv)["conformal_energy"], rel=1e-9)
+
+
+@pytest.mark.parametrize("growth", [0.01, np.nan])
+def test_it_stays_where_angles_would_suffer(hill, growth):
+    _, bordered, S, domain = hill
+    errors = iter([1.0, 1.0 + growth])
+    uv, energies = gauge_walk(S, domain, bordered.harmonic_extension, lambda uv: next(errors))
+    assert len(energies) == 1
+    np.testing.assert_array_equal(uv, bordered.harmonic_extension(domain.points))
+
+
+def test_no_angle_is_measured_where_there_is_nothing_to_gain():
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(6, 6))
+    bordered = BorderedLaplacian(mesh, laplacian(mesh), (mesh.boundary,))
+    domain = CircleDomain.of_arcs(np.ones(len(mesh.boundary)))  # symmetric: no Moebius map helps
+
+    def measured(uv):
+        raise AssertionError("not asked for")
+
+    S = bordered.dirichlet_to_neumann()
+    assert len(gauge_walk(S, domain, bordered.harmonic_extension, measured)[1]) == 1
