@@ -25,7 +25,7 @@ from cembench.geometry.gauge_walk import STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.metrics import flipped_triangles, mean_angle_error
+from cembench.metrics import flipped_triangles, sampled_angle_error
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -87,7 +87,7 @@ def direct_cem(
         energies += (EnergyModel(S, domain, held).energy,)
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
     uv, walked = gauge_walk(
-        S, domain, bordered.harmonic_extension, partial(mean_angle_error, mesh), steps
+        S, domain, bordered.harmonic_extension, partial(sampled_angle_error, mesh), steps
     )
     energies += walked[1:]
     folded = flipped_triangles(mesh, uv)

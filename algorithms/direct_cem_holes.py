@@ -18,7 +18,7 @@ from cembench.geometry.gauge_walk import STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import HoledMesh
-from cembench.metrics import flipped_triangles, mean_angle_error
+from cembench.metrics import flipped_triangles, sampled_angle_error
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -67,7 +67,7 @@ def direct_cem_holes(
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
     uv, walked = gauge_walk(
-        S, domain, bordered.harmonic_extension, partial(mean_angle_error, mesh), steps
+        S, domain, bordered.harmonic_extension, partial(sampled_angle_error, mesh), steps
     )
     energies = found.energies if chart else found.energies + walked[1:]
     folded = flipped_triangles(mesh, uv)

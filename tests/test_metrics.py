@@ -4,16 +4,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cembench import DiskMesh, HoledMesh
+from cembench import DiskMesh, HoledMesh, metrics
 from cembench.metrics import (
     all_metrics,
     angle_errors,
     boundary_circles,
     corner_angles,
     dilatations,
+    sampled_angle_error,
 )
 from meshes_gen.flat_disk import flat_disk
 from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from meshes_gen.spherical_cap import spherical_cap
 from tests import gallery
 
 
@@ -139,3 +141,15 @@ def test_circularity_of_an_ellipse_and_of_a_point():
     assert inner.circularity == pytest.approx(0.1, rel=0.1)
     uv[hole] = 0
     assert boundary_circles(mesh, uv)[1].circularity == np.inf
+
+
+def test_a_sample_of_the_angle_errors_is_the_mean_of_small_meshes_and_near_it_on_large_ones(
+    monkeypatch,
+):
+    mesh = spherical_cap(6000)
+    uv = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    mean = angle_errors(mesh, uv).mean()
+    assert sampled_angle_error(mesh, uv) == pytest.approx(mean)
+    monkeypatch.setattr(metrics, "SAMPLE", 500)
+    assert sampled_angle_error(mesh, uv) != mean
+    assert sampled_angle_error(mesh, uv) == pytest.approx(mean, rel=0.1)

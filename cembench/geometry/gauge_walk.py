@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.clock import phase
 from cembench.geometry.boundary_energy import EnergyModel, moebius_descent
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
@@ -65,9 +66,10 @@ def gauge_walk(
         gain = 1 - energy / energies[-1] if energies[-1] > ROUNDING else 0.0
         if not gain > LEAST_GAIN:
             break
-        error = angle_error(uv) if error is None else error
         uv_there = extended(there.points)
-        error_there = angle_error(uv_there)
+        with phase("gauge"):
+            error = angle_error(uv) if error is None else error
+            error_there = angle_error(uv_there)
         if not gain * error > ANGLE_WEIGHT * (error_there - error):
             break
         domain, uv, error = there, uv_there, error_there
