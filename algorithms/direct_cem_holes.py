@@ -42,7 +42,7 @@ def direct_cem_holes(
 
     As `direct-cem`, without its way back, with the centre and the radius of every hole as further
     unknowns; the holes are open in every step, and their circles exact. The outer boundary is that
-    of the vertex `outer`, or the longest. Decided here: the start fills the holes with fans and
+    of the vertex `outer`, or the longest. Decided here: the start fills the holes with disks and
     takes circles of the images' centroids and areas; where one of these has a radius below 1e-3,
     each boundary is tried as the outer one, the one that leaves the smallest circle largest is
     outside while E_C is minimised (`outside_while_minimised`; the energy history is that of this

@@ -283,15 +283,7 @@ def run(
     from cembench.paper.profiles import algorithms_of, surfaces_of
     from cembench.registry import load_registry
     from cembench.running.local import Options
-    from cembench.running.plan import (
-        How,
-        generate_surface,
-        mesh_files,
-        plan_cells,
-        read_mesh_for,
-        standing_of,
-        standing_of_file,
-    )
+    from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
     from cembench.store import Store
 
     policies = _policies(solves)
@@ -308,13 +300,7 @@ def run(
             "`cembench fetch`) or --surfaces NAME (see `cembench list surfaces`)."
         )
     with err.status("reading surfaces", spinner="line"):
-        found = [read_mesh_for(path, chosen) for path in files]
-        standing = {
-            mesh.name: standing_of_file(registry, path, mesh)
-            for path, mesh in zip(files, found, strict=True)
-        }
-        found += [generate_surface(registry, name, faces) for name in dict.fromkeys(generated)]
-    standing |= standing_of(registry, generated)
+        found, standing = gather_surfaces(registry, chosen, files, generated, faces)
     tasks = []
     for policy in policies:
         how = How(policy, _installed(backend), threads, repeats)

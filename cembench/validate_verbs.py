@@ -127,21 +127,13 @@ def _chosen(
 ) -> tuple[list[TriangleMesh], dict[str, Standing]]:
     """The surfaces that the user names, none for the usual ones; and what they stand for."""
     from cembench.paper.profiles import surfaces_of
-    from cembench.running.plan import (
-        How,
-        generate_surface,
-        mesh_files,
-        plan_cells,
-        read_mesh_for,
-        standing_of,
-    )
+    from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
 
     files = [*files, *(file for folder in folders for file in mesh_files(folder))]
     names = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
-    found = [read_mesh_for(path, [algorithm]) for path in files]
-    found += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
+    found, standing = gather_surfaces(registry, [algorithm], files, names, faces)
     plan_cells([algorithm], found, {}, How())  # complains now of what it could not run on later
-    return found, standing_of(registry, names)
+    return found, standing
 
 
 @contextmanager

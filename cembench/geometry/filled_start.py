@@ -1,7 +1,7 @@
 """A start for maps to the disk with circular holes: the holes are filled, then circles are fitted.
 
-A hole is filled with a fan over a regular place: its vertices on a circle, in proportion to edge
-length, joined to the centre. That takes the condensed Laplacian of the fan, no new mesh.
+A hole is filled with a round disk, its vertices on the rim in proportion to edge length. That adds
+a small dense block, no mesh.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cembench.geometry.circle_domain import LEAST_SHARE, CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.patches import disk_patch
 from cembench.geometry.planar import backward_arcs, polygon_area
 
 Real = NDArray[np.float64]
@@ -22,25 +23,6 @@ Complex = NDArray[np.complex128]
 ROOM = 0.45
 #: With circles smaller than this, other loops are tried as the outer one.
 CROWDED = 1e-3
-
-
-def fan(lengths: Real) -> Real:
-    """Which Laplacian on a hole's vertices (k, k) has a fan from the centre of a circle?
-
-    The vertices lie on the circle, `lengths` (k,) in proportion apart; the centre is eliminated.
-    """
-    arcs = lengths * (2 * np.pi / lengths.sum())
-    k = np.arange(len(arcs))
-    # Isosceles triangles: half the cotangents of the base angles, and of the angle at the centre.
-    base = 0.5 / np.tan((np.pi - np.minimum(arcs, 0.9 * np.pi)) / 2)
-    apex = 0.5 / np.tan(np.minimum(arcs, 0.9 * np.pi))
-    spokes = base + np.roll(base, 1)
-    L = np.zeros((len(arcs), len(arcs)))
-    after = np.roll(k, -1)
-    np.add.at(L, (k, after), -apex)
-    np.add.at(L, (after, k), -apex)
-    L[k, k] += apex + np.roll(apex, 1) + spokes
-    return L - np.outer(spokes, spokes) / spokes.sum()
 
 
 def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> CircleDomain:
@@ -83,7 +65,8 @@ def filled_start(
     filled = columns[inner]
     for k in np.unique(loop[inner]):
         here = np.flatnonzero(loop[inner] == k)
-        filled[np.ix_(here, here)] += fan(lengths[k])
+        arcs_here = lengths[k] * (2 * np.pi / lengths[k].sum())
+        filled[np.ix_(here, here)] += disk_patch(np.cumsum(arcs_here) - arcs_here)
     to_holes = np.linalg.solve(filled, columns[rim].T)  # minus the harmonic extension
     # What the open holes would swallow goes on to the outer boundary.
     measure = seen[rim] - seen[inner] @ to_holes

@@ -158,6 +158,23 @@ def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
     return read_mesh(path, kinds[0])
 
 
+def gather_surfaces(
+    registry: Registry,
+    algorithms: Sequence[Algorithm],
+    files: Sequence[Path],
+    names: Sequence[str],
+    faces: int | None = None,
+) -> tuple[list[TriangleMesh], dict[str, Standing]]:
+    """Read these files, generate these surfaces; and which rows of the paper do they stand for?"""
+    found = [read_mesh_for(path, algorithms) for path in files]
+    standing = {
+        mesh.name: standing_of_file(registry, path, mesh)
+        for path, mesh in zip(files, found, strict=True)
+    }
+    found += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
+    return found, standing | standing_of(registry, names)
+
+
 def mesh_files(folder: Path) -> list[Path]:
     """The mesh files of a folder, by name.
 

@@ -5,7 +5,6 @@ from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.filled_start import (
     CROWDED,
     arcs_of_measure,
-    fan,
     filled_start,
     widest_start,
 )
@@ -56,16 +55,6 @@ def test_down_a_tube_another_loop_is_outside_at_first():
     assert chosen.outer != 0
     assert chosen.radii.min() > 10 * first.radii.min()
     assert chosen.apart
-
-
-def test_a_fan_is_a_laplacian_of_the_disk_it_fills():
-    lengths = np.random.default_rng(0).random(40) + 0.5
-    L = fan(lengths)
-    np.testing.assert_allclose(L.sum(axis=1), 0, atol=1e-12)
-    assert np.linalg.eigvalsh(L)[0] > -1e-12
-    angle = np.concatenate([[0], np.cumsum(lengths)[:-1]]) * 2 * np.pi / lengths.sum()
-    for f in (np.cos(angle), np.sin(angle)):  # x and y have the disk's area as energy, 2 E_D = pi
-        assert abs(f @ L @ f / np.pi - 1) < 0.02
 
 
 def test_even_harmonic_measure_gives_arcs_in_proportion_to_length():

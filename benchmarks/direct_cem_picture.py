@@ -1,6 +1,6 @@
 """Draw docs/direct_cem.png: beads on a ring, and how fast two methods let them slide into place.
 
-python docs/direct_cem_picture.py
+python benchmarks/direct_cem_picture.py
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import matplotlib.pyplot as plt
 
 
 def main() -> None:
-    """Draw both panels and write the file beside this one."""
+    """Draw both panels and write the picture of the page."""
     mesh = hemi_ellipsoid(3000, x=2.5)
     start, end = direct_cem(mesh, max_iterations=0), direct_cem(mesh)
     by_length = np.exp(2j * np.pi * travelled(mesh.V[mesh.boundary]))
@@ -50,7 +50,7 @@ def main() -> None:
     fall.legend(frameon=False)
     fall.grid(alpha=0.3)
     figure.tight_layout()
-    figure.savefig(Path(__file__).with_name("direct_cem.png"), dpi=140, metadata={"Software": ""})
+    figure.savefig(PICTURE, dpi=140, metadata={"Software": ""})
     print(f"start {start.energy_history[0]:.6f}, end {end.energy_history[-1]:.6f}")
 
 
@@ -61,6 +61,7 @@ def travelled(loop: np.ndarray) -> np.ndarray:
 
 
 #: Energies are drawn down to here.
+PICTURE = Path(__file__).parents[1] / "docs" / "direct_cem.png"
 FLOOR = 1e-12
 ARROW = {"arrowstyle": "-", "color": "tab:red", "lw": 0.6, "alpha": 0.7}
 
