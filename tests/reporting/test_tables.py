@@ -3,6 +3,7 @@ import pytest
 from cembench import paper
 from cembench.reporting.content import averages
 from cembench.reporting.content.beside import significant
+from cembench.reporting.content.evidence import Evidence
 from cembench.reporting.content.other_targets import other_targets
 from cembench.reporting.content.policies import policies_table
 from cembench.reporting.content.table_1 import table_1
@@ -10,6 +11,8 @@ from cembench.reporting.content.table_2 import averages_table, measured_rates, t
 from cembench.reporting.content.table_3 import table_3
 from cembench.reporting.content.table_4 import table_4
 from cembench.reporting.document import marked
+from meshes_gen.spherical_cap import spherical_cap
+from tests.reporting.small_run import ok, record, write_run
 
 
 def by_name(tables):
@@ -134,3 +137,23 @@ def test_both_ways_of_solving_stand_side_by_side(evidence):
 )
 def test_seconds_have_three_digits_that_count(number, text):
     assert significant(number) == text
+
+
+def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
+    store = write_run(tmp_path, policies=("reuse",))
+    model = spherical_cap(300)
+    for algorithm, seconds in (("cem", 1.0), ("ldm", 8.0)):
+        outcome, uv = ok(algorithm, model, seconds)
+        one = record(algorithm, model, "Liu's Neutral Face", "reuse", outcome)
+        facts = one.mesh.model_copy(update={"origin": "model"})
+        store.save(one.model_copy(update={"mesh": facts}), uv, {"id": "machine", "cpu": "x"})
+    evidence = Evidence.of(tmp_path)
+    assert [s.name for s in evidence.models if s not in evidence.one_each] == ["spherical-cap"]
+    assert evidence.standing_for("Liu's Neutral Face").origin == "model"
+    rates, models = measured_rates(evidence, "ldm", "reuse")
+    assert dict(zip(models, rates, strict=True))["Liu's Neutral Face"] == pytest.approx(7.0)
+    assert len(models) == len(set(models)) == 2
+    table = by_name(table_2(evidence))["table-2"]
+    assert len(table.rows) - table.footer_rows == 3
+    _, counted = entry(table, "n, surfaces counted", "LDM", "here")
+    assert counted.number == 2

@@ -116,7 +116,8 @@ def table_beside(
 ) -> Table:
     """One row a surface, two columns a quantity that the paper prints, one for others.
 
-    Footers are taken over each column on its own; a last line says over how many numbers.
+    Footers are taken over each column on its own, each of the paper's models counting once; a last
+    line says over how many numbers.
     """
     columns = [Column("surface", numeric=False), Column("faces")]
     for quantity in quantities:
@@ -124,7 +125,8 @@ def table_beside(
             columns.append(Column("printed", quantity.heading))
         columns.append(Column("here", quantity.heading))
     rows = [_row(evidence, surface, quantities, policy) for surface in surfaces]
-    last = _footer_rows(rows, len(columns), footers)
+    counted = [r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.set_aside]
+    last = _footer_rows(counted, len(columns), footers)
     remarks = [*notes, *_remarks(columns, rows), *_sizes(surfaces)]
     return Table(
         name=name,

@@ -141,9 +141,21 @@ class Evidence:
         """The surfaces that are, or stand for, models of the paper."""
         return tuple(s for s in self.surfaces if s.paper_row)
 
+    @cached_property
+    def one_each(self) -> tuple[SurfaceFacts, ...]:
+        """One surface for each model of the paper: the model itself before what stands for it."""
+        real_first = sorted(self.models, key=lambda s: s.origin != "model")
+        chosen = {s.paper_row: s for s in reversed(real_first)}
+        return tuple(s for s in self.models if chosen[s.paper_row] is s)
+
+    @cached_property
+    def set_aside(self) -> tuple[SurfaceFacts, ...]:
+        """The stand-ins that averages leave out, since the run has the model or another one."""
+        return tuple(s for s in self.models if s not in self.one_each)
+
     def standing_for(self, model: str) -> SurfaceFacts | None:
-        """The first surface that is, or stands for, this model of the paper; None if none does."""
-        return next((s for s in self.models if s.paper_row == model), None)
+        """The surface that is, or stands for, this model of the paper; None if none does."""
+        return next((s for s in self.one_each if s.paper_row == model), None)
 
     @property
     def others(self) -> tuple[SurfaceFacts, ...]:
