@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -25,7 +24,7 @@ from cembench.geometry.gauge_walk import STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.metrics import flipped_triangles, sampled_angle_error
+from cembench.metrics import SampledAngleError, flipped_triangles
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -86,9 +85,7 @@ def direct_cem(
         domain = in_gauge(domain.towards(start, share), held)
         energies += (EnergyModel(S, domain, held).energy,)
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(
-        S, domain, bordered.harmonic_extension, partial(sampled_angle_error, mesh), steps
-    )
+    uv, walked = gauge_walk(S, domain, bordered.harmonic_extension, SampledAngleError(mesh), steps)
     energies += walked[1:]
     folded = flipped_triangles(mesh, uv)
     uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -18,7 +17,7 @@ from cembench.geometry.gauge_walk import STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import HoledMesh
-from cembench.metrics import flipped_triangles, sampled_angle_error
+from cembench.metrics import SampledAngleError, flipped_triangles
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -66,9 +65,7 @@ def direct_cem_holes(
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(
-        S, domain, bordered.harmonic_extension, partial(sampled_angle_error, mesh), steps
-    )
+    uv, walked = gauge_walk(S, domain, bordered.harmonic_extension, SampledAngleError(mesh), steps)
     energies = found.energies if chart else found.energies + walked[1:]
     folded = flipped_triangles(mesh, uv)
     uv, repairs = interior_without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)

@@ -6,12 +6,12 @@ from scipy.spatial.transform import Rotation
 
 from cembench import DiskMesh, HoledMesh, metrics
 from cembench.metrics import (
+    SampledAngleError,
     all_metrics,
     angle_errors,
     boundary_circles,
     corner_angles,
     dilatations,
-    sampled_angle_error,
 )
 from meshes_gen.flat_disk import flat_disk
 from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
@@ -149,7 +149,7 @@ def test_a_sample_of_the_angle_errors_is_the_mean_of_small_meshes_and_near_it_on
     mesh = spherical_cap(6000)
     uv = mesh.V[:, 0] + 1j * mesh.V[:, 1]
     mean = angle_errors(mesh, uv).mean()
-    assert sampled_angle_error(mesh, uv) == pytest.approx(mean)
+    assert SampledAngleError(mesh)(uv) == pytest.approx(mean)
     monkeypatch.setattr(metrics, "SAMPLE", 500)
-    assert sampled_angle_error(mesh, uv) != mean
-    assert sampled_angle_error(mesh, uv) == pytest.approx(mean, rel=0.1)
+    assert SampledAngleError(mesh)(uv) != mean
+    assert SampledAngleError(mesh)(uv) == pytest.approx(mean, rel=0.1)
