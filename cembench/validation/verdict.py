@@ -128,15 +128,20 @@ def _ratio_words(found: Sides) -> str:
     return f"{words}, too few surfaces for an interval"
 
 
+def _times(ratio: float, low: float, high: float, words: str) -> str:
+    """One digit after the point, two where one would say 1.0."""
+    digits = 1 if ratio >= 1.15 else 2
+    return f"{ratio:.{digits}f} times {words} ({low:.{digits}f}-{high:.{digits}f})"
+
+
 def _speed_words(speed: Speed, title: str, *, named: bool) -> str:
     than = f" than {title}" if named else ""
     if speed.low is None or speed.high is None:
         return f"{speed.ratio:.2f} times {title}'s seconds, too few rounds for a verdict"
     if speed.verdict == "faster":
-        sure = f"{1 / speed.high:.1f}-{1 / speed.low:.1f}"
-        return f"{1 / speed.ratio:.1f} times faster{than} ({sure})"
+        return _times(1 / speed.ratio, 1 / speed.high, 1 / speed.low, f"faster{than}")
     if speed.verdict == "slower":
-        return f"{speed.ratio:.1f} times slower{than} ({speed.low:.1f}-{speed.high:.1f})"
+        return _times(speed.ratio, speed.low, speed.high, f"slower{than}")
     return (
         f"neither faster nor slower than {title} for sure "
         f"({speed.low:.2f}-{speed.high:.2f} times its seconds)"

@@ -50,6 +50,11 @@ def test_worse_slower_and_without_a_map():
     )
 
 
+def test_a_small_gain_is_not_called_one_point_zero():
+    quick = against(speed=(0.978, 0.93, 0.998, "faster"))
+    assert "1.02 times faster (1.00-1.08)" in sentence(validation(against=(quick,)))
+
+
 def test_equal_and_undecided():
     same = against(energy=(0, 6, 0, 1.0, 0.998, 1.001), speed=(1.01, 0.97, 1.05, "undecided"))
     assert sentence(validation(against=(same,))) == (
