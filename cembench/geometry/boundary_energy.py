@@ -36,6 +36,9 @@ MODES = 8
 ROUNDING = 1e-16
 #: With more arcs than this held at their least length the boundary is too crowded to go on.
 MOST_HELD = 64
+#: How small CG makes the residual of a Newton step, as a share of the gradient: products are cheap,
+#: and with coarser steps crowded circles need ten times as many of them.
+ACCURACY = 0.01, 0.03
 #: Among radii and centres no curvature counts for less than this share of the largest.
 LEAST_CURVATURE = 1e-12
 #: How near to 0 the gauge brings sum w z, and in how many Newton steps at most.
@@ -94,7 +97,7 @@ def minimise(
             reason = "iterations"
             break
         with phase("boundary step"):
-            accuracy = float(np.clip(here.gradient_norm, 1e-3, 0.3))
+            accuracy = float(np.clip(here.gradient_norm, *ACCURACY))
             step = newton_step(here.gradient, here.hessian, here.precondition, radius, accuracy)
         products += step.products
         if not step.decrease >= ROUNDING * len(weights):
