@@ -82,7 +82,19 @@ def page(browser, address):
             return browser.execute_script(script, *arguments)
 
         def one(self, selector):
-            return browser.find_element(By.CSS_SELECTOR, selector)
+            return self.wait(lambda: self.all(selector))[0]  # a script may yet make it
+
+        def click(self, selector):
+            """Where the thing is once plots above it have been drawn, and the page stays still."""
+            element, places = self.one(selector), []
+            self.run("arguments[0].scrollIntoView({block: 'center'})", element)
+
+            def still():
+                places.append(self.run("return arguments[0].getBoundingClientRect().top", element))
+                return len(places) > 3 and len(set(places[-3:])) == 1
+
+            self.wait(still)
+            element.click()
 
         def all(self, selector):
             return browser.find_elements(By.CSS_SELECTOR, selector)
@@ -123,10 +135,10 @@ def visible(elements):
 def test_the_whole_page_works_without_a_message_or_a_request(page, browser, address):
     page.open()
     page.plot()
-    page.one("figure.plot .modebar-btn[data-title='Zoom in']").click()
-    page.one(".figure-link").click()
+    page.click("figure.plot .modebar-btn[data-title='Zoom in']")
+    page.click(".figure-link")
     page.open("#surface-1")
-    page.one(".page.current .enlarge").click()
+    page.click(".page.current .enlarge")
     assert page.one("#viewer").is_displayed()
 
     assert browser.get_log("browser") == []
@@ -145,7 +157,7 @@ def test_a_plot_is_drawn_and_zooms(page):
     assert not page.one("figure.plot .canvas > img").is_displayed()
     ticks = "return document.querySelector('.drawn').layout.xaxis.range.join()"
     before = page.run(ticks)
-    page.one("figure.plot .modebar-btn[data-title='Zoom in']").click()
+    page.click("figure.plot .modebar-btn[data-title='Zoom in']")
     page.wait(lambda: page.run(ticks) != before)
 
 
@@ -191,20 +203,20 @@ def test_tables_sort_by_value_with_gaps_last_and_footers_in_place(page):
 
 def test_a_number_opens_its_record_and_the_record_has_an_address(page, browser):
     page.open()
-    page.one("#times .figure-link").click()
+    page.click("#times .figure-link")
     record = page.wait(lambda: visible(page.all("#record-shown[open]")))[0]
     assert "Foot · cem" in record.text
     assert "laplacian 0.01" in record.text
     where = browser.current_url.partition("#")
     assert where[2].startswith("record-")
 
-    page.one("#record-shown .close").click()
+    page.click("#record-shown .close")
     page.wait(lambda: not visible(page.all("#record-shown")))
     assert "record-" not in browser.current_url
 
     browser.get("about:blank")
     page.open("#" + where[2])
-    assert "Foot · cem" in page.one("#record-shown").text
+    page.wait(lambda: "Foot · cem" in page.one("#record-shown").text)
 
 
 def test_a_gap_tells_its_cause_to_the_keyboard(page):
@@ -223,9 +235,9 @@ def test_each_surface_has_a_page_with_its_pictures_and_neighbours(page, browser)
     tops = {image.location["y"] for image in page.all("#surface-1 .side-by-side img")[:3]}
     assert len(tops) == 1
 
-    page.one("#surface-1 .after").click()
+    page.click("#surface-1 .after")
     page.wait(lambda: visible(page.all("#surface-2")))
-    page.one("#surface-2 .back").click()
+    page.click("#surface-2 .back")
     page.wait(lambda: visible(page.all("#surfaces")))
     assert not visible(page.all(".page"))
     browser.back()
@@ -234,7 +246,7 @@ def test_each_surface_has_a_page_with_its_pictures_and_neighbours(page, browser)
 
 def test_a_picture_is_enlarged_zoomed_and_compared_in_the_same_window(page):
     page.open("#surface-0")
-    page.one("#surface-0 .enlarge").click()
+    page.click("#surface-0 .enlarge")
     transform = "return document.querySelector('#viewer img').style.transform"
     fitted = page.run(transform)
     viewer = page.one("#viewer")
@@ -248,11 +260,12 @@ def test_a_picture_is_enlarged_zoomed_and_compared_in_the_same_window(page):
 
 def test_claims_are_filtered_by_their_verdict(page):
     page.open()
-    page.one(".tally [data-verdict='holds']").click()
-    shown = visible(page.all(".claim"))
-    assert [claim.get_attribute("data-verdict") for claim in shown] == ["holds"]
-    page.one(".tally [data-verdict='holds']").click()
-    assert len(visible(page.all(".claim"))) == 4
+    page.click(".tally [data-verdict='holds']")
+    page.wait(lambda: len(visible(page.all(".claim"))) == 1)
+    (shown,) = visible(page.all(".claim"))
+    assert shown.get_attribute("data-verdict") == "holds"
+    page.click(".tally [data-verdict='holds']")
+    page.wait(lambda: len(visible(page.all(".claim"))) == 4)
 
 
 def test_a_telephone_scrolls_down_only_and_tables_scroll_within(page):
@@ -271,7 +284,7 @@ def test_a_telephone_scrolls_down_only_and_tables_scroll_within(page):
         == 500
     )
     assert first.location["x"] == left
-    page.one(".menu").click()
+    page.click(".menu")
     assert page.one("#toc").is_displayed()
 
 
@@ -280,7 +293,7 @@ def test_dark_follows_the_system_until_the_reader_chooses_which_is_remembered(pa
     assert page.open().run(background) == "rgb(255, 255, 255)"
     dark = page.open(scheme="dark").run(background)
     assert dark != "rgb(255, 255, 255)"
-    page.one(".theme").click()
+    page.click(".theme")
     assert page.run(background) == "rgb(255, 255, 255)"
     assert page.open(scheme="dark").run(background) == "rgb(255, 255, 255)"
     page.run("localStorage.clear()")
@@ -291,7 +304,7 @@ def test_a_plot_takes_the_colours_of_the_page(page):
     page.open()
     page.plot()
     before = page.run(words)
-    page.one(".theme").click()
+    page.click(".theme")
     page.wait(lambda: page.run(words) != before)
     page.run("localStorage.clear()")
 
@@ -329,6 +342,6 @@ def test_without_javascript_everything_stands_one_under_the_other(page):
 def test_a_surface_named_like_code_stays_a_name(page, browser):
     page.open("#surface-3")
     assert page.one("#surface-3 h2").text == HOSTILE
-    page.one("#surface-3 .enlarge").click()
+    page.click("#surface-3 .enlarge")
     assert HOSTILE in page.one("#viewer p").text
     assert browser.get_log("browser") == []
