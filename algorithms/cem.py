@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
 from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole_start
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.folds import without_folds
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import polygon_area
 from cembench.parameterization import Parameterization
 from cembench.registry import algorithm
 
@@ -47,22 +45,16 @@ def cem(
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
-    L_bi, L_bb = bordered.L_bi, bordered.L_bb
-    ring = Cholesky(L_bb)
+    ring = Cholesky(bordered.L_bb)
 
     def ring_solution(f_i: Complex) -> Complex:
-        return ring.solve(-(L_bi @ f_i))  # Eq. 23
-
-    def energy(f_i: Complex, f_b: Complex) -> float:
-        # f^* L f needs only the boundary rows, since f is harmonic inside.
-        with phase("energy"):
-            return 0.5 * float(np.vdot(f_b, L_bb @ f_b + L_bi @ f_i).real) - polygon_area(f_b)
+        return ring.solve(-(bordered.L_bi @ f_i))  # Eq. 23
 
     f_b, f_i, history, order_kept = iterate_boundary(
         on_circle(pole_start(mesh.V, mesh.F, bordered.solved_boundary)),
         bordered.dirichlet,
         ring_solution,
-        energy,
+        bordered.conformal_energy,
         tolerance=tolerance,
         max_iterations=max_iterations,
         inversion=inversion,

@@ -10,11 +10,7 @@ from pydantic import Field
 
 from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_energy import (
-    EnergyModel,
-    in_gauge,
-    minimise,
-)
+from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
 from cembench.geometry.filled_start import arcs_of_measure
@@ -76,24 +72,24 @@ def direct_cem(
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
     seen, weights = bordered.swept_to_boundary(np.stack([middle, centred], axis=1)).T
     start, begun = _start(mesh, S, seen, weights)
-
     held = weights if gauge == "triangle" else start.outer_measure
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
-    domain, energies = found.domain, found.energies
+    energies = found.energies
     share = _share(back, energies) if begun == "harmonic measure" else 0.0
+    domain = in_gauge(found.domain.towards(start, share), held) if share else found.domain
+    here = EnergyModel(S, domain, held)
     if share:
-        domain = in_gauge(domain.towards(start, share), held)
-        energies += (EnergyModel(S, domain, held).energy,)
+        energies += (here.energy,)
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(S, domain, bordered.harmonic_extension, SampledAngleError(mesh), steps)
-    energies += walked[1:]
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
+    energies += walked
     folded = flipped_triangles(mesh, uv)
     uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
         "start": begun,
-        "gauge_steps": len(walked[1:]),
+        "gauge_steps": len(walked),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
         "folded_before_repair": folded,

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_energy import in_gauge, minimise
+from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
 from cembench.geometry.filled_start import widest_start
 from cembench.geometry.folds import interior_without_folds
 from cembench.geometry.gauge import Gauge, gauge_measure
@@ -65,14 +65,15 @@ def direct_cem_holes(
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(S, domain, bordered.harmonic_extension, SampledAngleError(mesh), steps)
-    energies = found.energies if chart else found.energies + walked[1:]
+    here = EnergyModel(S, domain, weights)
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
+    energies = found.energies if chart else found.energies + walked
     folded = flipped_triangles(mesh, uv)
     uv, repairs = interior_without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
-        "gauge_steps": len(walked[1:]),
+        "gauge_steps": len(walked),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
         "outside_while_minimised": int(longest[0] if not chart else holes[chart - 1][0]),

@@ -24,7 +24,7 @@ from cembench.geometry.boundary_iteration import inverted, on_circle, pole_start
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import backward_arcs, polygon_area
+from cembench.geometry.planar import backward_arcs
 from cembench.geometry.topology import boundary_half_edges, vertex_graph
 
 Real = NDArray[np.float64]
@@ -134,8 +134,7 @@ class BoundaryOperator:
 
     def energy(self, f_i: Complex, f_b: Complex) -> float:
         """E_C (Eq. 7) of a map that is harmonic inside."""
-        dirichlet = 0.5 * float(np.vdot(f_b, self.L_bb @ f_b + self.L_bi @ f_i).real)
-        return dirichlet - polygon_area(f_b)
+        return self._bordered.conformal_energy(f_i, f_b)
 
     def leading_eigenpairs(self, count: int = LEADING) -> tuple[Real, Real]:
         """The largest eigenvalues of K, descending (k,), and eigenvectors (n_b, k), matrix-free."""

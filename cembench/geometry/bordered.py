@@ -16,6 +16,7 @@ from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
 from cembench.geometry.mesh import TriangleMesh
+from cembench.geometry.planar import polygon_area
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -107,6 +108,12 @@ class BorderedLaplacian:
     def dirichlet(self, f_b: Complex) -> Complex:
         """The interior values with L_ii f_i = -L_ib f_b (Eq. 22)."""
         return self.solve_interior(-(self._L_ib @ f_b))
+
+    def conformal_energy(self, f_i: Complex, f_b: Complex) -> float:
+        """E_C (Eq. 7) of a map that is harmonic inside: only the boundary's rows count."""
+        with phase("energy"):
+            dirichlet = 0.5 * float(np.vdot(f_b, self.L_bb @ f_b + self.L_bi @ f_i).real)
+            return dirichlet - polygon_area(f_b)
 
     def dirichlet_to_neumann(self) -> DirichletToNeumann:
         """S = L_bb - L_bi L_ii^-1 L_ib, as its triangular factor."""

@@ -103,7 +103,7 @@ def minimise(
         if not step.decrease >= ROUNDING * len(weights):
             reason = "rounding"
             break
-        there = _tried(here, step.p, weights)
+        there = _tried(here, step.p)
         agreement = (here.energy - there.energy) / step.decrease if there else -np.inf
         if agreement > 0.75 and step.at_edge:
             radius *= 3
@@ -116,14 +116,13 @@ def minimise(
     return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
 
 
-def moebius_descent(S: DirichletToNeumann, domain: CircleDomain, leash: float) -> complex:
+def moebius_descent(here: EnergyModel, leash: float) -> complex:
     """Which Moebius map z -> (z - a) / (1 - conj(a) z), |a| <= `leash`, lowers the energy most?
 
     By the second-order model of E_C in a: z moves by -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3
     + ....
     """
-    here = EnergyModel(S, domain, np.zeros(len(domain.arcs)))
-    z, G = domain.points, here.residual
+    z, G = here.domain.points, here.residual
     fields = np.stack([z**2 - 1, -1j * (z**2 + 1)], axis=1)  # for real and for imaginary a
     bends = [[2 * (z**3 - z), -2j * z**3], [-2j * z**3, -2 * (z**3 + z)]]
     g = leash * np.real(np.conj(fields).T @ G)
@@ -144,13 +143,13 @@ def moebius_descent(S: DirichletToNeumann, domain: CircleDomain, leash: float) -
     return -leash * complex(*(axes @ (along / (curvatures + low))))
 
 
-def _tried(here: EnergyModel, step: Real, weights: Real) -> EnergyModel | None:
+def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:
     """What is the energy where this step leads? None where circles meet, or the gauge is lost."""
     domain = here.moved(step)
     if not domain.apart:
         return None
     try:
-        return EnergyModel(here.S, in_gauge(domain, weights), weights)
+        return here.at(in_gauge(domain, here.weights))
     except AlgorithmFailed:
         return None
 
@@ -191,6 +190,10 @@ class EnergyModel:
         with phase("energy"):
             self.residual = self.residual_of(domain.points)
             self.energy = 0.5 * float(np.vdot(domain.points, self.residual).real)
+
+    def at(self, domain: CircleDomain) -> EnergyModel:
+        """The same at another domain."""
+        return EnergyModel(self.S, domain, self.weights)
 
     def residual_of(self, z: Complex) -> Complex:
         """(S - A'') z for z (B,) or (B, k)."""

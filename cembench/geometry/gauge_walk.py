@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from cembench.clock import phase
 from cembench.geometry.boundary_energy import EnergyModel, moebius_descent
-from cembench.geometry.circle_domain import CircleDomain
-from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
 
 Complex = NDArray[np.complex128]
 
@@ -29,20 +27,17 @@ ROUNDING = 1e-12
 
 
 def gauge_walk(
-    S: DirichletToNeumann,
-    domain: CircleDomain,
+    here: EnergyModel,
     extended: Callable[[Complex], Complex],
     angle_error: Callable[[Complex], float],
     steps: int = STEPS,
 ) -> tuple[Complex, tuple[float, ...]]:
-    """Which Moebius image of this domain has less energy, at hardly any cost to the angles?
+    """Which Moebius image of a domain has less energy, at hardly any cost to the angles?
 
     Parameters
     ----------
-    S : DirichletToNeumann
-        Of the surface.
-    domain : CircleDomain
-        Where its boundary lies.
+    here : EnergyModel
+        At the domain.
     extended : function (B,) -> (n,)
         The harmonic map with given boundary values.
     angle_error : function (n,) -> float
@@ -55,27 +50,22 @@ def gauge_walk(
     uv : complex (n,)
         The map.
     energies : tuple of float
-        E_C of the domain and after each step taken.
+        E_C after each step taken.
 
     """
-    uv, error = extended(domain.points), None
-    energies = [_energy(S, domain)]
+    uv, error = extended(here.domain.points), None
+    energies: tuple[float, ...] = ()
     for _ in range(steps):
-        there = domain.through(moebius_descent(S, domain, LEASH))
-        energy = _energy(S, there)
-        gain = 1 - energy / energies[-1] if energies[-1] > ROUNDING else 0.0
+        there = here.at(here.domain.through(moebius_descent(here, LEASH)))
+        gain = 1 - there.energy / here.energy if here.energy > ROUNDING else 0.0
         if not gain > LEAST_GAIN:
             break
-        uv_there = extended(there.points)
+        uv_there = extended(there.domain.points)
         with phase("gauge"):
             error = angle_error(uv) if error is None else error
             error_there = angle_error(uv_there)
         if not gain * error > ANGLE_WEIGHT * (error_there - error):
             break
-        domain, uv, error = there, uv_there, error_there
-        energies.append(energy)
-    return uv, tuple(energies)
-
-
-def _energy(S: DirichletToNeumann, domain: CircleDomain) -> float:
-    return EnergyModel(S, domain, np.zeros(len(domain.arcs))).energy
+        here, uv, error = there, uv_there, error_there
+        energies += (here.energy,)
+    return uv, energies

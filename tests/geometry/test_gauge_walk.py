@@ -3,6 +3,7 @@ import pytest
 
 from cembench import DiskMesh
 from cembench.geometry.bordered import BorderedLaplacian
+from cembench.geometry.boundary_energy import EnergyModel
 from cembench.geometry.circle_domain import CircleDomain
 from cembench.geometry.gauge_walk import LEAST_GAIN, STEPS, gauge_walk
 from cembench.geometry.harmonic import edge_lengths
@@ -16,12 +17,14 @@ def hill():
     mesh = DiskMesh.from_arrays(*gallery.hill_in_a_corner())
     bordered = BorderedLaplacian(mesh, laplacian(mesh), (mesh.boundary,))
     domain = CircleDomain.of_arcs(edge_lengths(mesh, mesh.boundary))
-    return mesh, bordered, bordered.dirichlet_to_neumann(), domain
+    weights = domain.outer_measure
+    return mesh, bordered, EnergyModel(bordered.dirichlet_to_neumann(), domain, weights)
 
 
 def test_energy_falls_while_angles_stay(hill):
-    mesh, bordered, S, domain = hill
-    uv, energies = gauge_walk(S, domain, bordered.harmonic_extension, lambda uv: 1.0)
+    mesh, bordered, here = hill
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, lambda uv: 1.0)
+    energies = (here.energy, *walked)
     assert 1 < len(energies) <= STEPS + 1
     assert (-np.diff(energies) > LEAST_GAIN * np.array(energies[:-1])).all()
     assert energies[-1] == pytest.approx(all_metrics(mesh, uv)["conformal_energy"], rel=1e-9)
@@ -29,11 +32,11 @@ def test_energy_falls_while_angles_stay(hill):
 
 @pytest.mark.parametrize("growth", [0.01, np.nan])
 def test_it_stays_where_angles_would_suffer(hill, growth):
-    _, bordered, S, domain = hill
+    _, bordered, here = hill
     errors = iter([1.0, 1.0 + growth])
-    uv, energies = gauge_walk(S, domain, bordered.harmonic_extension, lambda uv: next(errors))
-    assert len(energies) == 1
-    np.testing.assert_array_equal(uv, bordered.harmonic_extension(domain.points))
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, lambda uv: next(errors))
+    assert len((here.energy, *walked)) == 1
+    np.testing.assert_array_equal(uv, bordered.harmonic_extension(here.domain.points))
 
 
 def test_no_angle_is_measured_where_there_is_nothing_to_gain():
@@ -44,5 +47,5 @@ def test_no_angle_is_measured_where_there_is_nothing_to_gain():
     def measured(uv):
         raise AssertionError("not asked for")
 
-    S = bordered.dirichlet_to_neumann()
-    assert len(gauge_walk(S, domain, bordered.harmonic_extension, measured)[1]) == 1
+    here = EnergyModel(bordered.dirichlet_to_neumann(), domain, domain.outer_measure)
+    assert len((here.energy, *gauge_walk(here, bordered.harmonic_extension, measured)[1])) == 1
