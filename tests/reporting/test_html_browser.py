@@ -222,7 +222,15 @@ def test_a_number_opens_its_record_and_the_record_has_an_address(page, browser):
 def test_a_gap_tells_its_cause_to_the_keyboard(page):
     page.open()
     page.run("document.querySelector('#times .why').focus()")
+    page.wait(lambda: page.one("#tip").text == "printed as a dash")
+    # The browser scrolls to what has the focus, and tells of it a little later.
+    page.run(
+        "scrollBy(0, 40); addEventListener('scroll', () => setTimeout(() => window.told = 1))"
+    )
+    page.wait(lambda: page.run("return window.told"))
     assert page.one("#tip").text == "printed as a dash"
+    gap, tip = page.boxes("#times .why")[0], page.boxes("#tip")[0]
+    assert min(abs(gap[1] - tip[2]), abs(gap[2] - tip[1])) < 12
 
 
 def test_each_surface_has_a_page_with_its_pictures_and_neighbours(page, browser):

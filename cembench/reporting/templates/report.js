@@ -198,7 +198,9 @@
       if (event.pointerType === "mouse" && owner && !tip.contains(event.relatedTarget)) hide();
     });
     document.addEventListener("focusout", hide);
-    document.addEventListener("scroll", hide, { passive: true, capture: true });
+    // The browser itself scrolls to what the keyboard reaches: that must not take its remark away.
+    const follow = () => { if (owner?.matches(":focus")) show(owner); else hide(); };
+    document.addEventListener("scroll", follow, { passive: true, capture: true });
     document.addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
   }
 
