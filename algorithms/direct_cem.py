@@ -51,18 +51,18 @@ def direct_cem(
     mean vertex, or arc length where that has lower energy (`start`); it is brought into the
     `gauge`, that is, a mean comes to lie at 0: of the boundary by length, of that triangle, or of
     the surface by area; from there Moebius maps are held by the start's arcs. Iteration ends when
-    the gradient's norm, whose square is about twice what E_C can still fall, is at most `tolerance`
-    (`stopped`: "gradient"), when nothing is left but rounding ("rounding"), after `max_iterations`
-    ("iterations"), or when too many arcs would fall below a tenth of their length at the start
-    ("crowded"; `held_arcs` counts those held). Near its minimum E_C is flat, angles are not: so the
-    boundary then goes the share `back` of the way to harmonic measure, whose angles are better on
-    coarse boundaries. Of what E_C fell that costs the share back^2; less of the way is gone where
-    that would be more than 1 % of E_C, and none with 0. With the gauge "boundary" the mean then
-    leaves 0, by 0.05 at a time and five times at most (`gauge_steps`), while E_C falls by 0.2 % at
-    least, and by twenty times the share by which the mean angle error grows. Folds are mended as in
-    CEM (`fold_repairs`). `delaunay` takes the weights of the intrinsic Delaunay triangulation, in
-    the energy history too; `folded_before_repair` then counts the folds that the original edges
-    force, and they stay.
+    the gradient, whose squared norm is about twice what E_C can still fall, says that this is at
+    most the share `tolerance` of E_C (`stopped`: "gradient"), when nothing is left but rounding
+    ("rounding"), after `max_iterations` ("iterations"), or when too many arcs would fall below a
+    tenth of their length at the start ("crowded"; `held_arcs` counts those held). Near its minimum
+    E_C is flat, angles are not: so the boundary then goes the share `back` of the way to harmonic
+    measure, whose angles are better on coarse boundaries. Of what E_C fell that costs the share
+    back^2; less of the way is gone where that would be more than 1 % of E_C, and none with 0. With
+    the gauge "boundary" the mean then leaves 0, by 0.05 at a time and five times at most
+    (`gauge_steps`), while E_C falls by 0.15 % at least, and by twenty times the share by which the
+    mean angle error grows. Folds are mended as in CEM (`fold_repairs`). `delaunay` takes the
+    weights of the intrinsic Delaunay triangulation, in the energy history too;
+    `folded_before_repair` then counts the folds that the original edges force, and they stay.
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))

@@ -31,7 +31,7 @@ from cembench.registry import algorithm
 def direct_cem_holes(
     mesh: HoledMesh,
     *,
-    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-7,
     max_iterations: Annotated[int, Field(ge=0)] = 100,
     gauge: Gauge = "boundary",
     outer: Annotated[int, Field(ge=0)] | None = None,
@@ -59,7 +59,7 @@ def direct_cem_holes(
     with phase("start"):
         lengths = [edge_lengths(mesh, loop) for loop in (longest, *holes)]
         start = widest_start(S, seen, lengths)
-    chart = start.outer
+    chart = start.rims.outer
     start = start if chart else in_gauge(start, weights)
     held = weights if gauge == "triangle" and not chart else start.outer_measure
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)

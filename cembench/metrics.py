@@ -45,18 +45,18 @@ def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
     `points` is (n, 3) in space or complex (n,) in the plane. A triangle whose image is a point
     has angles of zero.
     """
+    a, b, c = (points[F[:, k]] for k in range(3))
+    edges = b - a, c - b, a - c
+    dots = np.empty(F.shape)
     if np.iscomplexobj(points):
-        points = np.stack([points.real, points.imag], axis=1)
-    p = [points[F[:, c]] for c in range(3)]
-    angles = np.empty(F.shape)
-    for c in range(3):
-        u, v = p[(c + 1) % 3] - p[c], p[(c + 2) % 3] - p[c]
-        if u.shape[1] == 2:
-            sine = np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        else:
-            sine = np.linalg.norm(np.cross(u, v), axis=1)
-        angles[:, c] = np.arctan2(sine, np.einsum("td,td->t", u, v))
-    return np.rad2deg(angles)
+        for k in range(3):
+            dots[:, k] = -(edges[k] * np.conj(edges[k - 1])).real
+        double_area = np.abs((edges[0] * np.conj(edges[2])).imag)
+    else:
+        for k in range(3):
+            dots[:, k] = -np.einsum("td,td->t", edges[k], edges[k - 1])
+        double_area = np.linalg.norm(np.cross(edges[0], edges[2]), axis=1)
+    return np.rad2deg(np.arctan2(double_area[:, None], dots))
 
 
 def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:

@@ -15,6 +15,8 @@ So they are held fixed by a *gauge*: weights w, 1 in sum, for which sum w z = 0.
 
 from __future__ import annotations
 
+import math
+import sys
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,7 +44,7 @@ ACCURACY = 0.01, 0.03
 #: Among radii and centres no curvature counts for less than this share of the largest.
 LEAST_CURVATURE = 1e-12
 #: How near to 0 the gauge brings sum w z, and in how many Newton steps at most.
-GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 100
+GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 50
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class Minimum:
 
     `energies` are E_C of the start and after every step; `gradient` is the gradient's norm, whose
     square is about twice what E_C could still fall; `reason` tells what ended it: "gradient" (it is
-    below the tolerance), "rounding" (nothing more to gain in floating point), "iterations", or
+    small enough), "rounding" (nothing more to gain in floating point), "iterations", or
     "crowded" (more than `MOST_HELD` arcs at their least length; then `gradient` is NaN); `products`
     counts those with the Hessian, `held_arcs` the arcs that would have to become shorter than they
     may be for the energy to fall further.
@@ -75,8 +77,8 @@ def minimise(
 ) -> Minimum:
     """Which boundary on circles has the least conformal energy, in the gauge `weights` (B,)?
 
-    Ends when the gradient's norm is at most `tolerance`; never above the energy of the start,
-    which is brought into the gauge first.
+    Ends when E_C can fall by no more than the share `tolerance` of itself; never above the energy
+    of the start, which is brought into the gauge first.
 
     Raises
     ------
@@ -90,7 +92,7 @@ def minimise(
         if len(here.held) > MOST_HELD:
             reason = "crowded"
             break
-        if here.gradient_norm <= tolerance:
+        if here.gradient_norm**2 <= 2 * tolerance * here.energy:
             reason = "gradient"
             break
         if len(energies) > max_iterations:
@@ -98,7 +100,9 @@ def minimise(
             break
         with phase("boundary step"):
             accuracy = float(np.clip(here.gradient_norm, *ACCURACY))
-            step = newton_step(here.gradient, here.hessian, here.precondition, radius, accuracy)
+            step = newton_step(
+                here.gradient, here.uphill, here.hessian, here.precondition, radius, accuracy
+            )
         products += step.products
         if not step.decrease >= ROUNDING * len(weights):
             reason = "rounding"
@@ -123,24 +127,31 @@ def moebius_descent(here: EnergyModel, leash: float) -> complex:
     + ....
     """
     z, G = here.domain.points, here.residual
-    fields = np.stack([z**2 - 1, -1j * (z**2 + 1)], axis=1)  # for real and for imaginary a
-    bends = [[2 * (z**3 - z), -2j * z**3], [-2j * z**3, -2 * (z**3 + z)]]
-    g = leash * np.real(np.conj(fields).T @ G)
+    squared = z * z
+    fields = np.stack([squared - 1, -1j * (squared + 1)], axis=1)  # for real and for imaginary a
+    g = np.real(np.conj(fields).T @ G)
     H = np.real(np.conj(fields).T @ here.residual_of(fields))
-    H = leash**2 * (H + [[float(np.vdot(bend, G).real) for bend in row] for row in bends])
-    curvatures, axes = np.linalg.eigh((H + H.T) / 2)
+    once, cubed = complex(np.vdot(z, G)), complex(np.vdot(squared * z, G))
+    across = -2 * cubed.imag
+    H += [[2 * (cubed - once).real, across], [across, -2 * (cubed + once).real]]
     # In units of the leash: the model's minimum in the unit disk (More and Sorensen 1983).
-    along = axes.T @ g
-    rounding = np.finfo(float).eps * float(np.abs(curvatures).max()) + np.finfo(float).tiny
-    low = max(0.0, -float(curvatures[0])) + rounding
-    high = low + float(np.linalg.norm(g))
-    if np.linalg.norm(along / (curvatures + low)) > 1:
+    curvatures, axes = np.linalg.eigh(leash**2 * (H + H.T) / 2)
+    first, second = map(float, leash * (axes.T @ g))
+    low_curvature, high_curvature = map(float, curvatures)
+
+    def minimum(shift: float) -> tuple[float, float]:
+        return first / (low_curvature + shift), second / (high_curvature + shift)
+
+    rounding = sys.float_info.epsilon * max(map(abs, (low_curvature, high_curvature)))
+    low = max(0.0, -low_curvature) + rounding + sys.float_info.min
+    if math.hypot(*minimum(low)) > 1:
+        high = low + math.hypot(first, second)
         for _ in range(60):
             middle = (low + high) / 2
-            outside = np.linalg.norm(along / (curvatures + middle)) > 1
+            outside = math.hypot(*minimum(middle)) > 1
             low, high = (middle, high) if outside else (low, middle)
         low = high
-    return -leash * complex(*(axes @ (along / (curvatures + low))))
+    return -leash * complex(*(axes @ minimum(low)))
 
 
 def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:
@@ -164,18 +175,36 @@ def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
 
     """
     for _ in range(GAUGE_STEPS):
-        z = domain.points
-        middle, second = complex(weights @ z), complex(weights @ z**2)
-        if abs(middle) < GAUGE_ACCURACY:
+        a = _to_gauge(domain.points, weights)
+        if a == 0:
             return domain
-        # A small a moves sum w z by -a + conj(a) sum w z^2.
-        bottom = 1 - abs(second) ** 2
-        a = (middle + second * np.conj(middle)) / bottom if bottom > 0 else middle
-        domain = domain.through(a * min(1.0, 0.5 / abs(a)))
+        domain = domain.through(a)
+    mean = abs(weights @ domain.points)
     raise AlgorithmFailed(
-        f"no Moebius map of the disk brings the gauge's mean to 0 (it stays at {abs(middle):.2g}): "
+        f"no Moebius map of the disk brings the gauge's mean to 0 (it stays at {mean:.2g}): "
         "a single boundary vertex has too much of the weight. Choose another gauge"
     )
+
+
+def _to_gauge(points: Complex, weights: Real) -> complex:
+    """Which a, 0.5 at most, brings sum w z nearer to 0 by z -> (z - a) / (1 - conj(a) z)?
+
+    By Newton's method on the points alone; 0 where nothing is left to be done.
+    """
+    a, z = 0j, points
+    for _ in range(GAUGE_STEPS):
+        middle, second = complex(weights @ z), complex(weights @ (z * z))
+        if abs(middle) < GAUGE_ACCURACY:
+            break
+        # A small b moves sum w z by -b + conj(b) sum w z^2.
+        bottom = 1 - abs(second) ** 2
+        b = (middle + second * middle.conjugate()) / bottom if bottom > 0 else middle
+        b *= min(1.0, 0.5 / abs(b))
+        a = (a + b) / (1 + a.conjugate() * b)
+        if abs(a) > 0.5:
+            return a * (0.5 / abs(a))
+        z = (points - a) / (1 - a.conjugate() * points)
+    return a
 
 
 class EnergyModel:
@@ -197,66 +226,87 @@ class EnergyModel:
 
     def residual_of(self, z: Complex) -> Complex:
         """(S - A'') z for z (B,) or (B, k)."""
-        domain = self.domain
-        return self.S(z) + 0.5j * (z[domain.following] - z[domain.previous])
+        rims = self.domain.rims
+        return self.S(z) + 0.5j * (z[rims.following] - z[rims.previous])
 
     @cached_property
-    def _holes(self) -> Complex:
+    def _along(self) -> Complex:
+        """Where does dz go as each vertex moves along its circle? Shape (B,)."""
+        return 1j * self.domain.directions
+
+    @cached_property
+    def _holes(self) -> Complex | None:
         """Where does dz go as each radius grows, each centre moves right, and up? (B, 3 holes)."""
-        domain = self.domain
-        inside = domain.loop[:, None] == domain.holes
-        grow = inside * domain.directions[:, None]
+        rims = self.domain.rims
+        if not len(rims.holes):
+            return None
+        inside = rims.loop[:, None] == rims.holes
+        grow = inside * self.domain.directions[:, None]
         return np.concatenate([grow, inside.astype(complex), 1j * inside], axis=1)
 
     def _velocity(self, x: Real) -> Complex:
         """Dz of a step."""
-        B = len(self.domain.arcs)
-        return 1j * self.domain.directions * x[:B] + self._holes @ x[B:]
+        B = len(self._along)
+        moved = self._along * x[:B]
+        return moved if self._holes is None else moved + self._holes @ x[B:]
 
     def _pulled_back(self, u: Complex) -> Real:
         """Re(dz^* u) as a function of the step."""
-        along = np.imag(np.conj(self.domain.directions) * u)
+        along = (self._along.conj() * u).real
+        if self._holes is None:
+            return along
         return np.concatenate([along, np.real(np.conj(self._holes).T @ u)])
 
     def moved(self, x: Real) -> CircleDomain:
         """The domain that a step leads to."""
-        B, K = len(self.domain.arcs), len(self.domain.sizes)
-        growth, shift = np.zeros(K), np.zeros(K, dtype=np.complex128)
-        grown, right, up = np.split(x[B:], 3)
-        growth[self.domain.holes], shift[self.domain.holes] = grown, right + 1j * up
-        return self.domain.moved(x[:B], growth, shift)
+        domain, holes, B = self.domain, self.domain.rims.holes, len(self._along)
+        growth, shift = np.zeros_like(domain.radii), np.zeros_like(domain.centres)
+        grown, right, up = x[B:].reshape(3, -1)
+        growth[holes], shift[holes] = grown, right + 1j * up
+        return domain.moved(x[:B], growth, shift)
 
     @cached_property
     def gradient(self) -> Real:
         """Derivative of E_C along each entry of a step."""
         return self._pulled_back(self.residual)
 
+    @cached_property
+    def _outward(self) -> Real:
+        """How much does the residual point away from the circle's centre, by its radius? (B,)."""
+        return (self.residual.conj() * self.domain.directions).real / self.domain.radius
+
     def hessian(self, x: Real) -> Real:
         """Second derivative of E_C, applied to a step."""
-        domain, B, h = self.domain, len(self.domain.arcs), len(self.domain.holes)
+        domain, rims, B, h = (
+            self.domain,
+            self.domain.rims,
+            len(self._along),
+            len(self.domain.rims.holes),
+        )
         result = self._pulled_back(self.residual_of(self._velocity(x)))
         # d^2 z = exp(i theta) (-dx^2 + 2 i dx dr) / r
-        outward = np.real(np.conj(self.residual) * domain.directions) / domain.radius
-        result[:B] -= outward * x[:B]
+        result[:B] -= self._outward * x[:B]
         if h:
             turning = self.gradient[:B] / domain.radius
             grown = np.zeros(h + 1)
-            grown[domain.holes] = x[B : B + h]
-            result[:B] = result[:B] + turning * grown[domain.loop]
-            result[B : B + h] += domain.sums(turning * x[:B])[domain.holes]
+            grown[rims.holes] = x[B : B + h]
+            result[:B] += turning * grown[rims.loop]
+            result[B : B + h] += rims.sums(turning * x[:B])[rims.holes]
         return result
 
     @cached_property
     def _modes(self) -> tuple[Real, Real]:
         """Fourier modes on the outer circle, and by how much 1 / (|k| - 1) exceeds 1 / |k|."""
         domain, k = self.domain, np.arange(2, MODES + 1)
-        powers = domain.directions[:, None] ** k * (domain.loop == domain.outer)[:, None]
+        base = np.where(domain.rims.on_outer, domain.directions, 0)
+        powers = np.multiply.accumulate(np.broadcast_to(base, (MODES, len(base))))[1:].T
         weights = 1 / (np.pi * k * (k - 1))
         return np.concatenate([powers.real, powers.imag], axis=1), np.tile(weights, 2)
 
     @cached_property
     def _hole_block(self) -> Real:
         """Inverse of the Hessian's block of radii and centres."""
+        assert self._holes is not None
         block = np.real(np.conj(self._holes).T @ self.residual_of(self._holes))
         values, vectors = np.linalg.eigh((block + block.T) / 2)
         values = np.maximum(values, LEAST_CURVATURE * values[-1])
@@ -264,7 +314,7 @@ class EnergyModel:
 
     def _unconstrained(self, g: Real) -> Real:
         """M^-1 g; g (N,) or (N, k)."""
-        B = len(self.domain.arcs)
+        B = len(self._along)
         modes, weights = self._modes
         along = self.S.inverse(g[:B]) + (modes * weights) @ (modes.T @ g[:B])
         if len(g) == B:
@@ -274,12 +324,11 @@ class EnergyModel:
     @cached_property
     def _gauge(self) -> tuple[Real, Real, Real]:
         """Constraints, as :meth:`_constrained` has them: the mean and the outer circle stay."""
-        domain, w = self.domain, self.weights
-        along, holes = w * 1j * domain.directions, w @ self._holes
-        turn = np.concatenate(
-            [(domain.loop == domain.outer) / domain.sizes[domain.outer], np.zeros(len(holes))]
-        )
-        mean = np.concatenate([along, holes])
+        rims, mean = self.domain.rims, self.weights * self._along
+        turn = rims.on_outer / rims.sizes[rims.outer]
+        if self._holes is not None:
+            mean = np.concatenate([mean, self.weights @ self._holes])
+            turn = np.concatenate([turn, np.zeros(self._holes.shape[1])])
         return self._constrained(np.stack([mean.real, mean.imag, turn], axis=1))
 
     def _constrained(self, c: Real) -> tuple[Real, Real, Real]:
@@ -294,10 +343,9 @@ class EnergyModel:
         short = np.flatnonzero(domain.shortest)
         if not len(short):
             return short
-        downhill = -_projected(self._unconstrained(self.gradient), self._gauge)
-        change = domain.sense * (
-            downhill[: len(domain.arcs)][domain.following] - downhill[: len(domain.arcs)]
-        )
+        rims, B = domain.rims, len(domain.arcs)
+        downhill = -_projected(self._unconstrained(self.gradient), self._gauge)[:B]
+        change = rims.sense * (downhill[rims.following] - downhill)
         return short[change[short] < 0]
 
     @cached_property
@@ -307,7 +355,7 @@ class EnergyModel:
             return self._gauge
         c, k = self._gauge[0], np.arange(len(self.held))
         keep = np.zeros((len(c), len(k)))
-        keep[self.domain.following[self.held], k] = 1
+        keep[self.domain.rims.following[self.held], k] = 1
         keep[self.held, k] = -1
         return self._constrained(np.concatenate([c, keep], axis=1))
 
@@ -316,11 +364,15 @@ class EnergyModel:
         return _projected(self._unconstrained(g), self._constraints)
 
     @cached_property
+    def uphill(self) -> Real:
+        """The preconditioned gradient."""
+        with phase("boundary step"):
+            return self.precondition(self.gradient)
+
+    @cached_property
     def gradient_norm(self) -> float:
         """Norm of the gradient on these steps, (g M^-1 g)^(1/2)."""
-        with phase("boundary step"):
-            squared = float(self.gradient @ self.precondition(self.gradient))
-        return max(0.0, squared) ** 0.5
+        return max(0.0, float(self.gradient @ self.uphill)) ** 0.5
 
 
 def _projected(x: Real, constraints: tuple[Real, Real, Real]) -> Real:

@@ -20,6 +20,7 @@ from scipy import sparse
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite, ParameterError
+from cembench.geometry.real_columns import by_real_columns
 
 Solves = Literal["reuse", "backslash"]
 Backend = Literal["cvxopt", "superlu", "pardiso"]
@@ -132,7 +133,7 @@ class Cholesky:
         """A x = b; b (n,) or (n, k), real or complex; x alike."""
         factor = self._kept or _factor(self._how.backend, self._A, None)
         with phase("solves"):
-            return _by_real_columns(factor.solve, b)
+            return by_real_columns(factor.solve, b)
 
     def solve_leading(self, b: NDArray[Any]) -> NDArray[Any]:
         """A[:leading, :leading] x = b; b (leading,) or (leading, k), real or complex; x alike."""
@@ -140,10 +141,10 @@ class Cholesky:
             raise ValueError("solve_leading needs the order of the leading block at construction")
         if self._kept is not None:
             with phase("solves"):
-                return _by_real_columns(self._kept.solve_leading, b)
+                return by_real_columns(self._kept.solve_leading, b)
         factor = self._leading_factor()
         with phase("solves"):
-            return _by_real_columns(factor.solve, b)
+            return by_real_columns(factor.solve, b)
 
     def schur_factor(self) -> NDArray[np.float64]:
         """What is the Cholesky factor of the Schur complement of the leading block?
@@ -181,7 +182,7 @@ class Cholesky:
         k = self._leading
         if self._kept is not None and self._kept.schur_factor() is not None:
             with phase("solves"):
-                return _by_real_columns(self._kept.extended, x)
+                return by_real_columns(self._kept.extended, x)
         return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
 
     def _schur_factor_by_solves(self) -> NDArray[np.float64]:
@@ -256,13 +257,3 @@ class _SeparateFactors:
 
     def extended(self, B: NDArray[np.float64]) -> None:
         """Nor half a solve."""
-
-
-def _by_real_columns(solve: Any, b: NDArray[Any]) -> NDArray[Any]:
-    """Let a solver for real columns (n, k) take vectors and complex numbers too."""
-    columns = b.reshape(len(b), -1)
-    k = columns.shape[1]
-    if np.iscomplexobj(b):
-        x = solve(np.concatenate([columns.real, columns.imag], axis=1))
-        return (x[:, :k] + 1j * x[:, k:]).reshape((-1, *b.shape[1:]))
-    return np.asarray(solve(columns.astype(np.float64, copy=False))).reshape((-1, *b.shape[1:]))

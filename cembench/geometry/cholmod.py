@@ -12,11 +12,11 @@ import numpy as np
 from cvxopt import amd, cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg.blas import dtrmm
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
 from cembench.geometry.supernodes import trailing_block
+from cembench.geometry.triangular import triangle_times
 
 # Codes of `cholmod.solve`: the whole system, and its four steps.
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
@@ -98,7 +98,7 @@ class CholmodFactor:
         x = matrix(np.asfortranarray(B))
         cholmod.solve(self._symbolic, x, sys=_PERMUTE)
         cholmod.solve(self._symbolic, x, sys=_FORWARD)
-        return np.asarray(dtrmm(1.0, C, np.array(x)[self._leading :], lower=1))
+        return triangle_times(C, np.array(x)[self._leading :])
 
     def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """-A_ll^-1 A_lt B for B (n - leading, k): L^T x = (0, C^T B) ends in B."""
@@ -106,7 +106,7 @@ class CholmodFactor:
         if C is None:
             return None
         padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
-        padded[self._leading :] = dtrmm(1.0, C, B, lower=1, trans_a=1)
+        padded[self._leading :] = triangle_times(C, B, transposed=True)
         x = matrix(padded)
         cholmod.solve(self._symbolic, x, sys=_BACKWARD)
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)

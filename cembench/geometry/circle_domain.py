@@ -22,62 +22,26 @@ Indices = NDArray[np.int64]
 
 #: What share of its length at the start every arc keeps, so that no two vertices come together.
 LEAST_SHARE = 0.1
-#: From this arc on (radians) an angle is as exact as what a chord says.
-_WIDE = 1.0
-#: Below this an angle between points of a circle may be rounding.
-_ROUNDING = 1e-9
+#: A half chord below this may belong to a vanishing arc, or to all but the whole circle: that only
+#: where the arc was longer than a radian before.
+_ROUNDING, _WIDE = 1e-9, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class CircleDomain:
-    """The vertices of K boundary loops, B in all, on K circles, one of which is the outer one.
+class Rims:
+    """Which of B boundary vertices lie on which of K circles, loop behind loop; one is outside.
 
     Parameters
     ----------
     sizes : tuple of int
         How many vertices lie on each circle.
-    arcs : float (B,)
-        From each vertex to the next of its loop, radians, positive.
-    turns : float (K,)
-        Angle of each loop's first vertex.
-    centres, radii : complex (K,), float (K,)
-        0 and 1 for the outer circle.
-    least : float (B,)
-        No step makes an arc shorter than this.
     outer : int
         Which is the outer circle.
 
     """
 
     sizes: tuple[int, ...]
-    arcs: Real
-    turns: Real
-    centres: Complex
-    radii: Real
-    least: Real
     outer: int = 0
-
-    @classmethod
-    def of_arcs(cls, arcs: Real) -> CircleDomain:
-        """The unit disk, with such arcs in proportion, all positive, from 1 on; (B,)."""
-        arcs = arcs * (2 * np.pi / arcs.sum())
-        return cls(
-            (len(arcs),), arcs, np.zeros(1), np.zeros(1, complex), np.ones(1), LEAST_SHARE * arcs
-        )
-
-    @property
-    def outer_measure(self) -> Real:
-        """What share of the unit circle belongs to each vertex? Shape (B,), 0 on holes, 1 in sum.
-
-        Nearly the boundary's harmonic measure from what lies at the origin.
-        """
-        share = (self.arcs + self.arcs[self.previous]) / (4 * np.pi)
-        return np.where(self.loop == self.outer, share, 0.0)
-
-    @property
-    def shortest(self) -> NDArray[np.bool_]:
-        """Which arcs are as short as they may be? Shape (B,)."""
-        return self.arcs <= 1.01 * self.least
 
     @cached_property
     def holes(self) -> Indices:
@@ -95,9 +59,14 @@ class CircleDomain:
         return np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     @cached_property
+    def on_outer(self) -> NDArray[np.bool_]:
+        """Which vertices lie on the outer circle? Shape (B,)."""
+        return self.loop == self.outer
+
+    @cached_property
     def following(self) -> Indices:
         """Which vertex comes next on its loop? Shape (B,)."""
-        after = np.arange(1, len(self.arcs) + 1)
+        after = np.arange(1, len(self.loop) + 1)
         after[self.starts + np.array(self.sizes) - 1] = self.starts
         return after
 
@@ -111,33 +80,85 @@ class CircleDomain:
     @cached_property
     def sense(self) -> Real:
         """1 for the vertices of the outer loop, whose angles grow, -1 for the others."""
-        return np.where(self.loop == self.outer, 1.0, -1.0)
-
-    @cached_property
-    def radius(self) -> Real:
-        """The radius of each vertex's circle, shape (B,)."""
-        return self.radii[self.loop]
-
-    @cached_property
-    def directions(self) -> Complex:
-        """exp(i theta), shape (B,)."""
-        along = np.concatenate([[0.0], np.cumsum(self.arcs)[:-1]])
-        along -= along[self.starts][self.loop]
-        return np.exp(1j * (self.turns[self.loop] + self.sense * along))
-
-    @cached_property
-    def points(self) -> Complex:
-        """The boundary's image z, shape (B,)."""
-        return self.centres[self.loop] + self.radius * self.directions
+        return np.where(self.on_outer, 1.0, -1.0)
 
     def sums(self, values: Real) -> Real:
         """Sum over each loop, shape (K,)."""
         return np.asarray(np.add.reduceat(values, self.starts))
 
+    def along(self, arcs: Real) -> Real:
+        """How far round its circle is each vertex from the first of its loop? Radians."""
+        along = np.cumsum(arcs) - arcs
+        return along - along[self.starts][self.loop] if len(self.sizes) > 1 else along
+
+
+@dataclass(frozen=True, eq=False)
+class CircleDomain:
+    """The vertices of K boundary loops, B in all, on K circles, one of which is the outer one.
+
+    Parameters
+    ----------
+    rims : Rims
+        Which vertices lie on which circle.
+    arcs : float (B,)
+        From each vertex to the next of its loop, radians, positive.
+    turns : float (K,)
+        Angle of each loop's first vertex.
+    centres, radii : complex (K,), float (K,)
+        0 and 1 for the outer circle.
+    least : float (B,)
+        No step makes an arc shorter than this.
+
+    """
+
+    rims: Rims
+    arcs: Real
+    turns: Real
+    centres: Complex
+    radii: Real
+    least: Real
+
+    @classmethod
+    def of_arcs(cls, arcs: Real) -> CircleDomain:
+        """The unit disk, with such arcs in proportion, all positive, from 1 on; (B,)."""
+        arcs = arcs * (2 * np.pi / arcs.sum())
+        rims, least = Rims((len(arcs),)), LEAST_SHARE * arcs
+        return cls(rims, arcs, np.zeros(1), np.zeros(1, complex), np.ones(1), least)
+
+    @property
+    def outer_measure(self) -> Real:
+        """What share of the unit circle belongs to each vertex? Shape (B,), 0 on holes, 1 in sum.
+
+        Nearly the boundary's harmonic measure from what lies at the origin.
+        """
+        share = (self.arcs + self.arcs[self.rims.previous]) / (4 * np.pi)
+        return np.where(self.rims.on_outer, share, 0.0)
+
+    @property
+    def shortest(self) -> NDArray[np.bool_]:
+        """Which arcs are as short as they may be? Shape (B,)."""
+        return self.arcs <= 1.01 * self.least
+
+    @cached_property
+    def radius(self) -> Real:
+        """The radius of each vertex's circle, shape (B,)."""
+        return self.radii[self.rims.loop]
+
+    @cached_property
+    def directions(self) -> Complex:
+        """exp(i theta), shape (B,)."""
+        rims = self.rims
+        return np.exp(1j * (self.turns[rims.loop] + rims.sense * rims.along(self.arcs)))
+
+    @cached_property
+    def points(self) -> Complex:
+        """The boundary's image z, shape (B,)."""
+        return self.centres[self.rims.loop] + self.radius * self.directions
+
     @property
     def apart(self) -> bool:
         """Do the circles of the holes lie inside the unit circle and outside each other?"""
-        c, r = self.centres[self.holes], self.radii[self.holes]
+        c, r = self.centres[self.rims.holes], self.radii[self.rims.holes]
         between = np.abs(c[:, None] - c) - (r[:, None] + r)
         np.fill_diagonal(between, np.inf)
         return bool((np.abs(c) + r < 1).all() and (between > 0).all() and (r > 0).all())
@@ -149,20 +170,17 @@ class CircleDomain:
         by `growth` (K,), a centre by `shift` (K,); those of the outer circle are zero. However long
         the step, no arc falls below the `least`, and no radius changes by more than a factor 2.
         """
-        angle = along / self.radius
-        change = self.sense * (angle[self.following] - angle)
+        rims, angle = self.rims, along / self.radius
+        change = rims.sense * (angle[rims.following] - angle)
         arcs = self.arcs * _growth(change / self.arcs)
-        arcs *= (2 * np.pi / self.sums(arcs))[self.loop]
-        spare = np.maximum(arcs - self.least, 0.0)
-        arcs = (
-            self.least + spare * ((2 * np.pi - self.sums(self.least)) / self.sums(spare))[self.loop]
-        )
-        radii = self.radii * np.clip(_growth(growth / self.radii), 0.5, 2.0)
-        moved = replace(self, arcs=arcs, radii=radii, centres=self.centres + shift)
+        arcs *= (2 * np.pi / rims.sums(arcs))[rims.loop]
+        spare, room = np.maximum(arcs - self.least, 0.0), 2 * np.pi - rims.sums(self.least)
+        arcs = self.least + spare * (room / rims.sums(spare))[rims.loop]
         # The first vertex turns so that all together turn as they should.
-        ahead = self.sense * (_along(moved) - _along(self))
-        turns = self.turns + self.sums(angle - ahead) / np.array(self.sizes)
-        return replace(moved, turns=turns)
+        ahead = rims.sense * rims.along(arcs - self.arcs)
+        turns = self.turns + rims.sums(angle - ahead) / np.array(rims.sizes)
+        radii = self.radii * np.clip(_growth(growth / self.radii), 0.5, 2.0)
+        return CircleDomain(rims, arcs, turns, self.centres + shift, radii, self.least)
 
     def towards(self, other: CircleDomain, share: float) -> CircleDomain:
         """The domain on this share of the way to the arcs of another one, on the same circles."""
@@ -170,47 +188,41 @@ class CircleDomain:
 
     def through(self, a: complex) -> CircleDomain:
         """Where does the Moebius map (z - a) / (1 - conj(a) z) of the disk take this domain?"""
-        return self._image(Moebius(1, -a, -np.conj(a), 1), self.outer) if a else self
+        return self._image(Moebius(1, -a, -a.conjugate(), 1), self.rims) if a else self
 
     def inside_out(self, k: int) -> CircleDomain:
         """The same with hole k outside: z goes to r / (z - c), with its centre and radius."""
-        return self._image(Moebius(0, self.radii[k], 1, -self.centres[k]), k)
+        return self._image(
+            Moebius(0, self.radii[k], 1, -self.centres[k]), replace(self.rims, outer=k)
+        )
 
-    def _image(self, phi: Moebius, outer: int) -> CircleDomain:
-        """The image by a Moebius map that takes the circle `outer` to the unit circle.
+    def _image(self, phi: Moebius, rims: Rims) -> CircleDomain:
+        """The image by a Moebius map that takes the outer circle of `rims` to the unit circle.
 
         Circles go to circles; arcs stay as exact as they are, however short.
         """
-        c, r = self.centres, self.radii
-        # The image of a circle has its centre where that goes that the circle reflects to the pole.
-        pole = -phi.d / phi.c
-        centres = phi(c + r**2 / np.conj(pole - c + (pole == c)) * (pole != c))
-        centres[outer] = 0
-        image = phi(self.points)
-        radii = np.abs(image[self.starts] - centres)
-        radii[outer] = 1
-        determinant = abs(phi.a * phi.d - phi.b * phi.c)
-        stretch = determinant / np.abs(phi.c * self.points + phi.d) ** 2
-        chord = 2 * self.radius * np.sin(self.arcs / 2) * np.sqrt(stretch * stretch[self.following])
-        half = np.minimum(chord / (2 * radii[self.loop]), 1.0)
-        turned = (image - centres[self.loop]) / radii[self.loop]
-        moved = replace(
-            self, turns=np.angle(turned[self.starts]), centres=centres, radii=radii, outer=outer
-        )
-        step = (np.angle(turned[self.following] / turned) * moved.sense) % (2 * np.pi)
-        short = (self.arcs < _WIDE) & (half < _WIDE / 2)
-        small = 2 * np.arcsin(half)
-        # A chord belongs to two arcs; rounding may turn one that is nearly 0 into nearly 2 pi.
-        small = np.where((step > np.pi) & (small > _ROUNDING), 2 * np.pi - small, small)
-        arcs = np.where(short, small, step)
-        arcs *= (2 * np.pi / np.add.reduceat(arcs, self.starts))[self.loop]
-        return replace(moved, arcs=arcs, least=self.least * (arcs / self.arcs))
-
-
-def _along(domain: CircleDomain) -> Real:
-    """How far round its circle is each vertex from the first of its loop? Radians."""
-    along = np.concatenate([[0.0], np.cumsum(domain.arcs)[:-1]])
-    return along - along[domain.starts][domain.loop]
+        bottom = phi.c * self.points + phi.d
+        image = turned = (phi.a * self.points + phi.b) / bottom
+        centres, radii = np.zeros_like(self.centres), np.ones_like(self.radii)
+        if len(rims.holes):
+            # An image has its centre where that goes that the circle reflects to the pole.
+            c, r, pole = self.centres, self.radii, -phi.d / phi.c
+            found = phi(c + r**2 / np.conj(pole - c + (pole == c)) * (pole != c))
+            centres[rims.holes] = found[rims.holes]
+            radii[rims.holes] = np.abs(image[rims.starts] - centres)[rims.holes]
+            turned = (image - centres[rims.loop]) / radii[rims.loop]
+        # Half a chord, and its distance from the centre, of which rounding may take the sign.
+        next_turned = turned[rims.following]
+        stretch = np.sqrt(abs(phi.a * phi.d - phi.b * phi.c)) / np.abs(bottom)
+        shrunk = self.radius / radii[rims.loop]
+        sine = shrunk * np.sin(self.arcs / 2) * stretch * stretch[rims.following]
+        cosine = np.abs(next_turned + turned) / 2
+        beyond = (next_turned * np.conj(turned)).imag * rims.sense < 0
+        beyond &= (sine > _ROUNDING) | (self.arcs > _WIDE)
+        arcs = 2 * np.arctan2(sine, np.where(beyond, -cosine, cosine))
+        arcs *= (2 * np.pi / rims.sums(arcs))[rims.loop]
+        least = self.least * (arcs / self.arcs)
+        return CircleDomain(rims, arcs, np.angle(turned[rims.starts]), centres, radii, least)
 
 
 def _growth(t: Real) -> Real:

@@ -10,6 +10,8 @@ from scipy import linalg
 
 from cembench.clock import phase
 from cembench.errors import NotPositiveDefinite
+from cembench.geometry.real_columns import by_real_columns
+from cembench.geometry.triangular import triangle_solved
 
 Real = NDArray[np.float64]
 
@@ -27,7 +29,7 @@ class DenseCholesky:
     def __init__(self, A: Real) -> None:
         with phase("dense factorisation"):
             try:
-                self._factor = linalg.cho_factor(A, lower=True, check_finite=False)
+                self._C, _ = linalg.cho_factor(A, lower=True, check_finite=False)
             except linalg.LinAlgError as error:
                 raise NotPositiveDefinite(
                     f"the dense matrix of order {len(A)} is not positive definite ({error})"
@@ -36,10 +38,7 @@ class DenseCholesky:
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """A x = b, real or complex."""
         with phase("solves"):
-            if np.iscomplexobj(b):  # LAPACK would make a complex copy of the factor
-                return self._solve(b.real) + 1j * self._solve(b.imag)
-            return self._solve(b)
+            return by_real_columns(self._solve, b)
 
-    def _solve(self, b: Real) -> Real:
-        x: Real = linalg.cho_solve(self._factor, b, check_finite=False)
-        return x
+    def _solve(self, B: Real) -> Real:
+        return triangle_solved(self._C, triangle_solved(self._C, B), transposed=True)

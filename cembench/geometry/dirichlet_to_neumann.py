@@ -6,7 +6,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.blas import dtrmm, dtrsm
+
+from cembench.geometry.real_columns import by_real_columns
+from cembench.geometry.triangular import triangle_solved, triangle_times
 
 Real = NDArray[np.float64]
 
@@ -29,32 +31,18 @@ class DirichletToNeumann:
 
     def __call__(self, f: NDArray[Any]) -> NDArray[Any]:
         """S f for f (B,) or (B, k), real or complex."""
-        pinned = (f - f[-1])[:-1]
-        columns = _real_columns(pinned)
-        product = dtrmm(1.0, self._C, columns, lower=1, trans_a=1)
-        product = dtrmm(1.0, self._C, product, lower=1, overwrite_b=1)
-        found = _like(product, pinned)
+        found = by_real_columns(self._product, (f - f[-1])[:-1])
         return np.concatenate([found, -found.sum(axis=0, keepdims=True)])
 
     def inverse(self, g: Real) -> Real:
         """(S + m m^T)^-1 g with m = 1 / B: what inverts S up to its constants; g (B,) or (B, k)."""
         total = g.sum(axis=0)
-        right = _real_columns((g - total / len(g))[:-1])
-        x = dtrsm(1.0, self._C, right, lower=1)
-        x = _like(dtrsm(1.0, self._C, x, lower=1, trans_a=1, overwrite_b=1), g)
+        x = by_real_columns(self._solution, (g - total / len(g))[:-1])
         mean = x.sum(axis=0) / len(g)
         return np.concatenate([x - mean + total, (total - mean)[None]])
 
+    def _product(self, X: Real) -> Real:
+        return triangle_times(self._C, triangle_times(self._C, X, transposed=True))
 
-def _real_columns(f: NDArray[Any]) -> Real:
-    flat = f.reshape(len(f), -1)
-    if np.iscomplexobj(flat):
-        flat = np.concatenate([flat.real, flat.imag], axis=1)
-    return np.array(flat, order="F")
-
-
-def _like(columns: Real, f: NDArray[Any]) -> NDArray[Any]:
-    k = columns.shape[1] // 2
-    if np.iscomplexobj(f):
-        columns = columns[:, :k] + 1j * columns[:, k:]
-    return columns.reshape((len(columns), *f.shape[1:]))
+    def _solution(self, X: Real) -> Real:
+        return triangle_solved(self._C, triangle_solved(self._C, X), transposed=True)

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.geometry.circle_domain import LEAST_SHARE, CircleDomain
+from cembench.geometry.circle_domain import LEAST_SHARE, CircleDomain, Rims
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
 from cembench.geometry.patches import disk_patch
 from cembench.geometry.planar import backward_arcs, polygon_area
@@ -86,7 +86,7 @@ def filled_start(
     holes = np.delete(np.arange(len(sizes)), outer)
     radii[holes] = _with_room(centres[holes], radii[holes])
     centres[outer], radii[outer] = 0, 1
-    return CircleDomain(sizes, arcs, turns, centres, radii, LEAST_SHARE * arcs, outer)
+    return CircleDomain(Rims(sizes, outer), arcs, turns, centres, radii, LEAST_SHARE * arcs)
 
 
 #: Harmonic measure per length is taken for at least this share of its largest value.

@@ -36,4 +36,5 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
 
 def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:
     """Which triangle's barycentre is nearest to the mean vertex? V is (n, 2 or 3); its corners."""
-    return F[np.argmin(((V[F].mean(axis=1) - V.mean(axis=0)) ** 2).sum(axis=1))]
+    off = V[F[:, 0]] + V[F[:, 1]] + V[F[:, 2]] - 3 * V.mean(axis=0)
+    return F[np.argmin(np.einsum("td,td->t", off, off))]

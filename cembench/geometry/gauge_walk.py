@@ -21,7 +21,7 @@ Complex = NDArray[np.complex128]
 LEASH, STEPS = 0.05, 5
 #: A step must lower E_C by this share of itself, and by more than this many times the share by
 #: which the angle error grows.
-LEAST_GAIN, ANGLE_WEIGHT = 0.002, 20
+LEAST_GAIN, ANGLE_WEIGHT = 0.0015, 20
 #: E_C below this is rounding.
 ROUNDING = 1e-12
 

@@ -31,7 +31,13 @@ class Step:
 
 
 def newton_step(
-    g: Real, hessian: Linear, precondition: Linear, radius: float, accuracy: float, most: int = 200
+    g: Real,
+    uphill: Real,
+    hessian: Linear,
+    precondition: Linear,
+    radius: float,
+    accuracy: float,
+    most: int = 200,
 ) -> Step:
     """Which p with |p|_M <= radius makes g p + p H p / 2 small?
 
@@ -39,6 +45,8 @@ def newton_step(
     ----------
     g : (N,)
         Gradient; not zero.
+    uphill : float (N,)
+        M^-1 g.
     hessian, precondition : functions (N,) -> (N,)
         H p, symmetric, and M^-1 r, symmetric positive definite (on a subspace: p stays in it).
     radius : float
@@ -50,7 +58,7 @@ def newton_step(
 
     """
     p, Hp = np.zeros_like(g), np.zeros_like(g)
-    residual, y = g, precondition(g)
+    residual, y = g, uphill
     d = -y
     first = size = float(residual @ y)
     # |p|^2, <p, d> and |d|^2 in the norm of M follow by recurrence, so M itself is not needed.

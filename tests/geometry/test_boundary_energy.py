@@ -12,7 +12,7 @@ from cembench.geometry.boundary_energy import (
     minimise,
     moebius_descent,
 )
-from cembench.geometry.circle_domain import CircleDomain
+from cembench.geometry.circle_domain import CircleDomain, Rims
 from cembench.geometry.laplacian import laplacian
 from cembench.geometry.trust_region import newton_step
 from cembench.metrics import all_metrics
@@ -31,8 +31,8 @@ def ring():
     sizes = tuple(len(loop) for loop in loops)
     arcs = np.concatenate([a / a.sum() * 2 * np.pi for a in (rng.random(k) + 0.5 for k in sizes)])
     centres, radii = np.array([0, 0.1 + 0.2j]), np.array([1, 0.3])
-    domain = CircleDomain(sizes, arcs, rng.random(2), centres, radii, 0.1 * arcs)
-    weights = np.where(domain.loop == 0, 1 / sizes[0], 0)
+    domain = CircleDomain(Rims(sizes), arcs, rng.random(2), centres, radii, 0.1 * arcs)
+    weights = np.where(domain.rims.loop == 0, 1 / sizes[0], 0)
     return mesh, bordered, bordered.dirichlet_to_neumann(), domain, weights
 
 
@@ -53,8 +53,8 @@ def test_gradient_and_hessian_are_the_derivatives_along_a_step(ring):
     def energy(t):
         theta = np.angle(domain.directions) + t * x[:B] / domain.radius
         growth, shift = np.array([0, x[B]]), np.array([0, x[B + 1] + 1j * x[B + 2]])
-        z = (domain.centres + t * shift)[domain.loop]
-        z = z + (domain.radii + t * growth)[domain.loop] * np.exp(1j * theta)
+        z = (domain.centres + t * shift)[domain.rims.loop]
+        z = z + (domain.radii + t * growth)[domain.rims.loop] * np.exp(1j * theta)
         return 0.5 * np.vdot(z, model.residual_of(z)).real
 
     h = 1e-4
@@ -86,10 +86,10 @@ def test_steps_keep_the_gauge(ring):
 
 def test_energy_falls_at_every_step_down_to_a_stationary_point(ring):
     _, _, S, domain, weights = ring
-    found = minimise(S, domain, weights, tolerance=1e-7, max_iterations=50)
+    found = minimise(S, domain, weights, tolerance=1e-14, max_iterations=50)
     assert (np.diff(found.energies) < 0).all()
     assert found.reason == "gradient"
-    assert found.gradient <= 1e-7
+    assert found.gradient**2 <= 2e-14 * found.energies[-1]
     rng = np.random.default_rng(6)
     for _ in range(10):  # nowhere near is it lower
         model = EnergyModel(S, found.domain, weights)
@@ -162,16 +162,17 @@ def test_a_newton_step_solves_a_convex_model_and_stops_at_the_edge():
     rng = np.random.default_rng(8)
     A = rng.standard_normal((6, 6))
     H, g = A @ A.T + np.eye(6), rng.standard_normal(6)
-    whole = newton_step(g, lambda p: H @ p, lambda r: r, 1e3, 1e-12)
+    whole = newton_step(g, g, lambda p: H @ p, lambda r: r, 1e3, 1e-12)
     np.testing.assert_allclose(whole.p, -np.linalg.solve(H, g), rtol=1e-8)
-    short = newton_step(g, lambda p: H @ p, lambda r: r, 0.01, 1e-12)
+    short = newton_step(g, g, lambda p: H @ p, lambda r: r, 0.01, 1e-12)
     assert short.at_edge
     assert np.linalg.norm(short.p) == pytest.approx(0.01)
     assert 0 < short.decrease < whole.decrease
 
 
 def test_a_newton_step_follows_negative_curvature_to_the_edge():
-    step = newton_step(np.array([1.0, 0.1]), lambda p: p * [1, -1], lambda r: r, 2.0, 1e-12)
+    g = np.array([1.0, 0.1])
+    step = newton_step(g, g, lambda p: p * [1, -1], lambda r: r, 2.0, 1e-12)
     assert step.at_edge
     assert np.linalg.norm(step.p) == pytest.approx(2)
     assert step.decrease > 0

@@ -52,7 +52,7 @@ def test_down_a_tube_another_loop_is_outside_at_first():
     S, seen, lengths = pieces(pierced_tube())
     first, chosen = filled_start(S, seen, lengths, 0), widest_start(S, seen, lengths)
     assert first.radii.min() < CROWDED
-    assert chosen.outer != 0
+    assert chosen.rims.outer != 0
     assert chosen.radii.min() > 10 * first.radii.min()
     assert chosen.apart
 

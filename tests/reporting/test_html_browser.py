@@ -224,9 +224,7 @@ def test_a_gap_tells_its_cause_to_the_keyboard(page):
     page.run("document.querySelector('#times .why').focus()")
     page.wait(lambda: page.one("#tip").text == "printed as a dash")
     # The browser scrolls to what has the focus, and tells of it a little later.
-    page.run(
-        "scrollBy(0, 40); addEventListener('scroll', () => setTimeout(() => window.told = 1))"
-    )
+    page.run("scrollBy(0, 40); addEventListener('scroll', () => setTimeout(() => window.told = 1))")
     page.wait(lambda: page.run("return window.told"))
     assert page.one("#tip").text == "printed as a dash"
     gap, tip = page.boxes("#times .why")[0], page.boxes("#tip")[0]

@@ -54,8 +54,8 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause):
 
 def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
     expected = {
-        "sleeps": ("timeout", "not finished after 3 s"),
-        "spins": ("timeout", "not finished after 3 s"),
+        "sleeps": ("timeout", "not finished after 6 s"),
+        "spins": ("timeout", "not finished after 6 s"),
         "hoards": ("out_of_memory", "the limit is 500 MiB"),
         "hoards-in-a-child": ("out_of_memory", "the limit is 500 MiB"),
         "talks": ("ok", None),
@@ -69,7 +69,7 @@ def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
         "harmonic-circle": ("ok", None),
     }
     started = time.monotonic()
-    options = Options(timeout=3, memory_bytes=MEMORY)
+    options = Options(timeout=6, memory_bytes=MEMORY)
     found = run_tasks(tasks_of(*expected), Store(tmp_path), options)
     outcomes = {record.cell.algorithm: record.outcome for record in found}
     assert {name: o.status for name, o in outcomes.items()} == {

@@ -1,0 +1,27 @@
+"""Vectors and complex numbers for what knows only real columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+
+
+def by_real_columns(linear: Callable[[Real], Any], b: NDArray[Any]) -> NDArray[Any]:
+    """What does a linear map of real columns (n, k), in Fortran order, make of b?
+
+    b is (n,) or (n, k), real or complex; so is the result, of as many rows as the map gives.
+    """
+    columns = b.reshape(len(b), -1)
+    k = columns.shape[1]
+    if not np.iscomplexobj(b):
+        x = linear(np.asfortranarray(columns, dtype=np.float64))
+        return np.asarray(x).reshape((-1, *b.shape[1:]))
+    parts = np.empty((len(b), 2 * k), order="F")
+    parts[:, :k], parts[:, k:] = columns.real, columns.imag
+    x = np.asarray(linear(parts))
+    return (x[:, :k] + 1j * x[:, k:]).reshape((-1, *b.shape[1:]))
