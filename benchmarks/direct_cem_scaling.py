@@ -57,6 +57,11 @@ def main() -> None:
         print("cost grows as faces ** " + ", ".join(f"{e:.3f} ({n})" for n, e in exponents.items()))
         more = exponents["direct-cem"] - exponents["factorisation"]
         print(f"direct-cem less factorisation: {more:+.3f}")
+        means = {
+            name: statistics.geometric_mean(one["ratios"][name] for one in found)
+            for name in NAMES[1:]
+        }
+        print("geometric means: " + ", ".join(f"{m:.3f} (/ {n})" for n, m in means.items()))
 
 
 def exponent(found: list[dict[str, object]], name: str) -> float:

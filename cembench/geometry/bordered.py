@@ -67,7 +67,8 @@ class BorderedLaplacian:
             )
         with phase("assembly"):
             order = self._order = np.concatenate([self.interior, self.boundary])
-            self._ordered = sparse.csc_array(sparse.csr_array(L)[order][:, order])
+            # L is symmetric, so nothing need be converted between rows and columns.
+            self._ordered = sparse.csc_array(sparse.csr_array(L.T)[order][:, order].T)
             pinned = self._ordered[:-1, :-1]
         self._whole = Cholesky(pinned, leading=len(self.interior))
 

@@ -33,7 +33,7 @@ class CholmodFactor:
         self._leading = leading
         with phase("ordering"):
             self._lower = _lower_triangle(A)
-            self._permutation = _fill_reducing_order(A, self._lower, leading)
+            self._permutation = _fill_reducing_order(self._lower, leading)
         self._analyse()
         self._factor()
 
@@ -126,10 +126,11 @@ def _lower_triangle(A: sparse.csc_array) -> spmatrix:
     )
 
 
-def _fill_reducing_order(A: sparse.csc_array, lower: spmatrix, leading: int | None) -> matrix:
+def _fill_reducing_order(lower: spmatrix, leading: int | None) -> matrix:
     """Approximate minimum degree; of the leading block alone where there is one."""
     if leading is None:
         return amd.order(lower)
-    first = amd.order(_lower_triangle(A[:leading, :leading])) if leading else matrix(0, (0, 1))
-    last = np.arange(leading, A.shape[0])
-    return matrix(np.concatenate([np.array(first).ravel(), last]), (A.shape[0], 1), "i")
+    n = lower.size[0]
+    first = amd.order(lower[:leading, :leading]) if leading else matrix(0, (0, 1))
+    order = np.concatenate([np.array(first).ravel(), np.arange(leading, n)])
+    return matrix(order, (n, 1), "i")

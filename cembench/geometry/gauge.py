@@ -36,5 +36,6 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
 
 def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:
     """Which triangle's barycentre is nearest to the mean vertex? V is (n, 2 or 3); its corners."""
-    off = V[F[:, 0]] + V[F[:, 1]] + V[F[:, 2]] - 3 * V.mean(axis=0)
+    a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
+    off = a + b + c - 3 * V.mean(axis=0)
     return F[np.argmin(np.einsum("td,td->t", off, off))]

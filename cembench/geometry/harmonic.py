@@ -45,7 +45,7 @@ def harmonic_extension(
     i = np.flatnonzero(free)
     if len(i):
         with phase("assembly"):
-            rows = sparse.csr_array(L)[i]
+            rows = sparse.csr_array(L.T)[i]  # L is symmetric: nothing need be converted
             L_ii, right = rows[:, i], -(rows[:, fixed] @ f[fixed])
         f[i] = Cholesky(L_ii).solve(right)
     return f

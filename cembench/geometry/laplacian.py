@@ -19,12 +19,12 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
 
     V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is that at vertex ``F[t, c]``.
     """
-    a, b, c = (V[F[:, k]] for k in range(3))
+    a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
     # Edges opposite to the corners 0, 1, 2.
     e0, e1, e2 = c - b, a - c, b - a
-    dots = np.stack(
-        [-np.einsum("td,td->t", p, q) for p, q in ((e1, e2), (e2, e0), (e0, e1))], axis=1
-    )
+    dots = np.empty(F.shape)
+    for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
+        np.einsum("td,td->t", p, q, out=dots[:, k])
     # Lagrange's identity through the dot products alone would cancel on slivers.
     if V.shape[1] == 2:
         double_area = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
@@ -33,7 +33,7 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
         y = e1[:, 2] * e2[:, 0] - e1[:, 0] * e2[:, 2]
         z = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
         double_area = np.sqrt(x * x + y * y + z * z)
-    return dots / (2 * double_area[:, None])
+    return dots / (-2 * double_area[:, None])
 
 
 def laplacian_of_weights(
@@ -46,7 +46,9 @@ def laplacian_of_weights(
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
     one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
-    return sparse.csc_array(sparse.diags_array(W.sum(axis=1)) - W)
+    L = sparse.csr_array(sparse.diags_array(W.sum(axis=1)) - W)
+    # Symmetric to the last bit, so its rows are its columns.
+    return sparse.csc_array((L.data, L.indices, L.indptr), shape=L.shape)
 
 
 def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> sparse.csc_array:
