@@ -74,7 +74,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     call = law.at(faces)
     peaks = [(size, float(peak)) for size, _, peak, _ in same or known if peak]
     memory = (
-        max(peak * max(1.0, faces / size) for size, peak in peaks)
+        max(_bytes_at(faces, size, peak) for size, peak in peaks)
         if peaks
         else ROUGH_BYTES + ROUGH_BYTES_A_FACE * faces
     )
@@ -83,6 +83,11 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     calls = CALLS_A_ROUND if call < LONG_CALL else 1
     rounds = cell.repeats * (start + calls * call)
     return Estimate(call, check + rounds, memory, basis)
+
+
+def _bytes_at(faces: float, size: float, peak: float) -> float:
+    """In proportion to the triangles beyond those of an empty process, and never below a record."""
+    return peak + max(0.0, peak - ROUGH_BYTES) * max(0.0, faces / size - 1)
 
 
 def fit_power_law(points: Sequence[tuple[float, float]]) -> PowerLaw:

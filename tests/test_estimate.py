@@ -36,3 +36,10 @@ def test_the_same_cell_counts_before_other_sizes_and_those_before_the_paper():
 def test_repeats_cost():
     few, many = (record_of([1.0], repeats=n).cell for n in (1, 10))
     assert estimate(many, 1000, []).seconds > 4 * estimate(few, 1000, []).seconds
+
+
+def test_an_empty_process_does_not_grow_with_the_triangles():
+    cell = record_of([1.0], mesh_hash="big").cell
+    tiny, middle = known(150_000, 1e-3), known(300_000, 1e-2)  # 150 MB, 300 MB
+    assert estimate(cell, 60_000_000, [tiny]).memory_bytes == pytest.approx(150e6)
+    assert estimate(cell, 600_000, [tiny, middle]).memory_bytes == pytest.approx(450e6)
