@@ -70,6 +70,9 @@ def page(browser, address):
             self.tell("Emulation.setEmulatedMedia", **media)
             self.tell("Emulation.setScriptExecutionDisabled", value=not script)
             self.tell(
+                "Emulation.setFocusEmulationEnabled", enabled=True
+            )  # else events may stay out
+            self.tell(
                 "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], **metrics
             )
             browser.get(address + anchor)
@@ -229,6 +232,12 @@ def test_a_gap_tells_its_cause_to_the_keyboard(page):
     assert page.one("#tip").text == "printed as a dash"
     gap, tip = page.boxes("#times .why")[0], page.boxes("#tip")[0]
     assert min(abs(gap[1] - tip[2]), abs(gap[2] - tip[1])) < 12
+    # A pointer that rests elsewhere leaves things as they scroll away beneath it.
+    page.run(
+        "const left = new PointerEvent('pointerout', {bubbles: true, pointerType: 'mouse'});"
+        "document.querySelector('h1').dispatchEvent(left)"
+    )
+    assert page.one("#tip").text == "printed as a dash"
 
 
 def test_each_surface_has_a_page_with_its_pictures_and_neighbours(page, browser):

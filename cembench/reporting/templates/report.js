@@ -195,7 +195,9 @@
     document.addEventListener("focusin", marks(show));
     document.addEventListener("click", marks((mark, event) => { event.preventDefault(); show(mark); }));
     document.addEventListener("pointerout", (event) => {
-      if (event.pointerType === "mouse" && owner && !tip.contains(event.relatedTarget)) hide();
+      // A pointer that rests elsewhere leaves what scrolls away beneath it: no business of the owner's.
+      const left = event.pointerType === "mouse" && (owner?.contains(event.target) || tip.contains(event.target));
+      if (left && !tip.contains(event.relatedTarget)) hide();
     });
     document.addEventListener("focusout", hide);
     // The browser itself scrolls to what the keyboard reaches: that must not take its remark away.
