@@ -32,7 +32,7 @@ class CholmodFactor:
     def __init__(self, A: sparse.csc_array, leading: int | None) -> None:
         self._leading = leading
         with phase("ordering"):
-            self._lower = _lower_triangle(A)
+            self._lower, self._below = _lower_triangle(A)
             self._permutation = _fill_reducing_order(self._lower, leading)
         self._analyse()
         self._factor()
@@ -58,7 +58,7 @@ class CholmodFactor:
     def update(self, A: sparse.csc_array) -> None:
         """Factor another matrix of the same pattern, keeping ordering and symbolic analysis."""
         with phase("factorisation"):
-            self._lower = _lower_triangle(A)
+            self._lower.V = matrix(_in_order(A).data[self._below])
         if self._leading is not None:
             # Partial solves are wrong on a factor that was computed over an older one.
             self._analyse()
@@ -119,11 +119,18 @@ def _set_options() -> None:
     cholmod.options["print"] = 0
 
 
-def _lower_triangle(A: sparse.csc_array) -> spmatrix:
-    lower = sparse.tril(A, format="coo")
-    return spmatrix(
-        lower.data, lower.row.astype(np.int64), lower.col.astype(np.int64), lower.shape, "d"
-    )
+def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
+    """A's lower triangle, and which of A's entries it has."""
+    A = _in_order(A)
+    columns = np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
+    below = np.flatnonzero(A.indices >= columns)
+    rows = A.indices[below].astype(np.int64)
+    return spmatrix(A.data[below], rows, columns[below], A.shape, "d"), below
+
+
+def _in_order(A: sparse.csc_array) -> sparse.csc_array:
+    """A with every column's entries from top to bottom, as cvxopt keeps them."""
+    return A if A.has_sorted_indices else A.sorted_indices()
 
 
 def _fill_reducing_order(lower: spmatrix, leading: int | None) -> matrix:
