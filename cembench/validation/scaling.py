@@ -12,8 +12,8 @@ from cembench.records import Record
 from cembench.validation.finding import Finding
 
 #: The largest exponent that is allowed. Factoring the Laplacian of a planar mesh costs faces^1.5
-#: in theory; 0.3 are for iterations that become more with the mesh, and for the clock.
-MOST_EXPONENT = 1.8
+#: in theory; 0.25 is for iterations that become more with the mesh, and for the clock.
+MOST_EXPONENT = 1.75
 #: The fewest triangles of the largest mesh.
 LEAST_UP_TO = 900
 #: Phase whose growth is shown beside.

@@ -174,7 +174,7 @@ def other_limit(mesh: DiskMesh) -> Parameterization:
 @algorithm("quadratic", title="Compares every vertex with every other", target="disk")
 def quadratic(mesh: DiskMesh) -> Parameterization:
     uv = right(mesh)
-    for points in 4 * np.array_split(mesh.V, mesh.n // 8 + 1):
+    for points in 8 * np.array_split(mesh.V, mesh.n // 8 + 1):
         np.exp(mesh.V @ points.T).max()
     return Parameterization(uv)
 
