@@ -22,6 +22,8 @@ from pathlib import Path
 from cembench.running.environment import with_threads
 
 FACES = [20_000, 60_000, 190_000, 580_000, 1_700_000]
+#: A size is measured so long at least, or in so many rounds: short calls need more of them.
+LEAST_SECONDS, MOST_ROUNDS = 10, 25
 NAMES = ("direct-cem", "cem, 2 iterations", "cem", "factorisation")
 
 
@@ -74,6 +76,8 @@ def exponent(found: list[dict[str, object]], name: str) -> float:
 def measure_one(surface: str | int, rounds: int) -> dict[str, object]:
     """Measure one surface; seconds are medians over rounds, ratios medians of ratios in a round."""
     import gc
+    import time
+    from itertools import count
 
     import numpy as np
     from scipy import sparse
@@ -98,7 +102,10 @@ def measure_one(surface: str | int, rounds: int) -> dict[str, object]:
     }
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     with linear_algebra():
-        for round_ in range(rounds + 1):  # the first one warms up
+        until = time.monotonic() + LEAST_SECONDS
+        for round_ in count():  # the first one warms up
+            if round_ > rounds and (time.monotonic() > until or round_ > MOST_ROUNDS):
+                break
             for name, call in calls.items():
                 gc.collect()
                 total = measure(call)[1].total
