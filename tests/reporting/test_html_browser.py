@@ -90,14 +90,25 @@ def page(browser, address):
         def click(self, selector):
             """Where the thing is once plots above it have been drawn, and the page stays still."""
             element, places = self.one(selector), []
-            self.run("arguments[0].scrollIntoView({block: 'center'})", element)
+            self.run(
+                "window.reached = false; arguments[0].scrollIntoView({block: 'center'});"
+                "const reach = () => { window.reached = true; };"
+                "arguments[0].addEventListener('click', reach, {once: true, capture: true})",
+                element,
+            )
 
             def still():
                 places.append(self.run("return arguments[0].getBoundingClientRect().top", element))
                 return len(places) > 3 and len(set(places[-3:])) == 1
 
-            self.wait(still)
-            element.click()
+            def clicked():  # a plot may push it away at the last moment
+                still_here = still()
+                if still_here:
+                    element.click()
+                    places.clear()
+                return still_here and self.run("return window.reached")
+
+            self.wait(clicked)
 
         def all(self, selector):
             return browser.find_elements(By.CSS_SELECTOR, selector)
