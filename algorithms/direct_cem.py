@@ -76,9 +76,9 @@ def direct_cem(
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     energies = found.energies
     share = _share(back, energies) if begun == "harmonic measure" else 0.0
-    domain = in_gauge(found.domain.towards(start, share), held) if share else found.domain
-    here = EnergyModel(S, domain, held)
+    here = found.model
     if share:
+        here = here.at(in_gauge(here.domain.towards(start, share), held))
         energies += (here.energy,)
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
     uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)

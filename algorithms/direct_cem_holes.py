@@ -9,7 +9,7 @@ from pydantic import Field
 
 from cembench.clock import phase
 from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_energy import EnergyModel, in_gauge, minimise
+from cembench.geometry.boundary_energy import in_gauge, minimise
 from cembench.geometry.filled_start import widest_start
 from cembench.geometry.folds import interior_without_folds
 from cembench.geometry.gauge import Gauge, gauge_measure
@@ -63,9 +63,10 @@ def direct_cem_holes(
     start = start if chart else in_gauge(start, weights)
     held = weights if gauge == "triangle" and not chart else start.outer_measure
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
-    domain = in_gauge(found.domain.inside_out(0), weights) if chart else found.domain
+    here = found.model
+    if chart:
+        here = here.at(in_gauge(here.domain.inside_out(0), weights))
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    here = EnergyModel(S, domain, weights)
     uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
     energies = found.energies if chart else found.energies + walked
     folded = flipped_triangles(mesh, uv)

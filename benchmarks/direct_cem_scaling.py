@@ -77,7 +77,6 @@ def measure_one(surface: str | int, rounds: int) -> dict[str, object]:
     """Measure one surface; seconds are medians over rounds, ratios medians of ratios in a round."""
     import gc
     import time
-    from itertools import count
 
     import numpy as np
     from scipy import sparse
@@ -102,15 +101,14 @@ def measure_one(surface: str | int, rounds: int) -> dict[str, object]:
     }
     seconds: dict[str, list[float]] = {name: [] for name in calls}
     with linear_algebra():
-        until = time.monotonic() + LEAST_SECONDS
-        for round_ in count():  # the first one warms up
-            if round_ > rounds and (time.monotonic() > until or round_ > MOST_ROUNDS):
-                break
+        until, done = time.monotonic() + LEAST_SECONDS, 0
+        while done <= rounds or (done <= MOST_ROUNDS and time.monotonic() < until):
             for name, call in calls.items():
                 gc.collect()
                 total = measure(call)[1].total
-                if round_:
+                if done:  # the first round warms up
                     seconds[name].append(total)
+            done += 1
     first = seconds["direct-cem"]
     return {
         "faces": mesh.m,

@@ -59,7 +59,7 @@ class Minimum:
     may be for the energy to fall further.
     """
 
-    domain: CircleDomain
+    model: EnergyModel
     energies: tuple[float, ...]
     gradient: float
     reason: str
@@ -117,7 +117,7 @@ def minimise(
             here = there
             energies.append(here.energy)
     gradient = float("nan") if reason == "crowded" else here.gradient_norm
-    return Minimum(here.domain, tuple(energies), gradient, reason, products, len(here.held))
+    return Minimum(here, tuple(energies), gradient, reason, products, len(here.held))
 
 
 def moebius_descent(here: EnergyModel, leash: float) -> complex:
@@ -277,12 +277,8 @@ class EnergyModel:
 
     def hessian(self, x: Real) -> Real:
         """Second derivative of E_C, applied to a step."""
-        domain, rims, B, h = (
-            self.domain,
-            self.domain.rims,
-            len(self._along),
-            len(self.domain.rims.holes),
-        )
+        domain, rims = self.domain, self.domain.rims
+        B, h = len(domain.arcs), len(rims.holes)
         result = self._pulled_back(self.residual_of(self._velocity(x)))
         # d^2 z = exp(i theta) (-dx^2 + 2 i dx dr) / r
         result[:B] -= self._outward * x[:B]
@@ -344,7 +340,7 @@ class EnergyModel:
         if not len(short):
             return short
         rims, B = domain.rims, len(domain.arcs)
-        downhill = -_projected(self._unconstrained(self.gradient), self._gauge)[:B]
+        downhill = -_projected(self._free_uphill, self._gauge)[:B]
         change = rims.sense * (downhill[rims.following] - downhill)
         return short[change[short] < 0]
 
@@ -364,10 +360,14 @@ class EnergyModel:
         return _projected(self._unconstrained(g), self._constraints)
 
     @cached_property
+    def _free_uphill(self) -> Real:
+        return self._unconstrained(self.gradient)
+
+    @cached_property
     def uphill(self) -> Real:
         """The preconditioned gradient."""
         with phase("boundary step"):
-            return self.precondition(self.gradient)
+            return _projected(self._free_uphill, self._constraints)
 
     @cached_property
     def gradient_norm(self) -> float:
