@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.geometry.beltrami import beltrami_coefficients, dilatations_of
-from cembench.geometry.laplacian import half_cotangents
+from cembench.geometry.laplacian import corner_products, half_cotangents
 from cembench.geometry.mesh import TriangleMesh
 from cembench.geometry.planar import fitted_circle, polygon_area, signed_areas
 
@@ -45,17 +45,9 @@ def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
     `points` is (n, 3) in space or complex (n,) in the plane. A triangle whose image is a point
     has angles of zero.
     """
-    a, b, c = (points[F[:, k]] for k in range(3))
-    edges = b - a, c - b, a - c
-    dots = np.empty(F.shape)
     if np.iscomplexobj(points):
-        for k in range(3):
-            dots[:, k] = -(edges[k] * np.conj(edges[k - 1])).real
-        double_area = np.abs((edges[0] * np.conj(edges[2])).imag)
-    else:
-        for k in range(3):
-            dots[:, k] = -np.einsum("td,td->t", edges[k], edges[k - 1])
-        double_area = np.linalg.norm(np.cross(edges[0], edges[2]), axis=1)
+        points = np.stack([points.real, points.imag], axis=1)
+    dots, double_area = corner_products(points, F)
     return np.rad2deg(np.arctan2(double_area[:, None], dots))
 
 

@@ -15,6 +15,7 @@ from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
 from cembench.geometry.dirichlet_to_neumann import DirichletToNeumann
+from cembench.geometry.laplacian import by_rows
 from cembench.geometry.mesh import TriangleMesh
 from cembench.geometry.planar import polygon_area
 
@@ -67,8 +68,7 @@ class BorderedLaplacian:
             )
         with phase("assembly"):
             order = self._order = np.concatenate([self.interior, self.boundary])
-            # L is symmetric, so nothing need be converted between rows and columns.
-            self._ordered = sparse.csc_array(sparse.csr_array(L.T)[order][:, order].T)
+            self._ordered = sparse.csc_array(by_rows(L)[order][:, order].T)  # symmetric again
             pinned = self._ordered[:-1, :-1]
         self._whole = Cholesky(pinned, leading=len(self.interior))
 

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from cembench.clock import phase
 from cembench.geometry.cholesky import Cholesky
+from cembench.geometry.laplacian import by_rows
 from cembench.geometry.mesh import DiskMesh, TriangleMesh
 
 
@@ -45,7 +46,7 @@ def harmonic_extension(
     i = np.flatnonzero(free)
     if len(i):
         with phase("assembly"):
-            rows = sparse.csr_array(L.T)[i]  # L is symmetric: nothing need be converted
+            rows = by_rows(L)[i]
             L_ii, right = rows[:, i], -(rows[:, fixed] @ f[fixed])
         f[i] = Cholesky(L_ii).solve(right)
     return f

@@ -14,8 +14,10 @@ from cembench.clock import phase
 from cembench.geometry.mesh import TriangleMesh
 
 
-def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
-    """What is half the cotangent of each corner's angle? Shape (m, 3), dimensionless.
+def corner_products(
+    V: NDArray[np.float64], F: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Dot products (m, 3) of the edges that leave each corner, and twice the areas (m,), unsigned.
 
     V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is that at vertex ``F[t, c]``.
     """
@@ -25,6 +27,7 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
     dots = np.empty(F.shape)
     for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
         np.einsum("td,td->t", p, q, out=dots[:, k])
+    np.negative(dots, out=dots)
     # Lagrange's identity through the dot products alone would cancel on slivers.
     if V.shape[1] == 2:
         double_area = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
@@ -33,7 +36,16 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
         y = e1[:, 2] * e2[:, 0] - e1[:, 0] * e2[:, 2]
         z = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
         double_area = np.sqrt(x * x + y * y + z * z)
-    return dots / (-2 * double_area[:, None])
+    return dots, double_area
+
+
+def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+    """What is half the cotangent of each corner's angle? Shape (m, 3), dimensionless.
+
+    V and corners as for :func:`corner_products`.
+    """
+    dots, double_area = corner_products(V, F)
+    return dots / (2 * double_area[:, None])
 
 
 def laplacian_of_weights(
@@ -46,9 +58,8 @@ def laplacian_of_weights(
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
     one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
-    L = sparse.csr_array(sparse.diags_array(W.sum(axis=1)) - W)
     # Symmetric to the last bit, so its rows are its columns.
-    return sparse.csc_array((L.data, L.indices, L.indptr), shape=L.shape)
+    return sparse.csc_array(sparse.csr_array(sparse.diags_array(W.sum(axis=1)) - W).T)
 
 
 def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> sparse.csc_array:
@@ -69,6 +80,11 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
 
         negative, _, _ = igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)
         return sparse.csc_array(-negative)
+
+
+def by_rows(L: sparse.csc_array) -> sparse.csr_array:
+    """A Laplacian stored by rows: it is symmetric, so its columns are its rows as they are."""
+    return sparse.csr_array(L.T)
 
 
 def non_delaunay_share(mesh: TriangleMesh) -> float:

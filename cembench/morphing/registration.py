@@ -23,7 +23,7 @@ from scipy import sparse
 from cembench.clock import phase
 from cembench.errors import AlgorithmFailed
 from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.laplacian import cotangent_laplacian, laplacian
+from cembench.geometry.laplacian import by_rows, cotangent_laplacian, laplacian
 from cembench.geometry.mesh import DiskMesh
 from cembench.geometry.planar import signed_areas
 
@@ -182,7 +182,7 @@ def _minimisers(
     i, b = mesh.interior, mesh.boundary
     with phase("assembly"):
         pairs = _pairs(mesh.F, z, landmarks, targets, reach)
-        rows = sparse.csr_array(L)[i]
+        rows = by_rows(L)[i]
         L_ii, right = sparse.csc_array(rows[:, i]), -(rows[:, b] @ z[b])
         pull = np.zeros(mesh.n)
         pulled = np.zeros(mesh.n, dtype=np.complex128)
