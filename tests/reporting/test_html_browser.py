@@ -69,9 +69,8 @@ def page(browser, address):
             metrics = {"deviceScaleFactor": 1, "mobile": size == PHONE}
             self.tell("Emulation.setEmulatedMedia", **media)
             self.tell("Emulation.setScriptExecutionDisabled", value=not script)
-            self.tell(
-                "Emulation.setFocusEmulationEnabled", enabled=True
-            )  # else events may stay out
+            # Without it a page that has not the focus may be told of none.
+            self.tell("Emulation.setFocusEmulationEnabled", enabled=True)
             self.tell(
                 "Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], **metrics
             )
@@ -102,11 +101,11 @@ def page(browser, address):
                 return len(places) > 3 and len(set(places[-3:])) == 1
 
             def clicked():  # a plot may push it away at the last moment
-                still_here = still()
-                if still_here:
-                    element.click()
-                    places.clear()
-                return still_here and self.run("return window.reached")
+                if not still():
+                    return False
+                element.click()
+                places.clear()
+                return self.run("return window.reached")
 
             self.wait(clicked)
 
