@@ -45,9 +45,9 @@ def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
     `points` is (n, 3) in space or complex (n,) in the plane. A triangle whose image is a point
     has angles of zero.
     """
-    if np.iscomplexobj(points):
-        points = np.stack([points.real, points.imag], axis=1)
-    dots, double_area = corner_products(points, F)
+    planar = np.iscomplexobj(points)
+    V = np.stack([points.real, points.imag], axis=1) if planar else np.asarray(points, np.float64)
+    dots, double_area = corner_products(V, F)
     return np.rad2deg(np.arctan2(double_area[:, None], dots))
 
 
