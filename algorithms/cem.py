@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.geometry.bordered import BorderedLaplacian
-from cembench.geometry.boundary_iteration import iterate_boundary, on_circle, pole_start
-from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.folds import without_folds
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import DiskMesh
-from cembench.parameterization import Parameterization
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_iteration import iterate_boundary, on_circle, pole_start
+from cembench.conformal.folds import without_folds
+from cembench.conformal.laplacian import laplacian
+from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]

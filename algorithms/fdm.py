@@ -9,22 +9,22 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy import sparse
 
-from cembench.clock import phase
-from cembench.errors import AlgorithmFailed, NotPositiveDefinite
-from cembench.geometry.beltrami import (
+from cembench.conformal.beltrami import (
     beltrami_coefficients,
     generalised_weights,
     linear_beltrami_solver,
     unfolded,
     weights_of_map,
 )
-from cembench.geometry.doubling import DoubledSurface, doubled
-from cembench.geometry.folds import without_folds
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian, laplacian_of_weights
-from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import polygon_area, signed_areas
-from cembench.parameterization import Parameterization
+from cembench.conformal.doubling import DoubledSurface, doubled
+from cembench.conformal.folds import without_folds
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian, laplacian_of_weights
+from cembench.conformal.planar import polygon_area, signed_areas
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]

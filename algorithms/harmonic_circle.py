@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from cembench.geometry.folds import without_folds
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import DiskMesh
-from cembench.parameterization import Parameterization
+from cembench.conformal.folds import without_folds
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 

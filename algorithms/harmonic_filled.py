@@ -6,12 +6,12 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cembench.geometry.folds import without_folds
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import HoledMesh
-from cembench.geometry.patches import filled
-from cembench.parameterization import Parameterization
+from cembench.conformal.folds import without_folds
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.patches import filled
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import algorithm
 
 

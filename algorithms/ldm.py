@@ -5,22 +5,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.clock import phase
-from cembench.errors import AlgorithmFailed
-from cembench.geometry.beltrami import (
+from cembench.conformal.beltrami import (
     beltrami_coefficients,
     linear_beltrami_solver,
     weights_of_map,
 )
-from cembench.geometry.doubling import DoubledSurface, doubled, doubled_laplacian
-from cembench.geometry.folds import without_folds
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.moebius import three_point_map
-from cembench.geometry.planar import polygon_area
-from cembench.geometry.spherical import balanced_planar_map
-from cembench.geometry.stereographic import to_plane, to_sphere
-from cembench.parameterization import Parameterization
+from cembench.conformal.doubling import DoubledSurface, doubled, doubled_laplacian
+from cembench.conformal.folds import without_folds
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.moebius import three_point_map
+from cembench.conformal.planar import polygon_area
+from cembench.conformal.spherical import balanced_planar_map
+from cembench.conformal.stereographic import to_plane, to_sphere
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]

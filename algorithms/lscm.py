@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from cembench.clock import phase
-from cembench.errors import AlgorithmFailed
-from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.folds import interior_without_folds
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import polygon_area
-from cembench.parameterization import Parameterization
+from cembench.conformal.folds import interior_without_folds
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.planar import polygon_area
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]

@@ -9,19 +9,19 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy import sparse
 
-from cembench.clock import phase
-from cembench.errors import AlgorithmFailed, NotPositiveDefinite
-from cembench.geometry.balancing import moebius_centred
-from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.doubling import doubled, doubled_laplacian
-from cembench.geometry.folds import without_folds
-from cembench.geometry.harmonic import harmonic_extension
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import DiskMesh
-from cembench.geometry.planar import fitted_circle, polygon_area
-from cembench.geometry.spherical import balanced_planar_map
-from cembench.geometry.stereographic import to_plane, to_sphere
-from cembench.parameterization import Parameterization
+from cembench.conformal.balancing import moebius_centred
+from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.folds import without_folds
+from cembench.conformal.harmonic import harmonic_extension
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.planar import fitted_circle, polygon_area
+from cembench.conformal.spherical import balanced_planar_map
+from cembench.conformal.stereographic import to_plane, to_sphere
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
+from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]

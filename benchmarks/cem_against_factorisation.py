@@ -60,16 +60,16 @@ def measure_one(mesh: str | None, size: int) -> dict[str, object]:
 
     import igl
     import numpy as np
+    from cembench.algorithms.cem import cem
+    from cembench.surfaces.spherical_cap import spherical_cap
     from scipy import sparse
 
-    from algorithms.cem import cem
-    from cembench.clock import measure
-    from cembench.geometry.cholesky import Cholesky, linear_algebra
-    from cembench.geometry.files import read_mesh
-    from cembench.geometry.laplacian import laplacian
-    from cembench.geometry.mesh import DiskMesh
+    from cembench.conformal.laplacian import laplacian
+    from cembench.core.clock import measure
+    from cembench.linear_algebra.cholesky import Cholesky, linear_algebra
+    from cembench.mesh.files import read_mesh
+    from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.running.memory import peak_memory_bytes
-    from meshes_gen.spherical_cap import spherical_cap
 
     if mesh is None:
         surface = spherical_cap(size)

@@ -9,10 +9,9 @@ from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
-
-from algorithms.cem import cem
-from algorithms.direct_cem import direct_cem
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from cembench.algorithms.cem import cem
+from cembench.algorithms.direct_cem.disk import direct_cem
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -79,15 +79,15 @@ def measure_one(surface: str | int, rounds: int) -> dict[str, object]:
     import time
 
     import numpy as np
+    from cembench.algorithms.cem import cem
+    from cembench.algorithms.direct_cem.disk import direct_cem
+    from cembench.surfaces.spherical_cap import spherical_cap
     from scipy import sparse
 
-    from algorithms.cem import cem
-    from algorithms.direct_cem import direct_cem
-    from cembench.clock import measure
-    from cembench.geometry.cholesky import Cholesky, linear_algebra
-    from cembench.geometry.files import read_mesh
-    from cembench.geometry.laplacian import laplacian
-    from meshes_gen.spherical_cap import spherical_cap
+    from cembench.conformal.laplacian import laplacian
+    from cembench.core.clock import measure
+    from cembench.linear_algebra.cholesky import Cholesky, linear_algebra
+    from cembench.mesh.files import read_mesh
 
     mesh = spherical_cap(surface) if isinstance(surface, int) else read_mesh(surface)
     order = np.concatenate([mesh.interior, mesh.boundary])

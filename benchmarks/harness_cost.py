@@ -25,23 +25,23 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from cembench.surfaces.spherical_cap import spherical_cap
 from numpy.typing import NDArray
 
-from cembench.comparison import compare_ratios
-from cembench.records import Outcome, Round
 from cembench.registry import load_registry
+from cembench.results.comparison import compare_ratios
+from cembench.results.records import Outcome, Round
+from cembench.results.store import Store
 from cembench.running.environment import with_threads
 from cembench.running.local import Launcher, Options, run_tasks
 from cembench.running.plan import How, Task, plan_cells
-from cembench.store import Store
-from meshes_gen.spherical_cap import spherical_cap
 
 BARE = """
 import sys
 from statistics import median
 from time import perf_counter
-from algorithms.cem import cem
-from meshes_gen.spherical_cap import spherical_cap
+from cembench.algorithms.cem import cem
+from cembench.surfaces.spherical_cap import spherical_cap
 
 mesh = spherical_cap(int(sys.argv[1]))
 cem(mesh.fresh())

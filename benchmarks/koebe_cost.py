@@ -71,13 +71,14 @@ def measure_one(
     rounds: int, faces: int = 0, holes: int = 0, mesh: str | None = None
 ) -> dict[str, object]:
     """Measure one surface; figures are medians over the rounds."""
-    from algorithms.cem import cem
-    from algorithms.koebe_cem import koebe_cem
-    from cembench.clock import measure
-    from cembench.geometry.files import read_mesh
-    from cembench.geometry.mesh import HoledMesh
-    from cembench.geometry.patches import filled
-    from meshes_gen.holed_disk import holed_disk
+    from cembench.algorithms.cem import cem
+    from cembench.algorithms.koebe_cem.koebe_cem import koebe_cem
+    from cembench.surfaces.holed_disk import holed_disk
+
+    from cembench.conformal.patches import filled
+    from cembench.core.clock import measure
+    from cembench.mesh.files import read_mesh
+    from cembench.mesh.triangle_mesh import HoledMesh
 
     surface = read_mesh(mesh, HoledMesh) if mesh else holed_disk(faces, holes=holes)
     outer, inner = surface.outer_and_holes()

@@ -15,9 +15,9 @@ import tempfile
 from pathlib import Path
 
 from cembench.registry import load_registry
+from cembench.results.store import Store
 from cembench.running.local import Options, run_tasks
 from cembench.running.plan import How, generate_surface, plan_cells, read_mesh_for
-from cembench.store import Store
 
 #: Phases that take less than this share of the total in every line go under "rest".
 SHOWN = 0.05

@@ -28,11 +28,11 @@ from statistics import median
 from time import monotonic
 from typing import Any
 
-from cembench.atomic import write
-from cembench.comparison import circumstances, compare, references
-from cembench.intervals import LEVEL
-from cembench.records import DEFAULT_ROUNDS, Record
-from cembench.store import Store
+from cembench.core.atomic import write
+from cembench.results.comparison import circumstances, compare, references
+from cembench.results.intervals import LEVEL
+from cembench.results.records import DEFAULT_ROUNDS, Record
+from cembench.results.store import Store
 
 TWINS = Path(__file__).with_name("twins.py")
 
@@ -80,7 +80,15 @@ def write_text(path: Path, text: str) -> None:
 def run_command(chosen: argparse.Namespace, folder: Path, seed: int) -> list[str]:
     """The call of ``cembench run`` for one of the runs; it measures only what is missing."""
     both = ("cem", chosen.against)
-    command = [sys.executable, "-m", "cembench.cli", "run", "--plugin", str(TWINS), "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "cembench.commands.cli",
+        "run",
+        "--plugin",
+        str(TWINS),
+        "--json",
+    ]
     command += ["-a", ",".join([*both, *(f"{name}-twin" for name in both)])]
     command += ["--repeats", str(chosen.repeats), "--seed", str(seed), "-o", str(folder)]
     if chosen.surfaces:

@@ -15,17 +15,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from cembench import paper
-from cembench.datasets import is_fetched
-from cembench.geometry.files import read_mesh
-from cembench.metrics import all_metrics
-from cembench.records import MeshFacts
+from cembench.surfaces.catalogue import stand_in
+from cembench.surfaces.contact_sheet import contact_sheet
+from cembench.surfaces.rows import ROWS
+
+from cembench.conformal.metrics import all_metrics
+from cembench.mesh.datasets import is_fetched
+from cembench.mesh.files import read_mesh
 from cembench.registry import Registry, load_registry
-from cembench.reporting.surface_facts import factor_spans, find_facts, row_check
+from cembench.report.surface_facts import factor_spans, find_facts, row_check
+from cembench.results import paper
+from cembench.results.records import MeshFacts
 from cembench.running.plan import mesh_facts, standing_of_file
-from meshes_gen.catalogue import stand_in
-from meshes_gen.contact_sheet import contact_sheet
-from meshes_gen.rows import ROWS
 
 PAGE = Path(__file__).parents[1] / "docs/surfaces.md"
 SHEET = Path(__file__).parents[1] / "reports/surfaces/contact_sheet.png"

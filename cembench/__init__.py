@@ -2,9 +2,15 @@
 
 from importlib.metadata import version
 
-from cembench.errors import AlgorithmFailed, CembenchError, MeshError, ParameterError, RegistryError
-from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.parameterization import Parameterization
+from cembench.core.errors import (
+    AlgorithmFailed,
+    CembenchError,
+    MeshError,
+    ParameterError,
+    RegistryError,
+)
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import algorithm, surface
 
 __version__ = version("cembench")

@@ -4,7 +4,7 @@ A decorator only marks a function with its :class:`Algorithm` or :class:`Surface
 at import. A :class:`Registry` is then collected from entry points (``cembench.algorithms``,
 ``cembench.surfaces``, ``cembench.datasets``: the built-in ones are found no differently from
 anybody's) and from plug-ins named by the user, a file or ``module:name``. A dataset needs no mark:
-it is a :class:`cembench.datasets.Dataset`, an object at module level.
+it is a :class:`cembench.mesh.datasets.Dataset`, an object at module level.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from cembench.datasets import Dataset
-from cembench.errors import ParameterError, RegistryError
-from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.core.errors import ParameterError, RegistryError
+from cembench.mesh.datasets import Dataset
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 #: What an algorithm maps to; tables never mix these without saying so.
 Target = Literal["disk", "free boundary", "circular holes"]

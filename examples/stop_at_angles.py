@@ -12,10 +12,10 @@ from pydantic import Field
 from scipy import sparse
 
 from cembench import AlgorithmFailed, DiskMesh, Parameterization, algorithm
-from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.harmonic import arc_length_circle
-from cembench.geometry.laplacian import laplacian
-from cembench.metrics import corner_angles
+from cembench.conformal.harmonic import arc_length_circle
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import corner_angles
+from cembench.linear_algebra.cholesky import Cholesky
 
 
 @algorithm("stop-at-angles", title="CEM by angles", target="disk")

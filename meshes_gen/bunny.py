@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from meshes_gen.implicit import (
+from .implicit import (
     Body,
     Noise,
     Real,

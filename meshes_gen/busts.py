@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshes_gen.head import NEUTRAL, Expression, Head, Person
-from meshes_gen.implicit import (
+from .head import NEUTRAL, Expression, Head, Person
+from .implicit import (
     Body,
     Noise,
     Real,

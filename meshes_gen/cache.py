@@ -19,9 +19,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from cembench.datasets import cache_directory
-from cembench.errors import MeshError
-from cembench.geometry.mesh import TriangleMesh
+from cembench.core.errors import MeshError
+from cembench.mesh.datasets import cache_directory
+from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Raise this when a generator's result changes: every cached surface is then made anew.
 GENERATOR_VERSION = 1

@@ -14,24 +14,25 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from cembench.errors import RegistryError
-from cembench.geometry.mesh import DiskMesh, TriangleMesh
+from cembench.core.errors import RegistryError
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import surface
-from meshes_gen.brain import human_brain_body
-from meshes_gen.bunny import stanford_bunny_body
-from meshes_gen.busts import bimba_statue_body, david_head_body, knit_cap_man_body, nefertiti_body
-from meshes_gen.cache import cached, place_of
-from meshes_gen.cowboy_hat import cowboy_hat_body
-from meshes_gen.faces import EXPRESSIONS, HO, LIU, face_body
-from meshes_gen.foot import foot_body
-from meshes_gen.hand import left_hand_body
-from meshes_gen.head import Head
-from meshes_gen.implicit import Body
-from meshes_gen.lion import chinese_lion_body
-from meshes_gen.remesh import has_remeshing_filter, mesh_of
-from meshes_gen.rows import ROWS
-from meshes_gen.statues import isis_statue_body, statue_of_liberty_body
-from meshes_gen.vessels import bourbon_bottle_body, chinese_vase_body
+
+from .brain import human_brain_body
+from .bunny import stanford_bunny_body
+from .busts import bimba_statue_body, david_head_body, knit_cap_man_body, nefertiti_body
+from .cache import cached, place_of
+from .cowboy_hat import cowboy_hat_body
+from .faces import EXPRESSIONS, HO, LIU, face_body
+from .foot import foot_body
+from .hand import left_hand_body
+from .head import Head
+from .implicit import Body
+from .lion import chinese_lion_body
+from .remesh import has_remeshing_filter, mesh_of
+from .rows import ROWS
+from .statues import isis_statue_body, statue_of_liberty_body
+from .vessels import bourbon_bottle_body, chinese_vase_body
 
 #: Smallest and largest count of triangles that can be asked for.
 Faces = Annotated[int, Field(ge=400, le=4_000_000)]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from cembench.doctor import Finding
-from meshes_gen import remesh
+from cembench.workflows.doctor import Finding
+
+from . import remesh
 
 
 def remeshing_finding() -> Finding:

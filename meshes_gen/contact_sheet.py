@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from cembench.geometry.mesh import TriangleMesh
-from meshes_gen.local_operations import vertex_normals
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+from .local_operations import vertex_normals
 
 #: From where each surface is seen (x, y, z); figures look along -y.
 VIEWS: Mapping[str, tuple[float, float, float]] = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshes_gen.implicit import Body, Real, bump, join, meet
+from .implicit import Body, Real, bump, join, meet
 
 
 def cowboy_hat_body(seed: int = 0) -> Body:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cembench.datasets import Dataset
+from cembench.mesh.datasets import Dataset
 
 _DISK_MAPS = (
     "https://raw.githubusercontent.com/garyptchoi/disk-conformal-map/"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from meshes_gen.head import NEUTRAL, POUTING, SMILE, WRY, Expression, Head, Person, with_skin
-from meshes_gen.implicit import Body, Field, Real, ellipsoid
+from .head import NEUTRAL, POUTING, SMILE, WRY, Expression, Head, Person, with_skin
+from .implicit import Body, Field, Real, ellipsoid
 
 LIU = Person(jaw=1.0, nose=1.0, nose_width=1.0, lips=1.0, cheeks=1.0, skin_seed=11)
 HO = Person(

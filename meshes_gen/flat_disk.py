@@ -7,9 +7,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from cembench.geometry.mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import surface
-from meshes_gen.disk_grid import disk_grid
+
+from .disk_grid import disk_grid
 
 
 @surface("flat-disk", title="Flat disk", source="closed form")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshes_gen.implicit import Body, Noise, Real, bump, ellipsoid, halfspace, join, sphere, tube
+from .implicit import Body, Noise, Real, bump, ellipsoid, halfspace, join, sphere, tube
 
 #: Toes from the big one: base, joint, tip (toes point along -y), radii.
 TOES = [

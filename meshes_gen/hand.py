@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshes_gen.implicit import Body, Noise, Real, box, bump, cone, ellipsoid, halfspace, join, tube
+from .implicit import Body, Noise, Real, box, bump, cone, ellipsoid, halfspace, join, tube
 
 #: Knuckle, middle joint, last joint and tip of each finger; palm towards -y, fingers up.
 FINGERS = {

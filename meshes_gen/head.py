@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from meshes_gen.implicit import (
+from .implicit import (
     Field,
     Noise,
     Real,

@@ -7,9 +7,10 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from cembench.geometry.mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import surface
-from meshes_gen.spherical_cap import spherical_cap
+
+from .spherical_cap import spherical_cap
 
 
 @surface("hemi-ellipsoid", title="Half ellipsoid", source="closed form")

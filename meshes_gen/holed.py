@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.geometry.mesh import HoledMesh
+from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import surface
-from meshes_gen.cache import cached
-from meshes_gen.faces import HO, face_body, mask
-from meshes_gen.head import NEUTRAL, Head
-from meshes_gen.implicit import Body, Real, ellipsoid, sphere
-from meshes_gen.remesh import has_remeshing_filter, mesh_of
-from meshes_gen.rows import ROWS
+
+from .cache import cached
+from .faces import HO, face_body, mask
+from .head import NEUTRAL, Head
+from .implicit import Body, Real, ellipsoid, sphere
+from .remesh import has_remeshing_filter, mesh_of
+from .rows import ROWS
 
 #: Polar angle of the cap's rim, of the holes' centres, and the holes' radius; degrees.
 CAP, PLACE, HOLE = 100.0, 55.0, 14.0

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.spatial import Delaunay
 
-from cembench.geometry.mesh import HoledMesh
+from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import surface
 
 Complex = NDArray[np.complex128]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from meshes_gen.implicit import (
+from .implicit import (
     Body,
     Noise,
     Real,

@@ -19,11 +19,12 @@ from scipy import ndimage
 from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
-from cembench.errors import MeshError
-from cembench.geometry import topology
-from cembench.geometry.mesh import TriangleMesh
-from meshes_gen.implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
-from meshes_gen.local_operations import (
+from cembench.core.errors import MeshError
+from cembench.mesh import topology
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+from .implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
+from .local_operations import (
     Faces,
     area_vectors,
     boundary_mask,
@@ -38,7 +39,7 @@ from meshes_gen.local_operations import (
     subdivide,
     vertex_normals,
 )
-from meshes_gen.tunnels import plugged, plugs_for
+from .tunnels import plugged, plugs_for
 
 M = TypeVar("M", bound=TriangleMesh)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cembench import paper
+from cembench.results import paper
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 from scipy.interpolate import PchipInterpolator
 
-from cembench.errors import ParameterError
-from cembench.geometry.mesh import DiskMesh, HoledMesh
+from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import surface
-from meshes_gen.rectangle import rectangle_grid, rectangle_to_disk
+
+from .rectangle import rectangle_grid, rectangle_to_disk
 
 Faces = Annotated[int, Field(ge=24)]
 Complex = NDArray[np.complex128]

@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.geometry.mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import surface
-from meshes_gen.disk_grid import disk_grid
+
+from .disk_grid import disk_grid
 
 
 def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
-from meshes_gen.implicit import Field, Real, join
-from meshes_gen.local_operations import Faces, edges_of
+from .implicit import Field, Real, join
+from .local_operations import Faces, edges_of
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from meshes_gen.implicit import Body, Noise, Real, box, carve, halfspace, join, meet, ring
+from .implicit import Body, Noise, Real, box, carve, halfspace, join, meet, ring
 
 
 def revolve(p: Real, profile: NDArray[np.float64]) -> Real:

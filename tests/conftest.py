@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from cembench.cli import main
+from cembench.commands.cli import main
 
 
 @pytest.fixture

@@ -1,10 +1,10 @@
 """Small surfaces, good and bad, that many tests use."""
 
 import numpy as np
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.holed_disk import disk_with_holes
 
 from cembench import DiskMesh, HoledMesh
-from meshes_gen.flat_disk import flat_disk
-from meshes_gen.holed_disk import disk_with_holes
 
 
 def obj_text(V, F):

@@ -40,7 +40,7 @@ def test_the_built_in_ones_come_by_entry_points():
     assert registry.algorithm("lscm").target == "free boundary"
     assert registry.algorithm("cem").mesh_type is DiskMesh
     assert registry.algorithm("cem").notes.startswith("Faithful to Algorithm 1")
-    assert registry.algorithm("cem").origin == "algorithms.cem:cem"
+    assert registry.algorithm("cem").origin == "cembench.algorithms.cem:cem"
 
 
 def test_a_file_adds_its_algorithms_and_surfaces(plugin):
@@ -54,8 +54,10 @@ def test_a_file_adds_its_algorithms_and_surfaces(plugin):
 
 
 def test_a_module_adds_what_is_named():
-    with pytest.raises(RegistryError, match=r"declared twice: by algorithms.cem:cem and by"):
-        load_registry(["algorithms.cem:cem"])
+    with pytest.raises(
+        RegistryError, match=r"declared twice: by cembench.algorithms.cem:cem and by"
+    ):
+        load_registry(["cembench.algorithms.cem:cem"])
 
 
 def test_a_name_is_declared_once(plugin):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from cembench.geometry.mesh import DiskMesh, HoledMesh
-from cembench.metrics import all_metrics
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
+from cembench.conformal.metrics import all_metrics
 
 from . import cases
 

@@ -11,16 +11,16 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from cembench.geometry.beltrami import (
+from cembench.conformal.beltrami import (
     beltrami_coefficients,
     linear_beltrami_solver,
     weights_of_map,
 )
-from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.mesh import DiskMesh, TriangleMesh
-from cembench.metrics import all_metrics
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
 from cembench.running.plan import generate_surface
 

@@ -22,7 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cembench.geometry.cholesky import linear_algebra
+from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.running import worker
 from cembench.running.process import MARK, Start, die_with_parent
 

@@ -28,14 +28,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.records import Outcome, Record, Round
+from cembench.results.records import Outcome, Record, Round
+from cembench.results.samples import Samples
+from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.plan import Task
 from cembench.running.process import Ending, Limits, run_limited, spawning
 from cembench.running.worker import Answer, Job
-from cembench.samples import Samples
-from cembench.store import Store
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0

@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.clock import Timing, measure
-from cembench.errors import AlgorithmFailed, CembenchError
-from cembench.geometry.cholesky import linear_algebra
-from cembench.geometry.mesh import TriangleMesh
-from cembench.geometry.planar import crossing_segments, polygon_area
-from cembench.metrics import all_metrics, boundary_circles, flipped_triangles, image_area
-from cembench.parameterization import Parameterization
-from cembench.records import Boundary, Cell, Outcome, Round
+from cembench.conformal.metrics import all_metrics, boundary_circles, flipped_triangles, image_area
+from cembench.conformal.planar import crossing_segments, polygon_area
+from cembench.core.clock import Timing, measure
+from cembench.core.errors import AlgorithmFailed, CembenchError
+from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import linear_algebra
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm
+from cembench.results.records import Boundary, Cell, Outcome, Round
 from cembench.running.memory import Memory, memory_of_call
 
 #: How far from the unit circle a boundary vertex of a disk may lie.
@@ -49,7 +49,7 @@ def check_cell(
 ) -> tuple[Outcome, NDArray[np.complex128] | None]:
     """What comes out of one call, is that a valid map, and how much memory does it take?
 
-    Never raises for what the algorithm does: :class:`~cembench.errors.AlgorithmFailed` or any other
+    Never raises for what the algorithm does: :class:`~cembench.core.errors.AlgorithmFailed` or any other
     exception is a status with its cause. The one round of the outcome is this call, without
     warm-up. The second value is the map, also that of an invalid one if it has the right shape and
     is finite.

@@ -9,13 +9,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
 
-from cembench.datasets import recognised
-from cembench.errors import MeshError, ParameterError
-from cembench.geometry.files import is_mesh_file, read_mesh
-from cembench.geometry.laplacian import non_delaunay_share
-from cembench.geometry.mesh import TriangleMesh
-from cembench.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
+from cembench.conformal.laplacian import non_delaunay_share
+from cembench.core.errors import MeshError, ParameterError
+from cembench.mesh.datasets import recognised
+from cembench.mesh.files import is_mesh_file, read_mesh
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
+from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 
 M = TypeVar("M", bound=TriangleMesh)
 

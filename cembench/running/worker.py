@@ -16,9 +16,9 @@ from typing import Literal, NoReturn
 import numpy as np
 from pydantic import BaseModel
 
-from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.records import Cell, Outcome, Round
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, load_algorithm
+from cembench.results.records import Cell, Outcome, Round
 from cembench.running.measure import check_cell, outcome_of_error, time_cell
 from cembench.running.process import die_with_parent, limit_memory
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.geometry.moebius import Moebius
+from cembench.conformal.moebius import Moebius
 
 Complex = NDArray[np.complex128]
 

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from cembench.errors import ParameterError
+from cembench.core.errors import ParameterError
 from cembench.registry import Algorithm, Registry
 from cembench.running.measure import MESH_CHANGED
 from cembench.validation import surfaces

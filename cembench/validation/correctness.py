@@ -7,7 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cembench.metrics import all_metrics, boundary_circularity, flipped_triangles, image_area
+from cembench.conformal.metrics import (
+    all_metrics,
+    boundary_circularity,
+    flipped_triangles,
+    image_area,
+)
 from cembench.registry import Algorithm, Registry
 from cembench.running.measure import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
@@ -124,7 +129,7 @@ def folds(maps: Sequence[Mapped]) -> Finding:
         else "none",
         allowed="no triangle without positive area on a closed-form surface",
         remedy="solve the interior harmonically for the final boundary; "
-        "cembench.geometry.folds.without_folds repairs what remains.",
+        "cembench.conformal.folds.without_folds repairs what remains.",
     )
 
 
@@ -238,7 +243,7 @@ def same_under_backslash(reused: Mapped, anew: Mapped) -> Finding:
         ok=apart <= SAME_MAP,
         measured=measured,
         allowed=f"the same map within {SAME_MAP:g} however systems are solved",
-        remedy="factor and solve only through cembench.geometry.cholesky.Cholesky, and call "
+        remedy="factor and solve only through cembench.linear_algebra.cholesky.Cholesky, and call "
         "update() when the matrix changes.",
     )
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from cembench.records import Record
-from cembench.reporting.document import (
+from cembench.report.document import (
     Column,
     Gap,
     Item,
@@ -19,10 +18,11 @@ from cembench.reporting.document import (
     missing,
     words,
 )
-from cembench.reporting.frame import row
-from cembench.reporting.palette import looks
-from cembench.reporting.plots import Axis, Panel, Plot, Series, write_plot
-from cembench.store import Store
+from cembench.report.palette import looks
+from cembench.report.plots import Axis, Panel, Plot, Series, write_plot
+from cembench.results.record_rows import row
+from cembench.results.records import Record
+from cembench.results.store import Store
 from cembench.validation.finding import Finding
 from cembench.validation.quality import Against, Pair, Sides
 from cembench.validation.scaling import Growth

@@ -9,14 +9,14 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from cembench.errors import ParameterError
-from cembench.geometry.mesh import TriangleMesh
-from cembench.records import DEFAULT_ROUNDS, Record
+from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
+from cembench.results.records import DEFAULT_ROUNDS, Record
+from cembench.results.store import Store
 from cembench.running.environment import describe_environment
 from cembench.running.local import Options, Watcher, run_tasks
 from cembench.running.plan import How, Standing, plan_cells
-from cembench.store import Store
 from cembench.validation import surfaces
 from cembench.validation.contract import examine_contract
 from cembench.validation.correctness import examine_correctness

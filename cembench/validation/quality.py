@@ -2,7 +2,7 @@
 
 Quality: the ratio of a figure on each surface that both map validly. A surface counts as lower or
 higher where the ratio is more than 1 % off 1; the median ratio has the order interval of
-:mod:`cembench.intervals` over the surfaces, none for fewer than six.
+:mod:`cembench.results.intervals` over the surfaces, none for fewer than six.
 
 Speed: a round's figure is the median over the surfaces of the ratio of both algorithms' seconds in
 that round; the interval is over the rounds, so it tells how sure the figure is on these surfaces,
@@ -17,10 +17,10 @@ from statistics import median
 
 from pydantic import BaseModel, ConfigDict
 
-from cembench.comparison import Verdict as SpeedVerdict
-from cembench.comparison import compare, compare_ratios, paired_ratios
-from cembench.intervals import median_interval
-from cembench.records import Record
+from cembench.results.comparison import Verdict as SpeedVerdict
+from cembench.results.comparison import compare, compare_ratios, paired_ratios
+from cembench.results.intervals import median_interval
+from cembench.results.records import Record
 from cembench.running.measure import MESH_CHANGED
 from cembench.validation.finding import Finding
 

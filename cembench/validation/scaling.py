@@ -7,8 +7,8 @@ from math import log
 
 from pydantic import BaseModel, ConfigDict
 
-from cembench.errors import ParameterError
-from cembench.records import Record
+from cembench.core.errors import ParameterError
+from cembench.results.records import Record
 from cembench.validation.finding import Finding
 
 #: The largest exponent that is allowed. Factoring the Laplacian of a planar mesh costs faces^1.5

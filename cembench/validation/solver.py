@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.errors import RegistryError
-from cembench.geometry.mesh import TriangleMesh
-from cembench.records import Outcome
+from cembench.core.errors import RegistryError
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, load_registry
+from cembench.results.records import Outcome
 from cembench.running.local import Options, map_once
 from cembench.running.plan import How, Task, plan_cells
 

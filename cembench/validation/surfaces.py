@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.geometry.mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, ExactMap, Registry
 
 #: Families whose map is known or whose energy tends to zero, and in how many triangles.

@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
+from cembench.algorithms.cem import cem
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from algorithms.cem import cem
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.geometry.boundary_iteration import inverted
-from cembench.geometry.cholesky import available_backends, linear_algebra
-from cembench.geometry.cholmod import CholmodFactor
-from cembench.geometry.files import read_mesh
-from cembench.geometry.laplacian import laplacian
-from cembench.metrics import all_metrics
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from cembench.conformal.boundary_iteration import inverted
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import all_metrics
+from cembench.linear_algebra.cholesky import available_backends, linear_algebra
+from cembench.linear_algebra.cholmod import CholmodFactor
+from cembench.mesh.files import read_mesh
 from tests import gallery
 from tests.real_meshes import real_mesh
 

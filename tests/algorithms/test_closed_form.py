@@ -9,13 +9,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from cembench.surfaces.spherical_cap import exact_map, spherical_cap
 from scipy.optimize import least_squares
 
-from cembench.metrics import all_metrics
+from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
-from meshes_gen.flat_disk import flat_disk
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
-from meshes_gen.spherical_cap import exact_map, spherical_cap
 
 RINGS = (8, 16, 32)
 FINE = 128

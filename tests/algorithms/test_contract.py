@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import AlgorithmFailed, DiskMesh, HoledMesh, TriangleMesh
-from cembench.geometry.cholesky import linear_algebra
-from cembench.geometry.planar import signed_areas
-from cembench.metrics import all_metrics
+from cembench.conformal.metrics import all_metrics
+from cembench.conformal.planar import signed_areas
+from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.registry import load_registry
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
 from tests import gallery
 
 ALGORITHMS = load_registry().algorithms

@@ -1,19 +1,19 @@
 import numpy as np
 import pytest
+from cembench.algorithms.cem import cem
+from cembench.algorithms.direct_cem.boundary_energy import EnergyModel
+from cembench.algorithms.direct_cem.disk import direct_cem
+from cembench.algorithms.direct_cem.gauge_walk import LEASH
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from cembench.surfaces.spherical_cap import spherical_cap
 
-from algorithms.cem import cem
-from algorithms.direct_cem import direct_cem
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.geometry.boundary_energy import EnergyModel
-from cembench.geometry.cholesky import Cholesky, available_backends, linear_algebra
-from cembench.geometry.cholmod import CholmodFactor
-from cembench.geometry.files import read_mesh
-from cembench.geometry.gauge_walk import LEASH
-from cembench.geometry.harmonic import edge_lengths
-from cembench.geometry.planar import backward_arcs
-from cembench.metrics import all_metrics, angle_errors, flipped_triangles
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
-from meshes_gen.spherical_cap import spherical_cap
+from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.metrics import all_metrics, angle_errors, flipped_triangles
+from cembench.conformal.planar import backward_arcs
+from cembench.linear_algebra.cholesky import Cholesky, available_backends, linear_algebra
+from cembench.linear_algebra.cholmod import CholmodFactor
+from cembench.mesh.files import read_mesh
 from tests import gallery
 from tests.real_meshes import DISKS, real_mesh
 
@@ -146,7 +146,9 @@ def test_the_start_is_the_better_of_two(monkeypatch):
     energy = direct_cem(mesh, max_iterations=0).energy_history[0]
     uv = direct_cem(mesh, max_iterations=0).uv
     assert energy == pytest.approx(all_metrics(mesh, uv)["conformal_energy"])
-    monkeypatch.setattr("algorithms.direct_cem.arcs_of_measure", lambda seen, lengths: lengths)
+    monkeypatch.setattr(
+        "cembench.algorithms.direct_cem.disk.arcs_of_measure", lambda seen, lengths: lengths
+    )
     assert energy <= direct_cem(mesh, max_iterations=0).energy_history[0]
 
 

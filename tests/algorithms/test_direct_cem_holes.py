@@ -1,14 +1,14 @@
 import numpy as np
 import pytest
+from cembench.algorithms.direct_cem.holes import direct_cem_holes
+from cembench.surfaces.holed_disk import disk_with_holes
+from cembench.surfaces.sheets import catenoid_ring
 
-from algorithms.direct_cem_holes import direct_cem_holes
 from cembench import HoledMesh, ParameterError
-from cembench.geometry.cholesky import Cholesky
-from cembench.geometry.cholmod import CholmodFactor
-from cembench.geometry.files import read_mesh
-from cembench.metrics import all_metrics, boundary_circles
-from meshes_gen.holed_disk import disk_with_holes
-from meshes_gen.sheets import catenoid_ring
+from cembench.conformal.metrics import all_metrics, boundary_circles
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholmod import CholmodFactor
+from cembench.mesh.files import read_mesh
 from tests import gallery
 from tests.real_meshes import real_mesh
 

@@ -1,17 +1,17 @@
 import numpy as np
 import pytest
+from cembench.algorithms import fdm as module
+from cembench.algorithms.fdm import fdm
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from algorithms import fdm as module
-from algorithms.fdm import fdm
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.geometry.beltrami import beltrami_coefficients
-from cembench.geometry.doubling import doubled
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.planar import signed_areas
-from cembench.metrics import all_metrics
-from meshes_gen.flat_disk import flat_disk
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from cembench.conformal.beltrami import beltrami_coefficients
+from cembench.conformal.doubling import doubled
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import all_metrics
+from cembench.conformal.planar import signed_areas
 from tests import gallery
 
 

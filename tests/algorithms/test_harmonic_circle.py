@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from cembench.algorithms.harmonic_circle import harmonic_circle
+from cembench.surfaces.flat_disk import flat_disk
 
-from algorithms.harmonic_circle import harmonic_circle
 from cembench import DiskMesh
-from cembench.geometry.harmonic import arc_length_circle
-from cembench.geometry.laplacian import laplacian
-from meshes_gen.flat_disk import flat_disk
+from cembench.conformal.harmonic import arc_length_circle
+from cembench.conformal.laplacian import laplacian
 from tests import gallery
 
 

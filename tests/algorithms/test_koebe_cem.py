@@ -2,20 +2,20 @@
 
 import numpy as np
 import pytest
+from cembench.algorithms.harmonic_filled import harmonic_filled
+from cembench.algorithms.koebe_cem import steps as koebe
+from cembench.algorithms.koebe_cem.koebe_cem import koebe_cem
+from cembench.algorithms.koebe_cem.steps import koebe_steps
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.holed_disk import disk_with_holes
 from scipy.optimize import least_squares
 
-from algorithms.harmonic_filled import harmonic_filled
-from algorithms.koebe_cem import koebe_cem
 from cembench import AlgorithmFailed, HoledMesh, MeshError
-from cembench.errors import ParameterError
-from cembench.geometry import koebe
-from cembench.geometry.cholmod import CholmodFactor
-from cembench.geometry.files import read_mesh
-from cembench.geometry.koebe import koebe_steps
-from cembench.metrics import all_metrics, boundary_circles
+from cembench.conformal.metrics import all_metrics, boundary_circles
+from cembench.core.errors import ParameterError
+from cembench.linear_algebra.cholmod import CholmodFactor
+from cembench.mesh.files import read_mesh
 from cembench.running.measure import faults
-from meshes_gen.flat_disk import flat_disk
-from meshes_gen.holed_disk import disk_with_holes
 from tests import gallery
 from tests.real_meshes import real_mesh
 

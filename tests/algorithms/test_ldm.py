@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
+from cembench.algorithms import ldm as module
+from cembench.algorithms.ldm import ldm
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from algorithms import ldm as module
-from algorithms.ldm import ldm
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.clock import measure
-from cembench.metrics import all_metrics
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from cembench.conformal.metrics import all_metrics
+from cembench.core.clock import measure
 from tests import gallery
 
 

@@ -1,12 +1,12 @@
 import igl
 import numpy as np
 import pytest
+from cembench.algorithms.lscm import lscm
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from algorithms.lscm import lscm
 from cembench import AlgorithmFailed
-from cembench.metrics import all_metrics
-from meshes_gen.flat_disk import flat_disk
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from cembench.conformal.metrics import all_metrics
 
 
 def test_it_is_the_field_s_map_up_to_scale():
@@ -40,6 +40,6 @@ def test_a_flat_surface_comes_out_as_it_is():
 
 
 def test_a_collapsed_image_is_a_failure(monkeypatch):
-    monkeypatch.setattr("algorithms.lscm.polygon_area", lambda loop: 0.0)
+    monkeypatch.setattr("cembench.algorithms.lscm.polygon_area", lambda loop: 0.0)
     with pytest.raises(AlgorithmFailed, match="not positive: the map has collapsed"):
         lscm(hemi_ellipsoid(100))

@@ -5,13 +5,13 @@ Lion. Where a cell is met to its last printed digit the tolerance is half a unit
 """
 
 import pytest
+from cembench.algorithms.cem import cem
+from cembench.algorithms.fdm import fdm
+from cembench.algorithms.ldm import ldm
+from cembench.algorithms.qiem import qiem
 
-from algorithms.cem import cem
-from algorithms.fdm import fdm
-from algorithms.ldm import ldm
-from algorithms.qiem import qiem
-from cembench.geometry.files import read_mesh
-from cembench.metrics import all_metrics
+from cembench.conformal.metrics import all_metrics
+from cembench.mesh.files import read_mesh
 from tests.real_meshes import DISKS, real_mesh
 
 PRINTED = {  # E_C, mean, SD

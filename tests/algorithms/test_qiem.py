@@ -1,15 +1,15 @@
 import numpy as np
 import pytest
+from cembench.algorithms import qiem as module
+from cembench.algorithms.qiem import qiem
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from algorithms import qiem as module
-from algorithms.qiem import qiem
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.geometry.cholesky import linear_algebra
-from cembench.geometry.cholmod import CholmodFactor
-from cembench.geometry.doubling import doubled, doubled_laplacian
-from cembench.geometry.laplacian import laplacian
-from cembench.metrics import all_metrics
-from meshes_gen.hemi_ellipsoid import hemi_ellipsoid
+from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import all_metrics
+from cembench.linear_algebra.cholesky import linear_algebra
+from cembench.linear_algebra.cholmod import CholmodFactor
 from tests import gallery
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.tracked import algorithms, cases
 from benchmarks.tracked import kernels as kernels_module
-from cembench.geometry.mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh
 
 ROOT = Path(__file__).parents[2]
 

@@ -7,10 +7,10 @@ import time
 from pathlib import Path
 
 import pytest
+from cembench.surfaces import cache
+from cembench.surfaces.spherical_cap import spherical_cap
 
-from cembench.geometry.mesh import DiskMesh
-from meshes_gen import cache
-from meshes_gen.spherical_cap import spherical_cap
+from cembench.mesh.triangle_mesh import DiskMesh
 
 
 @pytest.fixture(autouse=True)

@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cembench.algorithms.cem import cem
+from cembench.surfaces import catalogue
+from cembench.surfaces.faces import EXPRESSIONS
+from cembench.surfaces.head import Head
+from cembench.surfaces.remesh import march
+from cembench.surfaces.rows import ROWS
 
-from algorithms.cem import cem
-from cembench.errors import RegistryError
-from cembench.geometry.laplacian import non_delaunay_share
-from cembench.geometry.mesh import DiskMesh
-from cembench.metrics import flipped_triangles
-from cembench.paper.profiles import Profile, surfaces_of
+from cembench.conformal.laplacian import non_delaunay_share
+from cembench.conformal.metrics import flipped_triangles
+from cembench.core.errors import RegistryError
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
-from cembench.reporting.surface_facts import factor_spans, row_check
+from cembench.report.surface_facts import factor_spans, row_check
+from cembench.results.paper.profiles import Profile, surfaces_of
 from cembench.running.plan import Standing, mesh_facts
-from meshes_gen import catalogue
-from meshes_gen.faces import EXPRESSIONS
-from meshes_gen.head import Head
-from meshes_gen.remesh import march
-from meshes_gen.rows import ROWS
 
 #: Made in seconds; the others are for the slow run.
 QUICK = ("nefertiti", "cowboy-hat", "chinese-vase")
@@ -117,8 +117,8 @@ def test_some_edges_not_delaunay_on_request() -> None:
 
 
 def test_another_route_without_pymeshlab(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("meshes_gen.remesh.has_remeshing_filter", lambda: False)
-    monkeypatch.setattr("meshes_gen.catalogue.has_remeshing_filter", lambda: False)
+    monkeypatch.setattr("cembench.surfaces.remesh.has_remeshing_filter", lambda: False)
+    monkeypatch.setattr("cembench.surfaces.catalogue.has_remeshing_filter", lambda: False)
     mesh = catalogue.stand_in("cowboy-hat")
     assert "pymeshlab" in mesh.notices[0]
     assert "doctor" in mesh.notices[0]
@@ -157,7 +157,7 @@ def test_the_quick_profile_takes_the_stand_ins_of_the_eight_smallest_models() ->
 
 def test_pouting_lips_leave_no_tunnel_to_plug(monkeypatch: pytest.MonkeyPatch) -> None:
     plugged: list[object] = []
-    monkeypatch.setattr("meshes_gen.remesh.plugs_for", lambda *a: plugged.append(a))
+    monkeypatch.setattr("cembench.surfaces.remesh.plugs_for", lambda *a: plugged.append(a))
     march(catalogue.BODIES["ho-pouting-face"](0))
     assert not plugged
 

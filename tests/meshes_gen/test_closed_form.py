@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from cembench.surfaces import cone, holed, sheets, spherical_cap
 from numpy.typing import NDArray
 
-from cembench.errors import ParameterError
-from cembench.geometry.mesh import DiskMesh, TriangleMesh
-from cembench.metrics import all_metrics
-from meshes_gen import cone, holed, sheets, spherical_cap
+from cembench.conformal.metrics import all_metrics
+from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 Case = Callable[[int], tuple[TriangleMesh, NDArray[np.complex128]]]
 QUARTERS = np.deg2rad(270)

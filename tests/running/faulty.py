@@ -10,8 +10,8 @@ import time
 import numpy as np
 
 from cembench import AlgorithmFailed, DiskMesh, Parameterization, algorithm
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian
 
 
 def good_map(mesh):

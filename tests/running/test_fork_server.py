@@ -7,7 +7,7 @@ import time
 import psutil
 import pytest
 
-from cembench.records import Outcome, Round
+from cembench.results.records import Outcome, Round
 from cembench.running.environment import with_threads
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.local import Launcher, Options

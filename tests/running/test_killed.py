@@ -12,14 +12,14 @@ from contextlib import suppress
 import psutil
 import pytest
 
-from cembench.samples import Samples
-from cembench.store import Store
+from cembench.results.samples import Samples
+from cembench.results.store import Store
 from tests.running.test_local import FAULTY
 
 
 def command(folder):
     return [
-        *(sys.executable, "-m", "cembench.cli", "run", "--plugin", FAULTY, "--json"),
+        *(sys.executable, "-m", "cembench.commands.cli", "run", "--plugin", FAULTY, "--json"),
         *("--surfaces", "flat-disk", "--faces", "600", "-a", "good,by-chance,nan,harmonic-circle"),
         *("--repeats", "2", "-o", str(folder)),
     ]

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import psutil
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.registry import load_registry
+from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.local import Options, Watcher, in_random_order, map_once, run_tasks
 from cembench.running.plan import How, plan_cells
-from cembench.store import Store
-from meshes_gen.flat_disk import flat_disk
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
 MEMORY = 500 * 2**20

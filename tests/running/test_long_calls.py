@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from cembench import DiskMesh
-from cembench.parameterization import Parameterization
-from cembench.records import Cell
+from cembench.core.parameterization import Parameterization
 from cembench.registry import algorithm, load_registry
+from cembench.results.records import Cell
 from cembench.running import measure
 from cembench.running.plan import generate_surface
 

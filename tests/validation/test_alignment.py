@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
 
-from cembench.geometry.moebius import Moebius
+from cembench.conformal.moebius import Moebius
 from cembench.validation.alignment import closest_moebius, distance
-from meshes_gen.flat_disk import flat_disk
 
 POINTS = flat_disk(600).V @ np.array([1, 1j, 0])
 RING = POINTS[np.abs(POINTS) > 0.4]

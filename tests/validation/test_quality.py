@@ -1,6 +1,6 @@
 import pytest
 
-from cembench.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 from cembench.validation.quality import (
     comparison_with,
     folds_on,

@@ -1,6 +1,6 @@
 import pytest
 
-from cembench.errors import ParameterError
+from cembench.core.errors import ParameterError
 from cembench.validation.scaling import growth, growths, scales, sizes
 from tests.validation.test_quality import record
 

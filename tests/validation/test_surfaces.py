@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cembench import DiskMesh, HoledMesh
-from cembench.metrics import all_metrics
+from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
 from cembench.validation import surfaces
 

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from cembench.records import Record
+from cembench.results.records import Record
 from tests.validation.in_this_process import LauncherHere, call_here
 
 FILE = Path(__file__).with_name("wrong.py")

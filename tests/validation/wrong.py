@@ -4,14 +4,14 @@ import time
 from typing import Annotated
 
 import numpy as np
+from cembench.algorithms.cem import cem
 from pydantic import Field
 
-from algorithms.cem import cem
 from cembench import AlgorithmFailed, DiskMesh, Parameterization, algorithm
-from cembench.geometry import cholesky
-from cembench.geometry.harmonic import arc_length_circle, harmonic_extension
-from cembench.geometry.laplacian import laplacian
-from cembench.geometry.planar import signed_areas
+from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.planar import signed_areas
+from cembench.linear_algebra import cholesky
 
 
 def right(mesh):

@@ -1,0 +1,381 @@
+"""The conformal energy of harmonic maps to a circle domain, minimised over where the boundary lies.
+
+A map that is harmonic inside has E_C = z^* S z / 2 - A(z), z its boundary values: S is the
+Dirichlet-to-Neumann matrix, A the area of the boundary polygons (Eqs. 5, 7, 8). Free are the angle
+of every vertex on its circle, and the centre and the radius of every hole. With G = S z - grad A,
+grad A at vertex j being -(i/2) (z_next - z_previous), E_C = Re(z^* G) / 2, its derivative along dz
+is Re(dz^* G), and the second one Re(dz^* (S - A'') dz) + Re(G^* d^2 z). So steps are Newton's.
+
+S and its inverse cost B^2 operations for B boundary vertices. S is also what preconditions: on the
+disk the Hessian's Fourier mode k has |k| - 1 where S has |k|.
+
+The Moebius maps of the disk leave conformality as it is, but the energy of a polygon only nearly.
+So they are held fixed by a *gauge*: weights w, 1 in sum, for which sum w z = 0.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+
+from .circle_domain import CircleDomain
+from .trust_region import newton_step
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Fourier modes from 2 to this one get the Hessian's own weight in the preconditioner.
+MODES = 8
+#: A promised decrease below this, times the number of boundary vertices, is rounding.
+ROUNDING = 1e-16
+#: With more arcs than this held at their least length the boundary is too crowded to go on.
+MOST_HELD = 64
+#: How small CG makes the residual of a Newton step, as a share of the gradient: products are cheap,
+#: and with coarser steps crowded circles need ten times as many of them.
+ACCURACY = 0.01, 0.03
+#: Among radii and centres no curvature counts for less than this share of the largest.
+LEAST_CURVATURE = 1e-12
+#: How near to 0 the gauge brings sum w z, and in how many Newton steps at most.
+GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 50
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where the minimisation ended.
+
+    `energies` are E_C of the start and after every step; `gradient` is the gradient's norm, whose
+    square is about twice what E_C could still fall; `reason` tells what ended it: "gradient" (it is
+    small enough), "rounding" (nothing more to gain in floating point), "iterations", or
+    "crowded" (more than `MOST_HELD` arcs at their least length; then `gradient` is NaN); `products`
+    counts those with the Hessian, `held_arcs` the arcs that would have to become shorter than they
+    may be for the energy to fall further.
+    """
+
+    model: EnergyModel
+    energies: tuple[float, ...]
+    gradient: float
+    reason: str
+    products: int
+    held_arcs: int
+
+
+def minimise(
+    S: DirichletToNeumann,
+    start: CircleDomain,
+    weights: Real,
+    *,
+    tolerance: float,
+    max_iterations: int,
+) -> Minimum:
+    """Which boundary on circles has the least conformal energy, in the gauge `weights` (B,)?
+
+    Ends when E_C can fall by no more than the share `tolerance` of itself; never above the energy
+    of the start, which is brought into the gauge first.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The gauge cannot be reached.
+
+    """
+    here = EnergyModel(S, in_gauge(start, weights), weights)
+    energies, radius, products = [here.energy], 1.0, 0
+    while True:
+        if len(here.held) > MOST_HELD:
+            reason = "crowded"
+            break
+        if here.gradient_norm**2 <= 2 * tolerance * here.energy:
+            reason = "gradient"
+            break
+        if len(energies) > max_iterations:
+            reason = "iterations"
+            break
+        with phase("boundary step"):
+            accuracy = float(np.clip(here.gradient_norm, *ACCURACY))
+            step = newton_step(
+                here.gradient, here.uphill, here.hessian, here.precondition, radius, accuracy
+            )
+        products += step.products
+        if not step.decrease >= ROUNDING * len(weights):
+            reason = "rounding"
+            break
+        there = _tried(here, step.p)
+        agreement = (here.energy - there.energy) / step.decrease if there else -np.inf
+        if agreement > 0.75 and step.at_edge:
+            radius *= 3
+        elif not agreement > 0.25:
+            radius = step.length / 4
+        if there and agreement > 1e-4 and there.energy < here.energy:
+            here = there
+            energies.append(here.energy)
+    gradient = float("nan") if reason == "crowded" else here.gradient_norm
+    return Minimum(here, tuple(energies), gradient, reason, products, len(here.held))
+
+
+def moebius_descent(here: EnergyModel, leash: float) -> complex:
+    """Which Moebius map z -> (z - a) / (1 - conj(a) z), |a| <= `leash`, lowers the energy most?
+
+    By the second-order model of E_C in a: z moves by -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3
+    + ....
+    """
+    z, G = here.domain.points, here.residual
+    squared = z * z
+    fields = np.stack([squared - 1, -1j * (squared + 1)], axis=1)  # for real and for imaginary a
+    g = np.real(np.conj(fields).T @ G)
+    H = np.real(np.conj(fields).T @ here.residual_of(fields))
+    once, cubed = complex(np.vdot(z, G)), complex(np.vdot(squared * z, G))
+    across = -2 * cubed.imag
+    H += [[2 * (cubed - once).real, across], [across, -2 * (cubed + once).real]]
+    # In units of the leash: the model's minimum in the unit disk (More and Sorensen 1983).
+    curvatures, axes = np.linalg.eigh(leash**2 * (H + H.T) / 2)
+    first, second = map(float, leash * (axes.T @ g))
+    low_curvature, high_curvature = map(float, curvatures)
+
+    def minimum(shift: float) -> tuple[float, float]:
+        return first / (low_curvature + shift), second / (high_curvature + shift)
+
+    rounding = sys.float_info.epsilon * max(map(abs, (low_curvature, high_curvature)))
+    low = max(0.0, -low_curvature) + rounding + sys.float_info.min
+    if math.hypot(*minimum(low)) > 1:
+        high = low + math.hypot(first, second)
+        for _ in range(60):
+            middle = (low + high) / 2
+            outside = math.hypot(*minimum(middle)) > 1
+            low, high = (middle, high) if outside else (low, middle)
+        low = high
+    return -leash * complex(*(axes @ minimum(low)))
+
+
+def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:
+    """What is the energy where this step leads? None where circles meet, or the gauge is lost."""
+    domain = here.moved(step)
+    if not domain.apart:
+        return None
+    try:
+        return here.at(in_gauge(domain, here.weights))
+    except AlgorithmFailed:
+        return None
+
+
+def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
+    """Which Moebius image of this domain has sum w z = 0?
+
+    Raises
+    ------
+    AlgorithmFailed
+        Newton's method finds none: a single vertex has too much of the weight.
+
+    """
+    for _ in range(GAUGE_STEPS):
+        a = _to_gauge(domain.points, weights)
+        if a == 0:
+            return domain
+        domain = domain.through(a)
+    mean = abs(weights @ domain.points)
+    raise AlgorithmFailed(
+        f"no Moebius map of the disk brings the gauge's mean to 0 (it stays at {mean:.2g}): "
+        "a single boundary vertex has too much of the weight. Choose another gauge"
+    )
+
+
+def _to_gauge(points: Complex, weights: Real) -> complex:
+    """Which a, 0.5 at most, brings sum w z nearer to 0 by z -> (z - a) / (1 - conj(a) z)?
+
+    By Newton's method on the points alone; 0 where nothing is left to be done.
+    """
+    a, z = 0j, points
+    for _ in range(GAUGE_STEPS):
+        middle, second = complex(weights @ z), complex(weights @ (z * z))
+        if abs(middle) < GAUGE_ACCURACY:
+            break
+        # A small b moves sum w z by -b + conj(b) sum w z^2.
+        bottom = 1 - abs(second) ** 2
+        b = (middle + second * middle.conjugate()) / bottom if bottom > 0 else middle
+        b *= min(1.0, 0.5 / abs(b))
+        a = (a + b) / (1 + a.conjugate() * b)
+        if abs(a) > 0.5:
+            return a * (0.5 / abs(a))
+        z = (points - a) / (1 - a.conjugate() * points)
+    return a
+
+
+class EnergyModel:
+    """E_C at a domain, its gradient, Hessian and preconditioner on steps that keep the gauge.
+
+    A step is a real vector: by how much every vertex moves along its circle (B), then for the holes
+    by how much the radii grow, and the centres move right, and up.
+    """
+
+    def __init__(self, S: DirichletToNeumann, domain: CircleDomain, weights: Real) -> None:
+        self.S, self.domain, self.weights = S, domain, weights
+        with phase("energy"):
+            self.residual = self.residual_of(domain.points)
+            self.energy = 0.5 * float(np.vdot(domain.points, self.residual).real)
+
+    def at(self, domain: CircleDomain) -> EnergyModel:
+        """The same at another domain."""
+        return EnergyModel(self.S, domain, self.weights)
+
+    def residual_of(self, z: Complex) -> Complex:
+        """(S - A'') z for z (B,) or (B, k)."""
+        rims = self.domain.rims
+        return self.S(z) + 0.5j * (z[rims.following] - z[rims.previous])
+
+    @cached_property
+    def _along(self) -> Complex:
+        """Where does dz go as each vertex moves along its circle? Shape (B,)."""
+        return 1j * self.domain.directions
+
+    @cached_property
+    def _holes(self) -> Complex | None:
+        """Where does dz go as each radius grows, each centre moves right, and up? (B, 3 holes)."""
+        rims = self.domain.rims
+        if not len(rims.holes):
+            return None
+        inside = rims.loop[:, None] == rims.holes
+        grow = inside * self.domain.directions[:, None]
+        return np.concatenate([grow, inside.astype(complex), 1j * inside], axis=1)
+
+    def _velocity(self, x: Real) -> Complex:
+        """Dz of a step."""
+        B = len(self._along)
+        moved = self._along * x[:B]
+        return moved if self._holes is None else moved + self._holes @ x[B:]
+
+    def _pulled_back(self, u: Complex) -> Real:
+        """Re(dz^* u) as a function of the step."""
+        along = (self._along.conj() * u).real
+        if self._holes is None:
+            return along
+        return np.concatenate([along, np.real(np.conj(self._holes).T @ u)])
+
+    def moved(self, x: Real) -> CircleDomain:
+        """The domain that a step leads to."""
+        domain, holes, B = self.domain, self.domain.rims.holes, len(self._along)
+        growth, shift = np.zeros_like(domain.radii), np.zeros_like(domain.centres)
+        grown, right, up = x[B:].reshape(3, -1)
+        growth[holes], shift[holes] = grown, right + 1j * up
+        return domain.moved(x[:B], growth, shift)
+
+    @cached_property
+    def gradient(self) -> Real:
+        """Derivative of E_C along each entry of a step."""
+        return self._pulled_back(self.residual)
+
+    @cached_property
+    def _outward(self) -> Real:
+        """How much does the residual point away from the circle's centre, by its radius? (B,)."""
+        return (self.residual.conj() * self.domain.directions).real / self.domain.radius
+
+    def hessian(self, x: Real) -> Real:
+        """Second derivative of E_C, applied to a step."""
+        domain, rims = self.domain, self.domain.rims
+        B, h = len(domain.arcs), len(rims.holes)
+        result = self._pulled_back(self.residual_of(self._velocity(x)))
+        # d^2 z = exp(i theta) (-dx^2 + 2 i dx dr) / r
+        result[:B] -= self._outward * x[:B]
+        if h:
+            turning = self.gradient[:B] / domain.radius
+            grown = np.zeros(h + 1)
+            grown[rims.holes] = x[B : B + h]
+            result[:B] += turning * grown[rims.loop]
+            result[B : B + h] += rims.sums(turning * x[:B])[rims.holes]
+        return result
+
+    @cached_property
+    def _modes(self) -> tuple[Real, Real]:
+        """Fourier modes on the outer circle, and by how much 1 / (|k| - 1) exceeds 1 / |k|."""
+        domain, k = self.domain, np.arange(2, MODES + 1)
+        base = np.where(domain.rims.on_outer, domain.directions, 0)
+        powers = np.multiply.accumulate(np.broadcast_to(base, (MODES, len(base))))[1:].T
+        weights = 1 / (np.pi * k * (k - 1))
+        return np.concatenate([powers.real, powers.imag], axis=1), np.tile(weights, 2)
+
+    @cached_property
+    def _hole_block(self) -> Real:
+        """Inverse of the Hessian's block of radii and centres."""
+        assert self._holes is not None
+        block = np.real(np.conj(self._holes).T @ self.residual_of(self._holes))
+        values, vectors = np.linalg.eigh((block + block.T) / 2)
+        values = np.maximum(values, LEAST_CURVATURE * values[-1])
+        return np.asarray(vectors / values @ vectors.T)
+
+    def _unconstrained(self, g: Real) -> Real:
+        """M^-1 g; g (N,) or (N, k)."""
+        B = len(self._along)
+        modes, weights = self._modes
+        along = self.S.inverse(g[:B]) + (modes * weights) @ (modes.T @ g[:B])
+        if len(g) == B:
+            return along
+        return np.concatenate([along, self._hole_block @ g[B:]])
+
+    @cached_property
+    def _gauge(self) -> tuple[Real, Real, Real]:
+        """Constraints, as :meth:`_constrained` has them: the mean and the outer circle stay."""
+        rims, mean = self.domain.rims, self.weights * self._along
+        turn = rims.on_outer / rims.sizes[rims.outer]
+        if self._holes is not None:
+            mean = np.concatenate([mean, self.weights @ self._holes])
+            turn = np.concatenate([turn, np.zeros(self._holes.shape[1])])
+        return self._constrained(np.stack([mean.real, mean.imag, turn], axis=1))
+
+    def _constrained(self, c: Real) -> tuple[Real, Real, Real]:
+        """Columns c that a step must be orthogonal to, M^-1 c, and the inverse of c^T M^-1 c."""
+        preconditioned = self._unconstrained(c)
+        return c, preconditioned, np.asarray(np.linalg.inv(c.T @ preconditioned), dtype=np.float64)
+
+    @cached_property
+    def held(self) -> NDArray[np.int64]:
+        """Which arcs are as short as they may be, and would become shorter downhill?"""
+        domain = self.domain
+        short = np.flatnonzero(domain.shortest)
+        if not len(short):
+            return short
+        rims, B = domain.rims, len(domain.arcs)
+        downhill = -_projected(self._free_uphill, self._gauge)[:B]
+        change = rims.sense * (downhill[rims.following] - downhill)
+        return short[change[short] < 0]
+
+    @cached_property
+    def _constraints(self) -> tuple[Real, Real, Real]:
+        """Those of the gauge, and that held arcs keep their length."""
+        if not len(self.held):
+            return self._gauge
+        c, k = self._gauge[0], np.arange(len(self.held))
+        keep = np.zeros((len(c), len(k)))
+        keep[self.domain.rims.following[self.held], k] = 1
+        keep[self.held, k] = -1
+        return self._constrained(np.concatenate([c, keep], axis=1))
+
+    def precondition(self, g: Real) -> Real:
+        """What is M^-1 g, projected onto the steps that keep the gauge?"""
+        return _projected(self._unconstrained(g), self._constraints)
+
+    @cached_property
+    def _free_uphill(self) -> Real:
+        return self._unconstrained(self.gradient)
+
+    @cached_property
+    def uphill(self) -> Real:
+        """The preconditioned gradient."""
+        with phase("boundary step"):
+            return _projected(self._free_uphill, self._constraints)
+
+    @cached_property
+    def gradient_norm(self) -> float:
+        """Norm of the gradient on these steps, (g M^-1 g)^(1/2)."""
+        return max(0.0, float(self.gradient @ self.uphill)) ** 0.5
+
+
+def _projected(x: Real, constraints: tuple[Real, Real, Real]) -> Real:
+    c, preconditioned, inverse = constraints
+    return x - preconditioned @ (inverse @ (c.T @ x))

@@ -1,0 +1,122 @@
+"""The conformal energy minimised directly over where the boundary lies on the unit circle."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.conformal.folds import without_folds
+from cembench.conformal.gauge import Gauge, gauge_measure
+from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import SampledAngleError, flipped_triangles
+from cembench.core.clock import phase
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+from .boundary_energy import EnergyModel, in_gauge, minimise
+from .circle_domain import CircleDomain
+from .filled_start import arcs_of_measure
+from .gauge_walk import STEPS, gauge_walk
+
+Real = NDArray[np.float64]
+
+#: What share of E_C the way back towards harmonic measure may cost.
+MOST_COST = 0.01
+
+
+@algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
+def direct_cem(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
+    max_iterations: Annotated[int, Field(ge=0)] = 50,
+    gauge: Gauge = "boundary",
+    back: Annotated[float, Field(ge=0, le=1)] = 0.3,
+    delaunay: bool = False,
+) -> Parameterization:
+    """Which boundary on the unit circle has the least conformal energy? Newton's method finds it.
+
+    E_C of the harmonic map (Eqs. 5, 7, 8) is a function of the boundary's angles alone,
+    z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first,
+    boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block:
+    Newton steps (trust region, preconditioned by S^-1) touch nothing but the boundary.
+
+    Decided here: the start is the harmonic measure of the boundary from the triangle nearest to the
+    mean vertex, or arc length where that has lower energy (`start`); it is brought into the
+    `gauge`, that is, a mean comes to lie at 0: of the boundary by length, of that triangle, or of
+    the surface by area; from there Moebius maps are held by the start's arcs. Iteration ends when
+    the gradient, whose squared norm is about twice what E_C can still fall, says that this is at
+    most the share `tolerance` of E_C (`stopped`: "gradient"), when nothing is left but rounding
+    ("rounding"), after `max_iterations` ("iterations"), or when too many arcs would fall below a
+    tenth of their length at the start ("crowded"; `held_arcs` counts those held). Near its minimum
+    E_C is flat, angles are not: so the boundary then goes the share `back` of the way to harmonic
+    measure, whose angles are better on coarse boundaries. Of what E_C fell that costs the share
+    back^2; less of the way is gone where that would be more than 1 % of E_C, and none with 0. With
+    the gauge "boundary" the mean then leaves 0, by 0.05 at a time and five times at most
+    (`gauge_steps`), while E_C falls by 0.15 % at least, and by twenty times the share by which the
+    mean angle error grows. Folds are mended as in CEM (`fold_repairs`). `delaunay` takes the
+    weights of the intrinsic Delaunay triangulation, in the energy history too;
+    `folded_before_repair` then counts the folds that the original edges force, and they stay.
+    """
+    L = laplacian(mesh, delaunay=delaunay)
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    S = bordered.dirichlet_to_neumann()
+    with phase("start"):
+        middle = gauge_measure(mesh, "triangle", mesh.boundary)
+        centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
+    seen, weights = bordered.swept_to_boundary(np.stack([middle, centred], axis=1)).T
+    start, begun = _start(mesh, S, seen, weights)
+    held = weights if gauge == "triangle" else start.outer_measure
+    found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
+    energies = found.energies
+    share = _share(back, energies) if begun == "harmonic measure" else 0.0
+    here = found.model
+    if share:
+        here = here.at(in_gauge(here.domain.towards(start, share), held))
+        energies += (here.energy,)
+    steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
+    energies += walked
+    folded = flipped_triangles(mesh, uv)
+    uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
+    extras = {
+        "stopped": found.reason,
+        "gradient": None if found.reason == "crowded" else found.gradient,
+        "start": begun,
+        "gauge_steps": len(walked),
+        "hessian_products": found.products,
+        "held_arcs": found.held_arcs,
+        "folded_before_repair": folded,
+        "fold_repairs": repairs,
+    }
+    return Parameterization(uv, len(energies) - 1, energies, extras)
+
+
+def _share(back: float, energies: tuple[float, ...]) -> float:
+    """Which share of the way back costs no more than it may, E_C being a parabola on it?"""
+    fallen = energies[0] - energies[-1]
+    return min(back, (MOST_COST * energies[-1] / fallen) ** 0.5) if fallen > 0 else 0.0
+
+
+def _start(
+    mesh: DiskMesh, S: DirichletToNeumann, seen: Real, weights: Real
+) -> tuple[CircleDomain, str]:
+    """Which start has the lower energy in the gauge: harmonic measure, or arc length? And its name.
+
+    `seen` is the harmonic measure from the middle triangle.
+    """
+    lengths = edge_lengths(mesh, mesh.boundary)
+    arcs = {"harmonic measure": arcs_of_measure(seen, lengths), "arc length": lengths}
+    models = {}
+    for name in arcs:
+        domain = in_gauge(CircleDomain.of_arcs(arcs[name]), weights)
+        models[name] = EnergyModel(S, domain, weights)
+    best = min(models, key=lambda name: models[name].energy)
+    return models[best].domain, best

@@ -1,0 +1,85 @@
+"""The conformal energy minimised directly over the unit disks with circular holes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.folds import interior_without_folds
+from cembench.conformal.gauge import Gauge, gauge_measure
+from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import SampledAngleError, flipped_triangles
+from cembench.core.clock import phase
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import HoledMesh
+from cembench.registry import algorithm
+
+from .boundary_energy import in_gauge, minimise
+from .filled_start import widest_start
+from .gauge_walk import STEPS, gauge_walk
+
+
+@algorithm(
+    "direct-cem-holes",
+    title="Direct CEM",
+    target="circular holes",
+    source="This suite: docs/direct_cem.md",
+)
+def direct_cem_holes(
+    mesh: HoledMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-7,
+    max_iterations: Annotated[int, Field(ge=0)] = 100,
+    gauge: Gauge = "boundary",
+    outer: Annotated[int, Field(ge=0)] | None = None,
+    delaunay: bool = False,
+) -> Parameterization:
+    """Which circles, and which places on them, have the least conformal energy?
+
+    As `direct-cem`, without its way back, with the centre and the radius of every hole as further
+    unknowns; the holes are open in every step, and their circles exact. The outer boundary is that
+    of the vertex `outer`, or the longest. Decided here: the start fills the holes with disks and
+    takes circles of the images' centroids and areas; where one of these has a radius below 1e-3,
+    each boundary is tried as the outer one, the one that leaves the smallest circle largest is
+    outside while E_C is minimised (`outside_while_minimised`; the energy history is that of this
+    domain), and a Moebius map brings the outer one out; folds are mended with the boundary kept
+    (`fold_repairs`).
+    """
+    L = laplacian(mesh, delaunay=delaunay)
+    with phase("boundary"):
+        longest, holes = mesh.outer_and_holes(outer)
+    bordered = BorderedLaplacian(mesh, L, (longest, *holes))
+    S = bordered.dirichlet_to_neumann()
+    with phase("start"):
+        measures = [gauge_measure(mesh, name, longest) for name in ("triangle", gauge)]
+    seen, weights = bordered.swept_to_boundary(np.stack(measures, axis=1)).T
+    with phase("start"):
+        lengths = [edge_lengths(mesh, loop) for loop in (longest, *holes)]
+        start = widest_start(S, seen, lengths)
+    chart = start.rims.outer
+    start = start if chart else in_gauge(start, weights)
+    held = weights if gauge == "triangle" and not chart else start.outer_measure
+    found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
+    here = found.model
+    if chart:
+        here = here.at(in_gauge(here.domain.inside_out(0), weights))
+    steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
+    energies = found.energies if chart else found.energies + walked
+    folded = flipped_triangles(mesh, uv)
+    uv, repairs = interior_without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
+    extras = {
+        "stopped": found.reason,
+        "gradient": None if found.reason == "crowded" else found.gradient,
+        "gauge_steps": len(walked),
+        "hessian_products": found.products,
+        "held_arcs": found.held_arcs,
+        "outside_while_minimised": int(longest[0] if not chart else holes[chart - 1][0]),
+        "folded_before_repair": folded,
+        "fold_repairs": repairs,
+    }
+    return Parameterization(uv, len(energies) - 1, energies, extras)

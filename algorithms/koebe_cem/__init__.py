@@ -1,0 +1,1 @@
+"""Koebe-CEM: Algorithm 2 of the paper, for surfaces with holes."""

@@ -1,0 +1,70 @@
+"""CEM for surfaces with holes: Koebe's method (the paper's Algorithm 2)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from cembench.conformal.metrics import boundary_circularity
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import HoledMesh
+from cembench.registry import algorithm
+
+from .steps import Patches, Weights, finished, koebe_steps
+
+
+@algorithm(
+    "koebe-cem",
+    title="Koebe-CEM",
+    target="circular holes",
+    source="The CEM paper, Algorithm 2; Zeng et al. 2009",
+)
+def koebe_cem(
+    mesh: HoledMesh,
+    *,
+    sweeps: Annotated[int, Field(ge=1)] = 1,
+    outer: Annotated[int, Field(ge=0)] | None = None,
+    tolerance: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 1e-5,
+    max_iterations: Annotated[int, Field(ge=0)] = 20,
+    inversion: bool = True,
+    patches: Patches = "disks",
+    weights: Weights = "surface",
+    rounding: bool = True,
+) -> Parameterization:
+    """Which map takes a surface with holes to a disk with round holes? Algorithm 2 of the paper.
+
+    One sweep is Algorithm 2: each boundary in turn is left open, the others are filled, and CEM
+    makes it a circle; the outer one (that of the vertex `outer`, or the longest) comes last. More
+    sweeps go on from there. Decided here: the surface's own triangles keep the surface's cotangent
+    weights in every step (`weights="plane"` takes those of the last image, as the paper's text
+    reads); a hole that has an image is filled by a round disk with its vertices where the image
+    puts them (`patches="fans"`: by a fan to the centroid, as in the paper, which knows nothing of
+    the disk's inside); the holes come longest first, so the shortest is opened first; a step starts
+    from the paper's pole (in later sweeps from where the boundary was when last opened) or from the
+    boundary's last image put on a circle, whichever has the lower E_C; at last each hole is put on
+    the circle fitted to it and the interior is solved for again (`rounding`;
+    `circularity_before_rounding` tells how far it was). Since patches change only dense blocks at
+    the boundary, the interior is eliminated once, for all steps of all sweeps.
+    """
+    steps = list(
+        koebe_steps(
+            mesh,
+            sweeps=sweeps,
+            outer=outer,
+            patches=patches,
+            weights=weights,
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+            inversion=inversion,
+        )
+    )
+    iterations = [len(step.energies) - 1 for step in steps]
+    uv, repairs = finished(mesh, steps[-1], outer=outer, rounding=rounding)
+    extras: dict[str, Any] = {
+        "iterations_by_step": iterations,
+        "order_kept": sum(step.order_kept for step in steps),
+        "circularity_before_rounding": boundary_circularity(mesh, steps[-1].uv),
+        "fold_repairs": repairs,
+    }
+    return Parameterization(uv, sum(iterations), (), extras)

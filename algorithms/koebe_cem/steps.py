@@ -1,0 +1,283 @@
+"""Koebe's method for surfaces with holes (the paper's Algorithm 2; Zeng et al. 2009).
+
+One step opens one boundary, fills all others, and maps that disk by CEM, so that the open boundary
+becomes a circle. A sweep does so with every boundary, the outer one last. Here the cotangent
+weights of the surface's own triangles are those of the surface in every step, for its conformal
+structure does not change; only the patches come from the plane. So a map is not composed of maps,
+each with its error, and errors of earlier steps are forgotten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_iteration import iterate_boundary, on_circle, pole
+from cembench.conformal.folds import in_order, interior_without_folds
+from cembench.conformal.laplacian import cotangent_laplacian, laplacian
+from cembench.conformal.patches import disk_patch, fan_patch
+from cembench.conformal.planar import backward_arcs, fitted_circle, polygon_area, signed_areas
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.linear_algebra.dense_cholesky import DenseCholesky
+from cembench.mesh.triangle_mesh import HoledMesh
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Loop = NDArray[np.int64]
+
+#: Round disks glued in, or the paper's fans to the centroid.
+Patches: TypeAlias = Literal["disks", "fans"]
+#: Whose angles give the weights of the surface's triangles: its own, or those of the last image.
+Weights: TypeAlias = Literal["surface", "plane"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """What one step of Koebe's method came to.
+
+    Parameters
+    ----------
+    sweep : int
+        Counted from 1.
+    boundary : int
+        Which boundary became a circle: 0 the outer one, then the holes, longest first.
+    before : complex (n,) or None
+        The image that the step set out from, inverted at the boundary's centroid so that this lies
+        outside; None in the first step, which sets out from the surface in space.
+    uv : complex (n,)
+        The image after it, the boundary on the unit circle and all others inside.
+    energies : tuple of float
+        E_C of the filled surface, before and after each iteration of CEM.
+    order_kept : int
+        How often a step of CEM was changed so that the boundary kept its order.
+    surface : BorderedLaplacian
+        The surface with its own weights, factored.
+
+    """
+
+    sweep: int
+    boundary: int
+    before: Complex | None
+    uv: Complex
+    energies: tuple[float, ...]
+    order_kept: int
+    surface: BorderedLaplacian
+
+
+def koebe_steps(
+    mesh: HoledMesh,
+    *,
+    sweeps: int = 1,
+    outer: int | None = None,
+    patches: Patches = "disks",
+    weights: Weights = "surface",
+    tolerance: float = 1e-5,
+    max_iterations: int = 20,
+    inversion: bool = True,
+) -> Iterator[Step]:
+    """Which images does Koebe's method pass through? Each step as it is done.
+
+    Parameters as in ``algorithms/koebe_cem.py``.
+
+    Raises
+    ------
+    AlgorithmFailed
+        There is nothing to map, or an image has collapsed.
+    ParameterError
+        `outer` names no boundary.
+
+    """
+    first, holes = mesh.outer_and_holes(outer)
+    loops = (first, *holes)
+    own = surface = BorderedLaplacian(mesh, laplacian(mesh), loops)
+    uv: Complex | None = None
+    kept: dict[int, Complex] = {}
+    for sweep in range(1, sweeps + 1):
+        for k in reversed(range(len(loops))):
+            before = None if uv is None else _outside_in(uv, loops[k])
+            points = mesh.V if before is None else np.stack([before.real, before.imag], axis=1)
+            if weights == "plane" and before is not None:
+                surface = BorderedLaplacian(mesh, _planar_laplacian(points, mesh.F), loops)
+            with phase("patches"):
+                glued = {j: _patch(points[loop], patches) for j, loop in enumerate(loops) if j != k}
+            disk = _FilledSurface(surface, glued, k)
+            starts = [kept[k] if k in kept else disk.start(*pole(points, mesh.F))]
+            if before is not None:
+                starts += _projected(before[loops[k]])
+            start = min(map(on_circle, starts), key=disk.energy)
+            kept[k], uv, energies, order_kept = disk.map(
+                start, tolerance=tolerance, max_iterations=max_iterations, inversion=inversion
+            )
+            yield Step(sweep, k, before, uv, energies, order_kept, own)
+
+
+def finished(
+    mesh: HoledMesh, step: Step, *, outer: int | None = None, rounding: bool = True
+) -> tuple[Complex, int]:
+    """Which map comes of the last step's image, its holes made round and its folds mended?
+
+    With `rounding`, each hole is put on the circle fitted to it, radially, as (25) puts the outer
+    boundary on its circle (vertices that would change places take the nearest angles in order), and
+    the interior is solved for again. The second value counts the repairs of folds.
+
+    Raises
+    ------
+    AlgorithmFailed
+        A hole is too far from a circle for that, or folds remain.
+
+    """
+    uv = step.uv
+    if rounding:
+        uv = uv.copy()
+        for hole in mesh.outer_and_holes(outer)[1]:
+            centre, radius = fitted_circle(uv[hole])
+            uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
+        f_b = uv[step.surface.boundary]
+        uv = step.surface.in_order(step.surface.dirichlet(f_b), f_b)
+    if (signed_areas(uv, mesh.F) > 0).all():
+        return uv, 0
+    return interior_without_folds(mesh, laplacian(mesh), uv)
+
+
+class _FilledSurface:
+    """A surface with patches on all of its boundaries but number `k`: a disk.
+
+    The closed boundaries c are eliminated too, so that an iteration of CEM needs only the open
+    boundary o and the interior: f_c = -W f_o, and half of f_o^* S f_o is the Dirichlet energy.
+    """
+
+    def __init__(self, surface: BorderedLaplacian, patches: dict[int, Real], k: int) -> None:
+        self._surface = surface
+        o = self._open = surface.parts[k]
+        with phase("patches"):
+            A = surface.S.copy()
+            for j, P in patches.items():
+                A[surface.parts[j], surface.parts[j]] += P
+            closed = np.ones(len(A), dtype=bool)
+            closed[o] = False
+            c = self._closed = np.flatnonzero(closed)
+        filled = DenseCholesky(A[np.ix_(c, c)])
+        self._W = filled.solve(A[c][:, o])
+        with phase("condensation"):
+            self._S = A[o, o] - A[o][:, c] @ self._W
+        self._ring = DenseCholesky(surface.L_bb[o][:, o].toarray())
+        self._to_interior = surface.L_bi[o]
+        self._to_closed = surface.L_bb[o][:, c]
+
+    def start(self, corners: Loop, values: Complex) -> Complex:
+        """Boundary values of the map with a pole (Eqs. 13 to 18) on the filled surface."""
+        surface = self._surface
+        with phase("start"):
+            n = len(surface.interior) + len(surface.boundary)
+            rhs = np.zeros(n, dtype=np.complex128)
+            rhs[corners] = values
+            inside = surface.solve_interior(rhs[surface.interior])
+            rhs_b = rhs[surface.boundary] - surface.L_bi @ inside
+            rhs_o = rhs_b[self._open] - _product(self._W.T, rhs_b[self._closed])
+        # Pinned at the last vertex (Theorem 1).
+        f_o = np.append(DenseCholesky(self._S[:-1, :-1]).solve(rhs_o[:-1]), 0.0)
+        return np.conj(f_o) if polygon_area(f_o) < 0 else f_o
+
+    def energy(self, f_o: Complex) -> float:
+        """E_C (Eq. 7) of the filled surface's map that is harmonic for these boundary values."""
+        with phase("energy"):
+            return 0.5 * float(np.vdot(f_o, _product(self._S, f_o)).real) - polygon_area(f_o)
+
+    def map(
+        self, start: Complex, *, tolerance: float, max_iterations: int, inversion: bool
+    ) -> tuple[Complex, Complex, tuple[float, ...], int]:
+        """CEM (Algorithm 1) from these boundary values on the unit circle.
+
+        Returns the open boundary's values, the map (n,), E_C of the filled surface before and after
+        each iteration, and how often the order had to be kept.
+        """
+        surface, m = self._surface, len(self._closed)
+
+        def on_boundaries(f_o: Complex) -> Complex:
+            f_b = np.empty(len(surface.boundary), dtype=np.complex128)
+            f_b[self._open], f_b[self._closed] = f_o, -_product(self._W, f_o)
+            return f_b
+
+        def dirichlet(f_o: Complex) -> Complex:
+            f_b = on_boundaries(f_o)
+            return np.concatenate([f_b[self._closed], surface.dirichlet(f_b)])
+
+        def ring(f: Complex) -> Complex:
+            return self._ring.solve(-(self._to_interior @ f[m:] + self._to_closed @ f[:m]))
+
+        f_o, f, history, order_kept = iterate_boundary(
+            start,
+            dirichlet,
+            ring,
+            lambda _, f_o: self.energy(f_o),
+            tolerance=tolerance,
+            max_iterations=max_iterations,
+            inversion=inversion,
+        )
+        uv = surface.in_order(f[m:], on_boundaries(f_o))
+        return f_o, uv, tuple(history), order_kept
+
+
+def _product(M: Real, f: Complex) -> Complex:
+    """M f without a complex copy of M."""
+    return M @ f.real + 1j * (M @ f.imag)
+
+
+def _projected(z: Complex) -> list[Complex]:
+    """An outer boundary's image put on its fitted circle radially, if that keeps its order."""
+    away: Complex = z - fitted_circle(z)[0]
+    if not np.abs(away).min() > 0 or backward_arcs(away):
+        return []
+    return [away / np.abs(away)]
+
+
+def _outside_in(uv: Complex, loop: Loop) -> Complex:
+    """The image inverted at the loop's centroid, so that the loop lies outside (Algorithm 2)."""
+    if polygon_area(uv[loop]) > 0:
+        return uv  # it is the outer one already
+    away = uv - uv[loop].mean()
+    if not np.abs(away).min() > 0:
+        raise AlgorithmFailed(
+            f"the boundary of vertex {int(loop.min())} came to have a vertex at its own centroid, "
+            "where the image is to be inverted"
+        )
+    return 1 / away
+
+
+def _patch(rim: Real, patches: Patches) -> Real:
+    """What fills a loop that lies at these points (k, 2 or 3)?"""
+    if patches == "disks" and rim.shape[1] == 2:
+        z = rim[:, 0] + 1j * rim[:, 1]
+        try:
+            turned = _around(z, fitted_circle(z)[0])
+            return disk_patch(np.unwrap(np.angle(turned)))
+        except AlgorithmFailed:
+            pass  # too far from round for a disk: its own polygon is nearer
+    return fan_patch(rim)
+
+
+def _around(z: Complex, centre: complex) -> Complex:
+    """Directions from the centre of a hole, which runs clockwise, mirrored: counter-clockwise."""
+    away: Complex = np.conj(z - centre)
+    if not np.abs(away).min() > 0:
+        raise AlgorithmFailed("a hole's image passes through the centre of its fitted circle")
+    circle: Complex = away / np.abs(away)
+    return in_order(circle) if backward_arcs(circle) else circle
+
+
+def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> sparse.csc_array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        L = cotangent_laplacian(points, F)
+    if not np.isfinite(L.data).all():
+        raise AlgorithmFailed(
+            "a triangle has collapsed in the image, so the plane gives it no weights; take those "
+            "of the surface (weights=surface)"
+        )
+    return L

@@ -1,0 +1,593 @@
+"""The command line. Exit code 0 if every asked cell ended ok, 1 if one did not, 2 on bad usage."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from cembench.commands import fetch as fetch_verbs
+from cembench.commands import holes as holes_verbs
+from cembench.commands import morph as morph_verbs
+from cembench.commands import report as report_verbs
+from cembench.commands import run as run_verbs
+from cembench.commands import theory as theory_verbs
+from cembench.commands import validate as validate_verbs
+from cembench.commands.console import Json, assignments, complain, err, out, print_json, split
+from cembench.core.errors import CembenchError, ParameterError
+from cembench.results.paper.profiles import Profile
+from cembench.results.records import DEFAULT_ROUNDS
+
+if TYPE_CHECKING:
+    from cembench.commands.progress import PlainProgress
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.registry import Algorithm, Registry, Surface
+    from cembench.report.surface_facts import SurfaceFacts
+    from cembench.results.records import Record
+    from cembench.results.store import Store
+    from cembench.running.local import Options
+    from cembench.running.plan import Task
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
+)
+Plugins = Annotated[
+    list[str],
+    typer.Option("--plugin", help="FILE.py or module:name with more algorithms. Repeatable."),
+]
+Parameters = Annotated[
+    list[str],
+    typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter. Repeatable."),
+]
+Threads = Annotated[int, typer.Option(min=1, help="Threads of the numerical libraries.")]
+Timeout = Annotated[float, typer.Option(min=0.1, help="Seconds that a call may take.")]
+Memory = Annotated[
+    str | None,
+    typer.Option(metavar="SIZE", help="Of a process, as 4GiB; default: 90 % of what is free."),
+]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
+
+
+class Solves(StrEnum):
+    """Keep a factor while its matrix stands, or factor at every solve like MATLAB's backslash."""
+
+    reuse = "reuse"
+    backslash = "backslash"
+
+
+class Backend(StrEnum):
+    """The library that factors."""
+
+    cvxopt = "cvxopt"
+    superlu = "superlu"
+    pardiso = "pardiso"
+
+
+class Kind(StrEnum):
+    """What `list` lists."""
+
+    algorithms = "algorithms"
+    surfaces = "surfaces"
+
+
+SolvesOption = Annotated[Solves, typer.Option(help="Keep factors, or factor at every solve.")]
+BackendOption = Annotated[Backend, typer.Option(help="The library that factors matrices.")]
+
+
+@app.command(
+    "list",
+    epilog="Examples:  cembench list  ·  cembench list algorithms --verbose  ·  "
+    "cembench list surfaces --measure  ·  cembench list --plugin mine.py",
+)
+def list_(
+    kind: Annotated[Kind | None, typer.Argument(help="Only these.")] = None,
+    *,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say all about each.")] = False,
+    measure: Annotated[
+        bool,
+        typer.Option("--measure", help="Measure the stand-ins that were not: minutes."),
+    ] = False,
+    plugin: Plugins = [],  # noqa: B006 - typer copies defaults
+    as_json: Json = False,
+) -> None:
+    """Which algorithms and surfaces are there?
+
+    `list surfaces` also tells of the stand-ins for the paper's models: counts,
+    whether they meet their rows of its Table 2, how unevenly CEM scales them,
+    where thumbnails lie. Of all of them with --measure, else of those measured.
+    """
+    from cembench.registry import load_registry
+    from cembench.report.render.terminal import algorithms_table, facts_table, surfaces_table
+
+    registry = load_registry(plugin)
+    if measure and kind is not Kind.surfaces:
+        raise ParameterError("--measure goes with surfaces: cembench list surfaces --measure.")
+    facts = _facts(registry, measure=measure) if kind is Kind.surfaces else {}
+    if as_json:
+        print_json(_registry_as_json(registry, kind, facts))
+        return
+    if kind in (None, Kind.algorithms):
+        out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
+    if kind is None:
+        out.print()
+    if kind in (None, Kind.surfaces):
+        out.print(surfaces_table(list(registry.surfaces.values()), verbose=verbose))
+    if facts:
+        known = {name: found for name, found in facts.items() if found}
+        if known:
+            out.print()
+            out.print(facts_table(known))
+        missing = len(facts) - len(known)
+        if missing:
+            out.print(
+                f"\n{missing} of {len(facts)} stand-ins are not measured yet: "
+                "`cembench list surfaces --measure` does it, in minutes.",
+                style="dim",
+            )
+
+
+@app.command(
+    "map",
+    epilog="Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
+    "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand",
+)
+def map_(
+    mesh: Annotated[
+        Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`.")
+    ],
+    *,
+    algorithm: Annotated[str, typer.Option("-a", "--algorithm", help="See `list`.")] = "cem",
+    parameter: Parameters = [],  # noqa: B006
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="Surface with UVs: OBJ or PLY.")
+    ] = None,
+    preview: Annotated[
+        bool, typer.Option("--preview", help="Draw a PNG, beside the output.")
+    ] = False,
+    plugin: Plugins = [],  # noqa: B006
+    solves: SolvesOption = Solves.reuse,
+    backend: BackendOption = Backend.cvxopt,
+    threads: Threads = 1,
+    timeout: Timeout = 600.0,
+    memory: Memory = None,
+    as_json: Json = False,
+) -> None:
+    """Map one surface, check the map, and write it.
+
+    The UVs are the map itself (the unit disk for target "disk"), with 17 significant digits.
+    """
+    from cembench.mesh.files import check_writable_format, write_mesh
+    from cembench.registry import load_registry
+    from cembench.report.render.terminal import figures_table
+    from cembench.results.record_rows import row
+    from cembench.running.local import Options, map_once
+    from cembench.running.plan import How, plan_cells, read_mesh_for, standing_of_file
+
+    options = Options(timeout=timeout, memory_bytes=_memory_bytes(memory))
+    registry = load_registry(plugin)
+    chosen = registry.algorithm(algorithm)
+    if output is not None:
+        check_writable_format(output, with_uv=True)
+    if not mesh.exists() and str(mesh) in registry.datasets:
+        mesh = fetch_verbs.fetched(registry.dataset(str(mesh)))
+    with err.status("reading", spinner="line"):
+        surface = read_mesh_for(mesh, [chosen])
+        standing = {surface.name: standing_of_file(registry, mesh, surface)}
+    how = How(solves.value, _installed(backend), threads, repeats=1)
+    tasks = plan_cells([chosen], [surface], assignments(parameter), how, plugin, standing)
+    with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
+        record, uv = map_once(tasks[0], options)
+    ok = record.outcome.status == "ok"
+    written: dict[str, str] = {}
+    if ok and uv is not None:
+        if output is not None:
+            write_mesh(output, surface, uv)
+            written["output"] = str(output)
+        if preview:
+            picture = (output or Path(f"{mesh.stem}_{algorithm}")).with_suffix(".png")
+            with err.status("drawing", spinner="line"):
+                written["preview"] = str(picture)
+                _draw(surface, uv, picture, record)
+    if as_json:
+        print_json(row(record) | written)
+    else:
+        _print_notices([surface])
+        out.print(figures_table(record))
+        for what, where in written.items():
+            out.print(f"[bold]{what}[/bold]  {escape(where)}")
+        if ok and not written:
+            out.print("Nothing was written; add -o FILE.obj to keep the map.", style="dim")
+    if not ok:
+        complain(f"{record.outcome.status}: {record.outcome.cause}")
+        raise typer.Exit(1)
+
+
+@app.command(
+    epilog="Examples:  cembench run --profile quick --dry-run  ·  "
+    "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
+    "cembench run --surfaces spherical-cap -o results/cap --json",
+)
+def run(
+    *,
+    profile: Annotated[
+        Profile | None,
+        typer.Option(help="The paper's models: the 8 smallest, up to 210 k faces, all 20."),
+    ] = None,
+    mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
+    mesh_dir: Annotated[
+        list[Path], typer.Option("--mesh-dir", help="All mesh files of a folder. Repeatable.")
+    ] = [],  # noqa: B006
+    dataset: Annotated[
+        list[str], typer.Option("--dataset", help="Fetched surfaces (see `fetch`), with commas.")
+    ] = [],  # noqa: B006
+    surfaces: Annotated[
+        list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
+    ] = [],  # noqa: B006
+    faces: Annotated[int | None, typer.Option(help="Triangles of the generated surfaces.")] = None,
+    algorithms: Annotated[
+        list[str],
+        typer.Option(
+            "-a",
+            "--algorithms",
+            help="Comma-separated; default: all, and the paper's four for `--profile quick`.",
+        ),
+    ] = [],  # noqa: B006
+    parameter: Parameters = [],  # noqa: B006
+    plugin: Plugins = [],  # noqa: B006
+    repeats: Annotated[
+        int, typer.Option(min=1, help="Rounds; fewer than 6 give no interval.")
+    ] = DEFAULT_ROUNDS,
+    seed: Annotated[int, typer.Option(help="Of the random order within a round.")] = 0,
+    timeout: Timeout = 600.0,
+    memory: Memory = None,
+    solves: Annotated[
+        list[str], typer.Option("--solves", help="reuse, backslash, or both with a comma.")
+    ] = ["reuse"],  # noqa: B006
+    backend: BackendOption = Backend.cvxopt,
+    threads: Threads = 1,
+    reference: Annotated[
+        str, typer.Option(help="The algorithm whose speedup over the others is told.")
+    ] = "cem",
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
+    ] = Path("results/run"),
+    fresh: Fresh = False,
+    rerun_failed: Annotated[
+        bool, typer.Option("--rerun-failed", help="Measure again what did not end ok.")
+    ] = False,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Print the cells and what they will cost.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Measure algorithms on surfaces, each pair in processes of its own.
+
+    Every finished process is on disk at once; what the folder already holds is not measured again.
+    -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
+    docs/measuring.md tells what is timed, and what an interval means.
+    """
+    from cembench.registry import load_registry
+    from cembench.results.paper.profiles import algorithms_of, surfaces_of
+    from cembench.results.store import Store
+    from cembench.running.local import Options
+    from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
+
+    policies = _policies(solves)
+    options = Options(timeout, _memory_bytes(memory), fresh, rerun_failed, seed)
+    registry = load_registry(plugin)
+    usual = algorithms_of(profile, registry) if profile else list(registry.algorithms)
+    chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
+    files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
+    files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
+    generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
+    if not files and not generated:
+        raise ParameterError(
+            "nothing to run on: name a --profile, or at least one --mesh FILE, --dataset NAME (see "
+            "`cembench fetch`) or --surfaces NAME (see `cembench list surfaces`)."
+        )
+    with err.status("reading surfaces", spinner="line"):
+        found, standing = gather_surfaces(registry, chosen, files, generated, faces)
+    tasks = []
+    for policy in policies:
+        how = How(policy, _installed(backend), threads, repeats)
+        tasks += plan_cells(chosen, found, assignments(parameter), how, plugin, standing)
+    if dry_run:
+        _present_plan(tasks, Store(output), options, as_json=as_json)
+        return
+    if not as_json:
+        _print_notices(found)
+    records = _measure(tasks, Store(output), options)
+    _present(records, as_json=as_json, where=output, reference=reference)
+
+
+@app.command(epilog="Example:  cembench reproduce -o results/reproduce")
+def reproduce(
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where the results go.")] = Path(
+        "results/reproduce"
+    ),
+    fresh: Fresh = False,
+    as_json: Json = False,
+) -> None:
+    """Measure every algorithm on stand-ins for the paper's eight smallest models, and report.
+
+    One round each, so that it takes minutes; `run --profile quick` has the rounds that intervals
+    need. What the folder already holds is not measured again. The report lies in it too.
+    """
+    from cembench.registry import load_registry
+    from cembench.results.paper.profiles import surfaces_of
+    from cembench.results.record_rows import rows
+    from cembench.results.store import Store
+    from cembench.running.local import Options
+    from cembench.running.plan import How, generate_surface, plan_cells, standing_of
+
+    options = Options(memory_bytes=_memory_bytes(None), fresh=fresh)
+    registry = load_registry()
+    surfaces = []
+    names = surfaces_of(Profile.quick, registry)
+    for name in names:
+        with err.status(f"making {name}", spinner="line"):
+            surfaces.append(generate_surface(registry, name))
+    chosen = list(registry.algorithms.values())
+    standing = standing_of(registry, names)
+    tasks = plan_cells(chosen, surfaces, {}, How(repeats=1), standing=standing)
+    records = _measure(tasks, Store(output), options)
+    command = f"cembench reproduce -o {output}"
+    report, folder = report_verbs.make_report(output, None, command)
+    if as_json:
+        print_json({"cells": rows(records), "report": report_verbs.summary(report, folder)})
+    else:
+        report_verbs.show_report(report, folder)
+        for record in records:
+            if record.outcome.status != "ok":
+                name = f"{record.cell.mesh} / {record.cell.algorithm}"
+                complain(f"{name}: {record.outcome.status}: {record.outcome.cause}")
+    if any(record.outcome.status != "ok" for record in records):
+        raise typer.Exit(1)
+
+
+@app.command(epilog="Example:  cembench doctor --json")
+def doctor(*, as_json: Json = False) -> None:
+    """Is everything there that cembench needs? What is missing, and what brings it?"""
+    from cembench.workflows.doctor import examine
+
+    with err.status("looking", spinner="line"):
+        findings = examine()
+    if as_json:
+        print_json([asdict(finding) for finding in findings])
+    else:
+        for finding in findings:
+            mark = (
+                "[green]ok[/green]  "
+                if finding.ok
+                else ("[bold red]bad[/bold red] " if finding.required else "[yellow]--[/yellow]  ")
+            )
+            out.print(f"{mark}{finding.name:<11}{escape(finding.detail)}", soft_wrap=True)
+            if not finding.ok:
+                out.print(f"    {'':<11}{escape(finding.remedy)}", style="dim", soft_wrap=True)
+    if any(finding.required and not finding.ok for finding in findings):
+        raise typer.Exit(1)
+
+
+#: Modules whose verbs are not written in this one.
+_MORE = (
+    run_verbs,
+    report_verbs,
+    validate_verbs,
+    holes_verbs,
+    theory_verbs,
+    morph_verbs,
+    fetch_verbs,
+)
+for verb, example in (entry for module in _MORE for entry in module.VERBS):
+    app.command(epilog=example)(verb)
+
+
+def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
+    """Run the tasks with a live table on a terminal, and with a line a cell elsewhere."""
+    from cembench.running.local import run_tasks
+
+    with _progress(len(tasks)) as progress:
+        return run_tasks(tasks, store, options, progress)
+
+
+@contextmanager
+def _progress(cells: int) -> Iterator[PlainProgress]:
+    from cembench.commands.progress import LiveProgress, PlainProgress
+
+    with (LiveProgress if err.is_terminal else PlainProgress)(err, cells) as progress:
+        yield progress
+
+
+def _present(records: list[Record], *, as_json: bool, where: Path, reference: str = "cem") -> None:
+    from cembench.report.render.terminal import results_table, speedups_table
+    from cembench.results.record_rows import rows
+
+    if as_json:
+        print_json(rows(records, reference))
+    else:
+        out.print(results_table(records))
+        speedups = speedups_table(records, reference)
+        if speedups is not None:
+            out.print(speedups)
+        out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True, markup=False)
+    if any(record.outcome.status != "ok" for record in records):
+        raise typer.Exit(1)
+
+
+def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_json: bool) -> None:
+    """Say which cells would be measured, and what that will cost."""
+    from cembench.commands.progress import duration
+    from cembench.report.render.terminal import plan_table
+    from cembench.running.estimate import estimate
+
+    records = store.records() if (store.folder / "records").is_dir() else []
+    held = {r.cell.key: r.outcome.status for r in records if not options.measures_again(r)}
+    lines = [
+        (
+            task.cell,
+            task.facts.faces,
+            None if task.cell.key in held else estimate(task.cell, task.facts.faces, records),
+        )
+        for task in tasks
+    ]
+    costs = [cost for _, _, cost in lines if cost is not None]
+    seconds = sum(cost.seconds for cost in costs)
+    largest = max((cost.memory_bytes for cost in costs), default=0)
+    if as_json:
+        cells = [
+            {
+                "key": cell.key,
+                "mesh": cell.mesh,
+                "algorithm": cell.algorithm,
+                "solves": cell.solves,
+                "faces": faces,
+                "held": held.get(cell.key),
+                "estimate": None if cost is None else asdict(cost),
+            }
+            for cell, faces, cost in lines
+        ]
+        print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest})
+        return
+    shown = [
+        (cell, faces, cost.basis if cost else f"there: {held[cell.key]}", cost)
+        for cell, faces, cost in lines
+    ]
+    out.print(plan_table(shown))
+    rough = (
+        " (rough: little of this was measured here before)"
+        if any(cost.basis == "rough" for cost in costs)
+        else ""
+    )
+    out.print(
+        f"\n{len(costs)} of {len(tasks)} cells to measure: about {duration(seconds)}, "
+        f"{largest / 2**30:.1f} GiB at most{rough}"
+    )
+
+
+def _draw(mesh: TriangleMesh, uv: Any, picture: Path, record: Record) -> None:
+    from cembench.drawing.preview import write_preview
+
+    metrics = record.outcome.metrics
+    caption = (
+        f"E_C {metrics['conformal_energy']:.4f}   angles off by "
+        f"{metrics['angle_error_mean_deg']:.2f} degrees in the mean   "
+        f"{metrics['flipped_triangles']} folds"
+    )
+    title = f"{record.cell.mesh}: {record.title}"
+    drawn = write_preview(mesh, uv, picture, title=title, caption=caption)
+    if drawn.notice:
+        err.print(f"note: {drawn.notice}", style="dim", markup=False, soft_wrap=True)
+
+
+def _print_notices(meshes: Sequence[TriangleMesh]) -> None:
+    for mesh in meshes:
+        for notice in mesh.notices:
+            err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
+
+
+def _policies(given: list[str]) -> list[str]:
+    names = list(dict.fromkeys(split(given)))
+    for name in names:
+        if name not in [policy.value for policy in Solves]:
+            raise ParameterError(
+                f"--solves {name!r} is unknown; allowed: reuse, backslash, or both with a comma."
+            )
+    return names or [Solves.reuse.value]
+
+
+def _memory_bytes(given: str | None) -> int:
+    import psutil
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
+    if given is None:
+        return int(0.9 * psutil.virtual_memory().available)
+    try:
+        size: int = TypeAdapter(ByteSize).validate_python(given)
+    except ValidationError:
+        raise ParameterError(
+            f"--memory {given!r} is no size; write a number with a unit, as 4GiB or 500MB."
+        ) from None
+    return size
+
+
+def _installed(backend: Backend) -> str:
+    from cembench.linear_algebra.cholesky import linear_algebra
+
+    with linear_algebra(backend=backend.value):
+        return backend.value
+
+
+def _facts(registry: Registry, *, measure: bool) -> dict[str, SurfaceFacts | None]:
+    """What is known of the surfaces that are kept on disk; found where it is not, if asked to."""
+    from cembench.report.surface_facts import find_facts, kept_facts
+
+    families = [family for family in registry.surfaces.values() if family.kept]
+    facts = {family.name: kept_facts(registry, family) for family in families}
+    todo = [family for family in families if measure and facts[family.name] is None]
+    for k, family in enumerate(todo, start=1):
+        words = f"[{k}/{len(todo)}] {family.name}"
+        if not err.is_terminal:
+            err.print(words, markup=False)
+        with err.status(escape(f"{words}: making, mapping, drawing"), spinner="line"):
+            facts[family.name] = find_facts(registry, family)
+    return facts
+
+
+def _registry_as_json(
+    registry: Registry, kind: Kind | None, facts: Mapping[str, SurfaceFacts | None]
+) -> dict[str, Any]:
+    from cembench.report.surface_facts import row_check
+
+    def about(registered: Any) -> dict[str, Any]:
+        return {
+            "name": registered.name,
+            "title": registered.title,
+            "source": registered.source,
+            "parameters": {p.name: p.default for p in registered.parameters},
+            "notes": registered.notes,
+            "origin": registered.origin,
+        }
+
+    def about_algorithm(a: Algorithm) -> dict[str, Any]:
+        return about(a) | {"target": a.target, "takes": a.mesh_type.__name__}
+
+    def about_surface(s: Surface) -> dict[str, Any]:
+        known = facts.get(s.name)
+        more = {"paper_row": s.paper_row or None, "landmarks": s.landmarks is not None}
+        if known is None:
+            return about(s) | more | {"facts": None}
+        flat = known.mesh.model_dump() | known.model_dump(exclude={"mesh"})
+        return about(s) | more | {"facts": flat | {"table2": row_check(known.mesh)}}
+
+    listed: dict[str, Any] = {}
+    if kind in (None, Kind.algorithms):
+        listed["algorithms"] = [about_algorithm(a) for a in registry.algorithms.values()]
+    if kind in (None, Kind.surfaces):
+        listed["surfaces"] = [about_surface(s) for s in registry.surfaces.values()]
+    return listed
+
+
+def main() -> None:
+    """Run the command line; errors meant for the user are one line, without a traceback."""
+    try:
+        app()
+    except CembenchError as error:
+        complain(str(error))
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,345 @@
+"""The verb that shows the steps of Koebe's method and what they come to (Figures 1 and 7)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cembench.commands.console import Json, complain, err, out, print_json
+from cembench.commands.run import DEFAULT_RUN
+
+if TYPE_CHECKING:
+    from cembench.algorithms.koebe_cem.steps import Step
+    from cembench.mesh.triangle_mesh import HoledMesh
+    from cembench.registry import Algorithm
+    from cembench.results.records import MeshOrigin, Record
+
+#: The surface of the paper's Figures 1 and 7, and the algorithm whose sweeps are counted.
+STAND_IN, KOEBE = "ho-face-with-holes", "koebe-cem"
+#: Steps that a picture shows; surfaces with more boundaries are drawn without the rest.
+MOST_STEPS = 4
+
+
+def holes(
+    meshes: Annotated[
+        list[str],
+        typer.Argument(metavar="MESH", help="Surface with holes: a file, or a known name."),
+    ] = [STAND_IN],  # noqa: B006 - typer copies defaults
+    *,
+    outer: Annotated[
+        int | None, typer.Option(help="A vertex of the outer boundary; default: the longest.")
+    ] = None,
+    sweeps: Annotated[int, typer.Option(min=1, help="The most sweeps that are tried.")] = 8,
+    faces: Annotated[int | None, typer.Option(help="Triangles of a generated surface.")] = None,
+    run: Annotated[
+        Path, typer.Option("--run", "-o", "--output", help="The run that gets the exhibits.")
+    ] = DEFAULT_RUN,
+    as_json: Json = False,
+) -> None:
+    """Map surfaces with holes, and draw the steps of Koebe's method (Figures 1 and 7).
+
+    One sweep is the paper's Algorithm 2. The table compares it with the best number of sweeps, by
+    conformal energy, and with every other algorithm for this class. docs/holes.md explains it.
+    """
+    from cembench.mesh.triangle_mesh import HoledMesh
+    from cembench.registry import load_registry
+    from cembench.running.plan import surface_named
+
+    registry = load_registry()
+    surfaces = [surface_named(registry, name, HoledMesh, faces) for name in meshes]
+    for mesh in surfaces:
+        mesh.outer_and_holes(outer)
+    algorithms = [a for a in registry.algorithms.values() if a.target == "circular holes"]
+    rows: list[dict[str, Any]] = []
+    options = "".join(
+        f" --{option} {value}"
+        for option, value in (("outer", outer), ("sweeps", sweeps), ("faces", faces))
+        if value is not None
+    )
+    for name, mesh in zip(meshes, surfaces, strict=True):
+        with err.status(f"Koebe's method on {mesh.name}", spinner="line"):
+            command = f"cembench holes {Path(name).name}{options}"
+            rows += _examine(mesh, algorithms, outer, sweeps, run, command)
+    files = " ".join(Path(name).name for name in meshes)
+    _lay_down_table(rows, run, f"cembench holes {files}{options}")
+    if as_json:
+        print_json(rows)
+    else:
+        _show(rows, run)
+    bad = [row for row in rows if row["status"] != "ok"]
+    for row in bad:
+        complain(f"{row['mesh']} / {row['algorithm']}: {row['status']}: {row['cause']}")
+    if bad:
+        raise typer.Exit(1)
+
+
+def _examine(
+    mesh: HoledMesh,
+    algorithms: list[Algorithm],
+    outer: int | None,
+    sweeps: int,
+    run: Path,
+    command: str,
+) -> list[dict[str, Any]]:
+    """Everything about one surface: a row for each way of mapping it, and two exhibits."""
+    from cembench.algorithms.koebe_cem.steps import koebe_steps
+    from cembench.core.errors import AlgorithmFailed
+
+    try:
+        steps = list(koebe_steps(mesh, sweeps=sweeps, outer=outer))
+        best = _best_sweep(mesh, steps, outer)
+    except AlgorithmFailed as error:
+        complain(f"{mesh.name}: {error}")
+        steps, best = [], 1
+    rows = []
+    for algorithm in algorithms:
+        counts = sorted({1, best}) if algorithm.name == KOEBE else [None]
+        for count in counts:
+            row, record, uv = _measured(mesh, algorithm, outer, count)
+            rows.append(row)
+            if algorithm.name == KOEBE and uv is not None and count == 1:
+                _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
+    return rows
+
+
+def _best_sweep(mesh: HoledMesh, steps: list[Step], outer: int | None) -> int:
+    """After which sweep is E_C of the finished map lowest? The first within 1 % of that."""
+    from cembench.algorithms.koebe_cem.steps import finished
+    from cembench.conformal.metrics import dirichlet_energy, image_area
+
+    energies = []
+    for step in steps:
+        if step.boundary == 0:
+            uv, _ = finished(mesh, step, outer=outer)
+            energies.append(dirichlet_energy(mesh, uv) - image_area(mesh, uv))
+    enough = min(energies) * (1.01 if min(energies) > 0 else 0.99)
+    return 1 + next(k for k, energy in enumerate(energies) if energy <= enough)
+
+
+def _measured(
+    mesh: HoledMesh, algorithm: Algorithm, outer: int | None, sweeps: int | None
+) -> tuple[dict[str, Any], Record, Any]:
+    """One checked call in a process of its own, as a row."""
+    from cembench.running.local import Options, map_once
+    from cembench.running.plan import How, plan_cells
+
+    known = {parameter.name for parameter in algorithm.parameters}
+    given = {"outer": outer, "sweeps": sweeps}
+    parameters = {k: v for k, v in given.items() if v is not None and k in known}
+    task = plan_cells([algorithm], [mesh], parameters, How(repeats=1))[0]
+    record, uv = map_once(task, Options())
+    outcome = record.outcome
+    row = {
+        "mesh": mesh.name,
+        "faces": mesh.m,
+        "holes": len(mesh.loops) - 1,
+        "algorithm": algorithm.name,
+        "sweeps": sweeps,
+        "status": outcome.status,
+        "cause": outcome.cause,
+        **outcome.metrics,
+        "circularity_before_rounding": outcome.extras.get("circularity_before_rounding"),
+        "boundaries": [boundary.model_dump() for boundary in outcome.boundaries],
+        "iterations": outcome.iterations,
+        "seconds": outcome.median_seconds,
+        "phases": outcome.phases,
+    }
+    return row, record, uv
+
+
+def _lay_down_pictures(
+    mesh: HoledMesh,
+    steps: list[Step],
+    uv: Any,
+    record: Record,
+    outer: int | None,
+    run: Path,
+    command: str,
+) -> None:
+    """Figure 1, the steps of the first sweep, and Figure 7, the map."""
+    from cembench.drawing.koebe_steps import write_steps
+    from cembench.drawing.preview import write_preview
+    from cembench.results.exhibits import Exhibit, Picture, exhibit_folder, write_exhibit
+
+    metrics = record.outcome.metrics
+    origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
+    figures = {
+        "angle_error_mean_deg": metrics["angle_error_mean_deg"],
+        "conformal_energy": metrics["conformal_energy"],
+        "boundary_circularity": metrics["boundary_circularity"],
+        "flipped_triangles": metrics["flipped_triangles"],
+    }
+    caption = (
+        f"E_C {metrics['conformal_energy']:.4f}   angles off by "
+        f"{metrics['angle_error_mean_deg']:.2f} degrees in the mean   "
+        f"holes off circles by {metrics['boundary_circularity']:.1g}   "
+        f"{metrics['flipped_triangles']} folds"
+    )
+    name = f"koebe-map-{mesh.name}"
+    picture = exhibit_folder(run, name) / "map.png"
+    write_preview(mesh, uv, picture, title=f"{mesh.name}: {record.title}", caption=caption)
+    alternative = "A checkerboard on the surface and on its image, a disk with round holes."
+    write_exhibit(
+        run,
+        Exhibit(
+            name=name,
+            title=f"{mesh.name} and its image, a disk with round holes",
+            text=f"The result of one sweep of Koebe's method. {caption}.",
+            command=command,
+            origin=origin,
+            figure="Figure 7",
+            pictures=(Picture(file="map.png", caption=caption, alternative=alternative),),
+            facts=figures,
+        ),
+    )
+    if len(mesh.loops) > MOST_STEPS:
+        return
+    name = f"koebe-steps-{mesh.name}"
+    first = [step for step in steps if step.sweep == 1]
+    title = f"{mesh.name}: the steps of Koebe's method"
+    panels = _panels(mesh, first, outer)
+    write_steps(mesh, panels, uv, exhibit_folder(run, name) / "steps.png", title)
+    words = (
+        "(a) The surface. Then, in turn: one boundary (red) is left open and the others are filled,"
+        " CEM makes the open one a circle; the next boundary is turned outside by an inversion at "
+        "its centroid. The checkerboard is that of the final map throughout."
+    )
+    table = _steps_table(mesh, first, outer)
+    write_exhibit(
+        run,
+        Exhibit(
+            name=name,
+            title=f"The steps of Koebe's method on {mesh.name}",
+            text=words,
+            command=command,
+            origin=origin,
+            figure="Figure 1",
+            pictures=(Picture(file="steps.png", caption=words, alternative=alternative),),
+            tables=(table,),
+            facts={"iterations": [len(step.energies) - 1 for step in first]},
+        ),
+    )
+
+
+def _panels(mesh: HoledMesh, steps: list[Step], outer: int | None) -> Any:
+    from cembench.drawing.koebe_steps import Panel
+
+    first, others = mesh.outer_and_holes(outer)
+    loops = (first, *others)
+    panels = [Panel("the surface")]
+    for step in steps:
+        name = "outer boundary" if step.boundary == 0 else f"hole {step.boundary}"
+        if step.before is not None:
+            panels.append(Panel(f"{name} turned outside", step.before, loops[step.boundary]))
+        panels.append(Panel(f"{name} made a circle", step.uv, loops[step.boundary]))
+    return panels
+
+
+def _steps_table(mesh: HoledMesh, steps: list[Step], outer: int | None) -> Any:
+    """Circularity of each boundary after each step of the sweep."""
+    from cembench.conformal.metrics import circle_of
+    from cembench.results.exhibits import Table
+
+    first, others = mesh.outer_and_holes(outer)
+    loops = (first, *others)
+    names = ("outer", *(f"hole {k}" for k in range(1, len(loops))))
+    rows: tuple[tuple[str | float | int | None, ...], ...] = tuple(
+        (
+            names[step.boundary],
+            len(step.energies) - 1,
+            *(circle_of(loop, step.uv[loop]).circularity for loop in loops),
+        )
+        for step in steps
+    )
+    columns = ("opened", "iterations", *(f"circularity, {name}" for name in names))
+    return Table(title="Circularity after each step, before rounding", columns=columns, rows=rows)
+
+
+_TABLE = (
+    ("surface", "mesh"),
+    ("holes", "holes"),
+    ("algorithm", "algorithm"),
+    ("sweeps", "sweeps"),
+    ("E_C", "conformal_energy"),
+    ("mean", "angle_error_mean_deg"),
+    ("SD", "angle_error_sd_deg"),
+    ("circularity", "boundary_circularity"),
+    ("before rounding", "circularity_before_rounding"),
+    ("folds", "flipped_triangles"),
+    ("iterations", "iterations"),
+    ("seconds", "seconds"),
+    ("status", "status"),
+)
+
+
+def _lay_down_table(rows: list[dict[str, Any]], run: Path, command: str) -> None:
+    from cembench.results.exhibits import Exhibit, Table, write_exhibit
+
+    table = Table(
+        title="Surfaces with holes",
+        columns=tuple(title for title, _ in _TABLE),
+        rows=tuple(tuple(row.get(key) for _, key in _TABLE) for row in rows),
+        notes=(
+            "Mean and SD are of the angles' errors in degrees; circularity is the largest "
+            "distance of a boundary from its fitted circle, in radii; seconds are of one call.",
+        ),
+    )
+    standing = {row["mesh"] for row in rows} <= {STAND_IN}
+    write_exhibit(
+        run,
+        Exhibit(
+            name="holes",
+            title="Surfaces with holes",
+            text="Koebe's method after one sweep and after the best number of sweeps, beside the "
+            "other maps to a disk with holes.",
+            command=command,
+            origin="stand-in" if standing else "surface",
+            tables=(table,),
+            facts={"rows": rows},
+        ),
+    )
+
+
+def _show(rows: list[dict[str, Any]], run: Path) -> None:
+    from rich.table import Table as Grid
+
+    grid = Grid(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    grid.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=14)
+    grid.add_column("algorithm", no_wrap=True)
+    for heading in ("sweeps", "E_C", "mean", "SD", "circ.", "folds", "sec"):
+        grid.add_column(heading, justify="right", no_wrap=True)
+    grid.add_column("status", no_wrap=True)
+    before = None
+    for row in rows:
+        grid.add_row(
+            row["mesh"] if row["mesh"] != before else "",
+            row["algorithm"],
+            "-" if row["sweeps"] is None else str(row["sweeps"]),
+            *(
+                "-" if row.get(key) is None else format(row[key], form)
+                for key, form in (
+                    ("conformal_energy", ".4f"),
+                    ("angle_error_mean_deg", ".2f"),
+                    ("angle_error_sd_deg", ".2f"),
+                    ("boundary_circularity", ".0e"),
+                    ("flipped_triangles", "d"),
+                    ("seconds", ".2f"),
+                )
+            ),
+            row["status"],
+        )
+        before = row["mesh"]
+    out.print(grid)
+    out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
+
+
+#: Each verb with the examples that its help shows.
+VERBS = (
+    (
+        holes,
+        "Examples:  cembench holes face_with_holes.obj --sweeps 4 --run results/mine  ·  "
+        "cembench holes ho-face-with-holes --faces 20000 --json",
+    ),
+)

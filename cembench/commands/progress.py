@@ -1,0 +1,178 @@
+"""How far is a run? A live table on a terminal; a line at a time where there is none."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any, Self
+
+from rich.console import Console, Group, RenderableType
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from cembench.report.render.terminal import status_style
+from cembench.results.records import Record
+from cembench.running.local import Watcher
+from cembench.running.plan import Task
+
+#: Cells that the live table shows.
+_SHOWN = 12
+
+
+class Remaining:
+    """How many seconds are left? Each cell's next process is taken to last as its last one did."""
+
+    def __init__(self) -> None:
+        self.processes = 0
+        self.done = 0
+        self._left: dict[str, int] = {}
+        self._last: dict[str, float] = {}
+
+    def expect(self, processes: int) -> None:
+        """So many processes are to be run."""
+        self.processes = processes
+
+    def ended(self, cell: str, left: int, seconds: float) -> None:
+        """A process of a cell has taken so long; so many of it are left."""
+        self.done += 1
+        self._left[cell] = left
+        self._last[cell] = seconds
+
+    def finished(self, cell: str) -> None:
+        """No more processes are run for this cell, whatever was expected."""
+        self.processes -= self._left.pop(cell, 0)
+
+    @property
+    def seconds(self) -> float | None:
+        """Of what is left; None before the first process has ended."""
+        if not self._last:
+            return None
+        known = sum(self._left.get(cell, 0) * last for cell, last in self._last.items())
+        unknown = self.processes - self.done - sum(self._left.values())
+        return known + max(unknown, 0) * sum(self._last.values()) / len(self._last)
+
+
+class PlainProgress(Watcher):
+    """A line for each round that begins and for each cell that is finished."""
+
+    def __init__(self, console: Console, cells: int) -> None:
+        self.console = console
+        self.cells = cells
+        self.finished_cells = 0
+        self.remaining = Remaining()
+        self._step = ""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        """Nothing is left on the screen that would have to go."""
+
+    def waits(self) -> None:
+        """Say so."""
+        self._say("another run measures into this folder; waiting for it to end")
+
+    def begins(self, processes: int) -> None:
+        """Know how much there is to do."""
+        self.remaining.expect(processes)
+
+    def starts(self, task: Task, step: str) -> None:
+        """A line where a new round begins."""
+        if step != self._step:
+            self._step = step
+            left = self.remaining.seconds
+            self._say(step + ("" if left is None else f", about {duration(left)} left"))
+
+    def ends(self, task: Task, step: str, seconds: float) -> None:
+        """Learn how long such a process takes."""
+        self.remaining.ended(task.cell.label, rounds_left(task, step), seconds)
+
+    def finished(self, task: Task, record: Record, *, kept: bool) -> None:
+        """A line for the cell."""
+        self.remaining.finished(task.cell.label)
+        self.finished_cells += 1
+        how = "kept" if kept else record.outcome.status
+        self._say(
+            f"[{self.finished_cells}/{self.cells}] {task.cell.mesh} / {task.cell.algorithm}: {how}"
+        )
+
+    def _say(self, line: str) -> None:
+        self.console.print(line, markup=False, soft_wrap=True)
+
+
+class LiveProgress(PlainProgress):
+    """A table of the cells that are in work, and a bar with the time that is left."""
+
+    def __init__(self, console: Console, cells: int) -> None:
+        super().__init__(console, cells)
+        self._lines: dict[str, tuple[str, str, Text]] = {}
+        self._recent: deque[str] = deque(maxlen=_SHOWN)
+        self._notice = ""
+        self._live = Live(console=console, transient=True, get_renderable=self._picture)
+
+    def __enter__(self) -> Self:
+        self._live.__enter__()
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self._live.__exit__(*error)
+
+    def starts(self, task: Task, step: str) -> None:
+        """Move the cell to the end of the table."""
+        self._notice = ""
+        self._show(task, Text(step, style="bold"))
+
+    def ends(self, task: Task, step: str, seconds: float) -> None:
+        """Show that the step is done."""
+        super().ends(task, step, seconds)
+        self._show(task, Text(f"{step} done", style="dim"))
+
+    def finished(self, task: Task, record: Record, *, kept: bool) -> None:
+        """Show the status and the seconds."""
+        self.remaining.finished(task.cell.label)
+        self.finished_cells += 1
+        status = record.outcome.status
+        text = Text("kept" if kept else status, style=status_style(status))
+        if record.outcome.median_seconds is not None:
+            text.append(f"  {record.outcome.median_seconds:.3f} s", style="dim")
+        self._show(task, text)
+
+    def _say(self, line: str) -> None:
+        self._notice = line
+
+    def _show(self, task: Task, state: Text) -> None:
+        label = task.cell.label
+        self._lines[label] = (task.cell.mesh, task.cell.algorithm, state)
+        if label in self._recent:
+            self._recent.remove(label)
+        self._recent.append(label)
+
+    def _picture(self) -> RenderableType:
+        table = Table(box=None, pad_edge=False, show_header=False)
+        for label in self._recent:
+            table.add_row(*self._lines[label])
+        bar = Table.grid(padding=(0, 1))
+        left = self.remaining.seconds
+        bar.add_row(
+            ProgressBar(total=max(self.remaining.processes, 1), completed=self.remaining.done),
+            f"{self.finished_cells}/{self.cells} cells",
+            "" if left is None else f"about {duration(left)} left",
+        )
+        bar.columns[0].width = 30
+        return Group(table, bar, *([Text(self._notice)] if self._notice else []))
+
+
+def rounds_left(task: Task, step: str) -> int:
+    """How many processes does a cell need after this step, if nothing goes wrong?"""
+    number = step.split()[1] if step.startswith("round") else "0"
+    return task.cell.repeats - int(number)
+
+
+def duration(seconds: float) -> str:
+    """Seconds as a person says them."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    if seconds < 90 * 60:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"

@@ -1,0 +1,94 @@
+"""The verb that writes reports, and what `reproduce` shares with it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cembench.commands.console import Json, err, out, print_json
+from cembench.commands.run import DEFAULT_RUN, Run
+
+if TYPE_CHECKING:
+    from cembench.report.document import Report
+
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", help="The report's folder; default: RUN/report."),
+]
+
+
+def report(run: Run = DEFAULT_RUN, *, output: Output = None, as_json: Json = False) -> None:
+    """Write the paper's tables, figures and claims as a run measured them.
+
+    The folder holds index.html (one file that works offline), report.md, report.tex, and every
+    table, figure and its data as files of their own. The four tables are shown here.
+    """
+    written, folder = make_report(run, output)
+    if as_json:
+        print_json(summary(written, folder))
+    else:
+        show_report(written, folder)
+
+
+def make_report(run: Path, output: Path | None, command: str = "") -> tuple[Report, Path]:
+    """Write a report, telling how far it is on standard error; the report and its folder."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+    from cembench.report.write_report import write_report
+
+    folder = output or run / "report"
+    told = f"cembench report {run}" + (f" -o {output}" if output else "")
+    bar = Progress(
+        BarColumn(20), MofNCompleteColumn(), TextColumn("{task.description}", markup=False),
+        console=err, transient=True,
+    )  # fmt: skip
+    with bar:
+        task = bar.add_task("reading")
+
+        def progress(words: str, done: int, total: int) -> None:
+            bar.update(task, description=words, completed=done, total=total)
+            if not err.is_terminal and done < total:
+                err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
+
+        return write_report(run, folder, command or told, progress), folder
+
+
+def show_report(report: Report, folder: Path) -> None:
+    """Print the paper's tables, what became of its claims, and where the report is."""
+    from cembench.report.render.terminal_report import paper_tables
+
+    out.print(paper_tables(report))
+    verdicts = summary(report, folder)["verdicts"]
+    out.print("Claims: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items()))
+    out.print(f"Report: {(folder / 'index.html').resolve()}", soft_wrap=True, markup=False)
+
+
+def summary(report: Report, folder: Path) -> dict[str, Any]:
+    """What a report holds, as JSON tells it."""
+    from cembench.report.document import Claim, Gap, figures_of, sections_of, tables_of
+
+    items = [item for _, section in sections_of(report) for item in section.items]
+    claims = {item.name: item.verdict for item in items if isinstance(item, Claim)}
+    return {
+        "report": str(folder),
+        "html": str(folder / "index.html"),
+        "markdown": str(folder / "report.md"),
+        "latex": str(folder / "report.tex"),
+        "tables": [table.name for table in tables_of(report)],
+        "figures": [figure.name for figure in figures_of(report)],
+        "gaps": {item.title: item.why for item in items if isinstance(item, Gap)},
+        "claims": claims,
+        "verdicts": dict(Counter(claims.values())),
+    }
+
+
+#: Each verb with the examples that its help shows.
+VERBS = (
+    (
+        report,
+        "Examples:  cembench report results/run  ·  cembench report results/run -o out --json",
+    ),
+)

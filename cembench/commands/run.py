@@ -1,0 +1,211 @@
+"""The verbs that look at finished runs: status, show, compare, merge, export."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cembench.commands.console import Json, out, print_json, warn
+from cembench.core.errors import RecordError
+from cembench.report.export import Format
+
+if TYPE_CHECKING:
+    from cembench.results.records import Cell, Record
+    from cembench.results.store import Store
+
+Run = Annotated[Path, typer.Argument(help="A run's folder.")]
+DEFAULT_RUN = Path("results/run")
+
+
+def status(run: Run = DEFAULT_RUN, *, as_json: Json = False) -> None:
+    """How far is a run, and what did not end ok?"""
+    from cembench.report.render.terminal import status_style
+    from cembench.results.store import Store
+
+    store = _existing(Store(run))
+    held = {record.cell.label: record for record in store.finished()}
+    asked = store.plan() or [record.cell for record in held.values()]
+    states = {cell.label: _state(store, held.get(cell.label), cell) for cell in asked}
+    others = [record for label, record in held.items() if label not in states]
+    about: dict[str, Any] = {
+        "run": str(run),
+        "measuring": store.is_locked(),
+        "asked": len(asked),
+        "states": dict(Counter(state.split(":")[0] for state in states.values())),
+        "recorded_besides": len(others),
+        "cells": [
+            {"key": c.key, "mesh": c.mesh, "algorithm": c.algorithm, "state": states[c.label]}
+            for c in asked
+        ],
+    }
+    if as_json:
+        print_json(about)
+        return
+    out.print("a run measures into it now" if about["measuring"] else "no run measures into it")
+    for state, count in sorted(about["states"].items(), key=lambda item: -item[1]):
+        out.print(f"{count:>6}  {state}", style=status_style(state) if state == "ok" else "")
+    if others:
+        out.print(f"{len(others):>6}  recorded besides, not asked for last")
+    for cell in asked:
+        if states[cell.label] not in ("ok", "waiting"):
+            line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {states[cell.label]}"
+            out.print(line, markup=False, soft_wrap=True)
+
+
+def show(
+    cell: Annotated[str, typer.Argument(help="The beginning of a key, or MESH/ALGORITHM.")],
+    *,
+    run: Annotated[Path, typer.Option("--run", help="The run's folder.")] = DEFAULT_RUN,
+    as_json: Json = False,
+) -> None:
+    """All that is recorded of a cell."""
+    from cembench.report.render.terminal import figures_table
+    from cembench.results.record_rows import row
+    from cembench.results.store import Store
+
+    found = _chosen(Store(run).records(), cell)
+    if as_json:
+        print_json([row(record) for record in found])
+        return
+    for record in found:
+        outcome = record.outcome
+        out.print(f"[bold]{outcome.status}[/bold]  {record.cell.solves}  {record.cell.key[:12]}")
+        out.print(figures_table(record))
+        for number, r in enumerate(outcome.rounds, start=1):
+            calls = " ".join(f"{seconds:.4f}" for seconds in r.calls)
+            out.print(f"round {number:<3} {r.started_at}  {calls}", markup=False)
+        for words in (outcome.cause, outcome.traceback):
+            if words:
+                out.print(words, markup=False, soft_wrap=True)
+
+
+def compare(before: Run, after: Run, *, as_json: Json = False) -> None:
+    """What became faster or slower from one run to another?
+
+    The interval holds what each run's rounds show; that the machine was in another state in the
+    other run is not in it. To tell two algorithms apart, measure both in one run.
+    """
+    from dataclasses import asdict
+
+    from cembench.report.render.terminal import changes_table
+    from cembench.results.comparison import compare_runs, machine_differences
+    from cembench.results.store import Store
+
+    old, new = Store(before), Store(after)
+    changes = compare_runs(old.records(), new.records())
+    if not changes:
+        raise RecordError(
+            f"{before} and {after} have no timed cell in common: the same algorithm with the same "
+            "parameters on the same surface, solves, backend and threads."
+        )
+    earlier, later = old.environments(), new.environments()
+    pairs = {(c.before.environment, c.after.environment) for c in changes}
+    differences = sorted(
+        {d for b, a in pairs for d in machine_differences(earlier.get(b, {}), later.get(a, {}))}
+    )
+    if as_json:
+        rows = [
+            {
+                "mesh": c.after.cell.mesh,
+                "algorithm": c.after.cell.algorithm,
+                "solves": c.after.cell.solves,
+                "seconds_before": c.before.outcome.median_seconds,
+                "seconds_after": c.after.outcome.median_seconds,
+                **asdict(c.comparison),
+            }
+            for c in changes
+        ]
+        print_json({"differences": differences, "cells": rows})
+    else:
+        out.print(changes_table(changes))
+    if differences:
+        warn("the runs were not measured under the same conditions; their seconds do not compare")
+        for difference in differences:
+            warn(difference)
+
+
+def merge(
+    runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where they come together.")],
+    as_json: Json = False,
+) -> None:
+    """Bring the records of several runs together in one folder.
+
+    Of a cell that several hold, one that ended ok counts first, and then the later one.
+    """
+    from cembench.results.store import Store
+    from cembench.results.store import merge as merged
+
+    into = Store(output)
+    with into.locked():
+        count = merged([Store(run) for run in runs], into)
+    machines = sorted({record.environment for record in into.records()})
+    if as_json:
+        print_json({"output": str(output), "cells": count, "environments": machines})
+    else:
+        out.print(f"{count} cells in {output}", markup=False, soft_wrap=True)
+    if len(machines) > 1:
+        warn(f"measured in {len(machines)} environments; only ratios of one sitting compare")
+
+
+def export(
+    run: Run = DEFAULT_RUN,
+    *,
+    form: Annotated[Format, typer.Option("--format", help="What to write.")] = Format.csv,
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", help="The file; default: RUN/rows.FORMAT.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Write all records of a run as one table, a row a cell."""
+    from cembench.report.export import export_rows
+    from cembench.results.record_rows import rows
+    from cembench.results.store import Store
+
+    found = rows(Store(run).records())
+    path = output or run / f"rows.{form.value}"
+    export_rows(found, path, form)
+    if as_json:
+        print_json({"output": str(path), "rows": len(found)})
+    else:
+        out.print(f"{len(found)} rows in {path}", markup=False, soft_wrap=True)
+
+
+def _existing(store: Store) -> Store:
+    if not store.folder.is_dir():
+        raise RecordError(
+            f"{store.folder} holds no run: there is no such folder. Make one with `cembench run`."
+        )
+    return store
+
+
+def _state(store: Store, record: Record | None, cell: Cell) -> str:
+    """In words: a status with its cause, how many rounds are done, or that it waits."""
+    if record is not None:
+        outcome = record.outcome
+        return outcome.status + (f": {outcome.cause}" if outcome.cause else "")
+    rounds = store.rounds_done(cell)
+    return "waiting" if rounds is None else f"in work: {rounds} of {cell.repeats} rounds done"
+
+
+def _chosen(records: list[Record], wanted: str) -> list[Record]:
+    by_name = [r for r in records if f"{r.cell.mesh}/{r.cell.algorithm}" == wanted]
+    found = by_name or [r for r in records if wanted and r.cell.key.startswith(wanted)]
+    if not found:
+        known = ", ".join(dict.fromkeys(f"{r.cell.mesh}/{r.cell.algorithm}" for r in records))
+        raise RecordError(f"no cell {wanted!r} in this run; it holds: {known or 'nothing'}.")
+    return found
+
+
+#: Each verb with the examples that its help shows.
+VERBS = (
+    (status, "Example:  cembench status results/run"),
+    (show, "Examples:  cembench show face/cem  ·  cembench show 3fa9 --run results/mine"),
+    (compare, "Example:  cembench compare results/before results/after"),
+    (merge, "Example:  cembench merge results/a results/b -o results/both"),
+    (export, "Example:  cembench export results/run --format parquet"),
+)

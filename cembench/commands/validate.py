@@ -1,0 +1,187 @@
+"""The verb that judges a solver: validate."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cembench.commands.console import Json, assignments, err, out, print_json, split
+from cembench.results.paper.profiles import Profile
+from cembench.results.records import DEFAULT_ROUNDS
+from cembench.validation.verdict import Requirement
+
+if TYPE_CHECKING:
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.registry import Algorithm, Registry
+    from cembench.running.plan import Standing
+    from cembench.validation.examine import Telling
+    from cembench.validation.verdict import Validation
+
+Names = list[str]
+
+
+def validate(
+    plugin: Annotated[
+        str,
+        typer.Argument(
+            metavar="PLUGIN", help="FILE.py, FILE.py:NAME, module:name, or a registered name."
+        ),
+    ],
+    *,
+    against: Annotated[
+        Names, typer.Option(help="Baselines; default: cem, or the usual one of the target.")
+    ] = [],  # noqa: B006 - typer copies defaults
+    profile: Annotated[Profile | None, typer.Option(help="Compare on these stand-ins.")] = None,
+    surfaces: Annotated[Names, typer.Option(help="Compare on these; see `list surfaces`.")] = [],  # noqa: B006
+    mesh: Annotated[list[Path], typer.Option(help="Compare on this file. Repeatable.")] = [],  # noqa: B006
+    mesh_dir: Annotated[list[Path], typer.Option(help="Compare on a folder's files.")] = [],  # noqa: B006
+    faces: Annotated[
+        int | None,
+        typer.Option(min=24, help="Triangles of a named surface; unnamed ones have 5,000."),
+    ] = None,
+    repeats: Annotated[int, typer.Option(min=1, help="Rounds of timing.")] = DEFAULT_ROUNDS,
+    up_to: Annotated[
+        int, typer.Option(min=0, help="Triangles up to which growth is measured; 0: not.")
+    ] = 30_000,
+    parameter: Annotated[
+        Names,
+        typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set one. Repeatable."),
+    ] = [],  # noqa: B006
+    require: Annotated[
+        list[Requirement],
+        typer.Option(
+            metavar="WHAT",
+            help="Exit with 1 unless also: faster, not-slower, better, not-worse, no-folds. "
+            "Repeatable.",
+        ),
+    ] = [],  # noqa: B006
+    checks_only: Annotated[
+        bool, typer.Option("--checks-only", help="Contract and correctness, no timing.")
+    ] = False,
+    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds that a call may take.")] = 120.0,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", help="Keep JSON, HTML and the runs in this folder."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Is this solver right, and is it better and faster than what there is?
+
+    Four stages, each reached only if the ones before found no fault: the contract, correctness on
+    surfaces whose map is known, quality and speed beside a baseline, growth of the seconds.
+    Exit code 0: valid, and what was required holds; 1: not; 2: wrong usage.
+    docs/write_a_solver.md shows it at work.
+    """
+    from cembench.running.local import Options
+    from cembench.running.plan import distribute_parameters
+    from cembench.validation.examine import Asked, examine
+    from cembench.validation.solver import Solver, in_a_process, load_solver
+    from cembench.validation.terminal import validation_text
+
+    algorithm, registry, plugins = load_solver(plugin)
+    arguments = distribute_parameters([algorithm], assignments(parameter))[algorithm.name]
+    options = Options(timeout=timeout)
+    solver = Solver(algorithm, plugins, arguments, in_a_process(options))
+    with err.status("reading surfaces", spinner="line"):
+        meshes, standing = _chosen(algorithm, registry, profile, surfaces, mesh, mesh_dir, faces)
+    asked = Asked(
+        against=split(against) or None,
+        meshes=meshes,
+        standing=standing,
+        faces=faces or 5000,
+        rounds=repeats,
+        up_to=up_to,
+        require=require,
+        checks_only=checks_only,
+        options=options,
+        command=shlex.join(["cembench", *sys.argv[1:]]),
+    )
+    with _folder(output) as folder:
+        found = examine(solver, registry, folder, asked, _telling())
+        written = _write(found, folder) if output is not None else {}
+    if as_json:
+        print_json(_as_json(found, written))
+    else:
+        out.print(validation_text(found))
+        for path in written.values():
+            out.print(path, style="dim", markup=False, soft_wrap=True)
+    if not found.passed:
+        raise typer.Exit(1)
+
+
+def _chosen(
+    algorithm: Algorithm,
+    registry: Registry,
+    profile: Profile | None,
+    surfaces: Names,
+    files: list[Path],
+    folders: list[Path],
+    faces: int | None,
+) -> tuple[list[TriangleMesh], dict[str, Standing]]:
+    """The surfaces that the user names, none for the usual ones; and what they stand for."""
+    from cembench.results.paper.profiles import surfaces_of
+    from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
+
+    files = [*files, *(file for folder in folders for file in mesh_files(folder))]
+    names = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
+    found, standing = gather_surfaces(registry, [algorithm], files, names, faces)
+    plan_cells([algorithm], found, {}, How())  # complains now of what it could not run on later
+    return found, standing
+
+
+@contextmanager
+def _folder(output: Path | None) -> Iterator[Path]:
+    """Where the runs go: the user's folder, or one that is gone in the end."""
+    if output is not None:
+        yield output
+        return
+    with TemporaryDirectory(prefix="cembench-") as folder:
+        yield Path(folder)
+
+
+def _telling() -> Telling:
+    """A line for each stage, and the progress of what is timed."""
+    from cembench.commands.progress import LiveProgress, PlainProgress
+    from cembench.validation.examine import Telling
+
+    def watcher(cells: int) -> PlainProgress:
+        return (LiveProgress if err.is_terminal else PlainProgress)(err, cells)
+
+    return Telling(lambda stage: err.print(f"{stage} ...", style="dim"), watcher)
+
+
+def _write(found: Validation, folder: Path) -> dict[str, str]:
+    """Lay the validation into the folder, as JSON and as a page; where is each?"""
+    from cembench.core.atomic import write_model
+    from cembench.report.render.html import write_html
+    from cembench.validation.document import document_of
+
+    path = folder / "validation.json"
+    write_model(path, found)
+    page = write_html(document_of(found, folder), folder)
+    return {"output": str(path), "page": str(page)}
+
+
+def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:
+    """The data, and what is said of it."""
+    from cembench.validation.verdict import sentence
+
+    said = {"valid": found.valid, "passed": found.passed, "verdict": sentence(found)}
+    return said | found.model_dump(mode="json") | written
+
+
+#: Each verb with the examples that its help shows.
+VERBS = (
+    (
+        validate,
+        "Examples:  cembench validate mine.py  ·  cembench validate mine.py:fast --against cem,fdm "
+        "--profile quick -o results/mine  ·  cembench validate mine.py --require not-slower",
+    ),
+)

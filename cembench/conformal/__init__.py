@@ -1,0 +1,1 @@
+"""Conformal geometry: Laplacian, harmonic and Moebius maps, Beltrami coefficients, metrics."""

@@ -1,0 +1,126 @@
+"""Beltrami coefficients: how far from conformal is a piecewise linear map, and which way?
+
+Also the way back, from coefficients to a map: the generalised Laplacian and the linear Beltrami
+solver (Lui, Lam, Wong & Gu 2013).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.harmonic import harmonic_extension
+from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
+from cembench.conformal.planar import signed_areas
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+
+Complex = NDArray[np.complex128]
+
+#: A triangle with 1 - |mu| below this counts as collapsed: its coefficient has lost its digits.
+COLLAPSED = 1e-8
+
+
+def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> Complex:
+    """What is mu of the map that carries each planar triangle ``uv[F]`` to ``V[F]``? Shape (m,).
+
+    V is (n, 2) or (n, 3). From the first fundamental form E, F, G of that map,
+    mu = (E - G + 2 i F) / (E + G + 2 sqrt(EG - F^2)), with the root's sign that of the planar area:
+    |mu| < 1 where the orientation is kept, |mu| > 1 where the triangle is folded, NaN where the
+    planar triangle has no area.
+    """
+    area = signed_areas(uv, F)
+    # The gradient of the hat function of a corner is i times the opposite edge over 2 area.
+    dx = np.zeros((len(F), V.shape[1]))
+    dy = np.zeros_like(dx)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        for c in range(3):
+            gradient = 1j * (uv[F[:, (c + 2) % 3]] - uv[F[:, (c + 1) % 3]]) / (2 * area)
+            dx += gradient.real[:, None] * V[F[:, c]]
+            dy += gradient.imag[:, None] * V[F[:, c]]
+        E, G = np.einsum("td,td->t", dx, dx), np.einsum("td,td->t", dy, dy)
+        mixed = np.einsum("td,td->t", dx, dy)
+        root = np.sign(area) * np.sqrt(np.maximum(E * G - mixed**2, 0.0))
+        mu: Complex = (E - G + 2j * mixed) / (E + G + 2 * root)
+    return mu
+
+
+def dilatations_of(mu: Complex) -> NDArray[np.float64]:
+    """Largest over smallest stretch, (1 + |mu|) / |1 - |mu||; infinite where mu is NaN."""
+    modulus = np.nan_to_num(np.abs(mu), nan=1.0)
+    with np.errstate(divide="ignore"):
+        return (1 + modulus) / np.abs(1 - modulus)
+
+
+def unfolded(mu: Complex) -> Complex:
+    """What would mu be if the folded triangles were turned over? 1 / conj(mu) where |mu| > 1."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(np.abs(mu) > 1, 1 / np.conj(mu), mu)
+
+
+def generalised_weights(uv: Complex, F: NDArray[np.int64], mu: Complex) -> NDArray[np.float64]:
+    """Which weights make maps of coefficients mu harmonic? Shape (m, 3), for the opposite edges.
+
+    They add up (`laplacian_of_weights`) to the generalised Laplacian, the stiffness matrix of
+    -div(A grad) on the planar triangles ``uv[F]``, where A = [[a, b], [b, c]], a = |1 - mu|^2 / d,
+    b = -2 Im mu / d, c = |1 + mu|^2 / d, d = 1 - |mu|^2; mu = 0 gives half the cotangents of the
+    plane. A folded triangle counts with its coefficient `unfolded`, which keeps A positive. Not
+    finite where a planar triangle has no area or |mu| = 1.
+    """
+    mu = unfolded(mu)
+    edge = [uv[F[:, (c + 2) % 3]] - uv[F[:, (c + 1) % 3]] for c in range(3)]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        double_area = np.abs((np.conj(edge[0]) * edge[1]).imag)
+        scale = 1 / (2 * double_area * (1 - np.abs(mu) ** 2))
+        # n.An = |e + mu conj(e)|^2 / d for the normal n = i e of an edge e; polarised.
+        e = [edge[c] + mu * np.conj(edge[c]) for c in range(3)]
+        weights = [-scale * (np.conj(e[(c + 1) % 3]) * e[(c + 2) % 3]).real for c in range(3)]
+    return np.stack(weights, axis=1)
+
+
+def weights_of_map(
+    uv: Complex, F: NDArray[np.int64], mu: Complex, V: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """`generalised_weights` for the coefficients mu of the map from ``uv[F]`` to ``V[F]``.
+
+    Dirichlet's energy is conformally invariant, so these are half the cotangents of V whatever uv
+    is. Where a planar triangle has collapsed, so that mu is lost in rounding, that limit is taken.
+    """
+    weights = generalised_weights(uv, F, mu)
+    with np.errstate(invalid="ignore"):
+        usable = 1 - np.abs(unfolded(mu)) > COLLAPSED
+    lost = np.flatnonzero(~(usable & np.isfinite(weights).all(axis=1)))
+    weights[lost] = half_cotangents(V, F[lost])
+    return weights
+
+
+def linear_beltrami_solver(
+    F: NDArray[np.int64],
+    weights: NDArray[np.float64],
+    fixed: NDArray[np.int64],
+    values: NDArray[Any],
+) -> NDArray[Any]:
+    """Which map has the coefficients behind these generalised weights, and these values?
+
+    In the least squares sense: it is harmonic for the generalised Laplacian, whose matrix is
+    symmetric positive definite once a vertex is fixed. `weights` (m, 3) as `generalised_weights`
+    gives them, `fixed` (k,) vertices, `values` (k,), real or complex, where they go; the result
+    is (n,) for the vertices 0 to n - 1 that F names.
+
+    Raises
+    ------
+    AlgorithmFailed
+        Weights that are not finite, or a matrix that is not positive definite.
+
+    """
+    bad = np.flatnonzero(~np.isfinite(weights).all(axis=1))
+    if len(bad):
+        raise AlgorithmFailed(
+            f"{len(bad)} of {len(F)} triangles have collapsed in the plane (the first is number "
+            f"{bad[0]}), so the generalised Laplacian has no coefficients there"
+        )
+    with phase("assembly"):
+        A = laplacian_of_weights(F, weights, int(F.max()) + 1)
+    return harmonic_extension(A, fixed, values)

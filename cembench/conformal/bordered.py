@@ -1,0 +1,149 @@
+"""A surface's Laplacian ordered for one factorisation that serves boundary and interior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import accumulate, pairwise
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.conformal.laplacian import by_rows
+from cembench.conformal.planar import polygon_area
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+T = TypeVar("T", bound=np.generic)
+
+
+class BorderedLaplacian:
+    """L with the interior first, then the boundary loops as they are named, the last vertex pinned.
+
+    Its Cholesky factor holds that of L_ii as its leading block, and that of the boundary's Schur
+    complement, which is the Dirichlet-to-Neumann matrix, as its trailing one. Whatever is glued to
+    the boundary, patches that fill holes, changes only that small block.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    L : sparse (n, n)
+        Its Laplacian.
+    loops : sequence of int arrays
+        Its boundary loops, in the order wanted.
+
+    Attributes
+    ----------
+    interior, boundary : int64
+        Indices i, and b: the loops one behind the other.
+    parts : tuple of slice
+        Where each loop lies in the boundary.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The mesh has no interior vertex.
+    NotPositiveDefinite
+        L pinned is not.
+
+    """
+
+    def __init__(
+        self, mesh: TriangleMesh, L: sparse.sparray, loops: Sequence[NDArray[np.int64]]
+    ) -> None:
+        self.interior, self.boundary = mesh.interior, np.concatenate(loops)
+        ends = [0, *accumulate(map(len, loops))]
+        self.parts = tuple(slice(*between) for between in pairwise(ends))
+        if not len(self.interior):
+            raise AlgorithmFailed(
+                "the mesh has no interior vertex, so no harmonic map has any freedom"
+            )
+        with phase("assembly"):
+            order = self._order = np.concatenate([self.interior, self.boundary])
+            self._ordered = sparse.csc_array(by_rows(L)[order][:, order].T)  # symmetric again
+            pinned = self._ordered[:-1, :-1]
+        self._whole = Cholesky(pinned, leading=len(self.interior))
+
+    @cached_property
+    def L_bi(self) -> sparse.csr_array:
+        """The boundary's rows of L, the interior's columns."""
+        n_i = len(self.interior)
+        with phase("assembly"):
+            return sparse.csr_array(self._ordered)[n_i:, :n_i]
+
+    @cached_property
+    def _L_ib(self) -> sparse.csr_array:
+        with phase("assembly"):
+            return sparse.csr_array(self.L_bi.T)
+
+    @cached_property
+    def L_bb(self) -> sparse.csc_array:
+        """The boundary's rows and columns of L."""
+        n_i = len(self.interior)
+        with phase("assembly"):
+            return self._ordered[n_i:, n_i:]
+
+    def in_order(self, f_i: NDArray[T], f_b: NDArray[T]) -> NDArray[T]:
+        """Values on the interior and the boundary as one array (n,), in the order of the mesh."""
+        f = np.empty(len(self._order), dtype=f_b.dtype)
+        f[self._order] = np.concatenate([f_i, f_b])
+        return f
+
+    def solved_boundary(self, rhs: Complex) -> Complex:
+        """The boundary values of L f = rhs (n,), 0 in sum, with f = 0 at the last of them."""
+        f = np.append(self._whole.solve(rhs[self._order][:-1]), 0.0)
+        return f[len(self.interior) :]
+
+    def solve_interior(self, rhs_i: NDArray[Any]) -> NDArray[Any]:
+        """L_ii f_i = rhs_i."""
+        return self._whole.solve_leading(rhs_i)
+
+    def dirichlet(self, f_b: Complex) -> Complex:
+        """The interior values with L_ii f_i = -L_ib f_b (Eq. 22)."""
+        return self.solve_interior(-(self._L_ib @ f_b))
+
+    def conformal_energy(self, f_i: Complex, f_b: Complex) -> float:
+        """E_C (Eq. 7) of a map that is harmonic inside: only the boundary's rows count."""
+        with phase("energy"):
+            dirichlet = 0.5 * float(np.vdot(f_b, self.L_bb @ f_b + self.L_bi @ f_i).real)
+            return dirichlet - polygon_area(f_b)
+
+    def dirichlet_to_neumann(self) -> DirichletToNeumann:
+        """S = L_bb - L_bi L_ii^-1 L_ib, as its triangular factor."""
+        return DirichletToNeumann(self._whole.schur_factor())
+
+    @cached_property
+    def S(self) -> Real:
+        """The same, dense (B, B): positive semi-definite, rows sum to zero."""
+        C = self._whole.schur_factor()
+        with phase("condensation"):
+            pinned = C @ C.T
+            # The last row and column follow from sums of zero (Theorem 1).
+            S = np.zeros((len(C) + 1, len(C) + 1))
+            S[:-1, :-1] = pinned
+            S[-1, :-1] = S[:-1, -1] = -pinned.sum(axis=0)
+            S[-1, -1] = pinned.sum()
+            return S
+
+    def swept_to_boundary(self, measure: Real) -> Real:
+        """Which weights on the boundary give every harmonic map the mean that the measure gives?
+
+        `measure` is (n, k), each column 1 in sum; the result (B, k) is its harmonic measure, 1 in
+        sum too.
+        """
+        weights = self._whole.condensed(measure[self._order][:-1])
+        return np.concatenate([weights, 1 - weights.sum(axis=0, keepdims=True)])
+
+    def harmonic_extension(self, f_b: Complex) -> Complex:
+        """The map (n,) with these boundary values that is harmonic inside, by half a solve."""
+        # Constants are harmonic: so the last vertex can be taken to 0 and back.
+        f_i: Any = self._whole.extended((f_b - f_b[-1])[:-1]) + f_b[-1]
+        return self.in_order(f_i, f_b)

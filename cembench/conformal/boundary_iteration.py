@@ -1,0 +1,136 @@
+"""The steps of CEM (Algorithm 1) that do not depend on how the Dirichlet problem is solved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.gauge import middle_triangle
+from cembench.conformal.planar import backward_arcs, polygon_area
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+def pole(V: Real, F: NDArray[np.int64]) -> tuple[NDArray[np.int64], Complex]:
+    """Which right-hand side puts a pole at the triangle in the middle (Eq. 14)?
+
+    V is (n, 2 or 3). The triangle is the one whose barycentre is nearest to the mean vertex; its
+    corners (3,) come back with their values (3,), all others are zero.
+    """
+    corners = middle_triangle(V, F)
+    p_a, p_b, p_c = V[corners]
+    base = p_b - p_a
+    alpha = np.dot(p_c - p_a, base) / np.dot(base, base)
+    height = np.linalg.norm(p_c - (p_a + alpha * base))
+    length = np.linalg.norm(base)
+    values = [
+        -1 / length + 1j * (1 - alpha) / height,
+        1 / length + 1j * alpha / height,
+        -1j / height,
+    ]
+    return corners, np.array(values)
+
+
+def pole_start(V: Real, F: NDArray[np.int64], solve: Callable[[Complex], Complex]) -> Complex:
+    """Where does the boundary lie in the map with a pole in the middle (Eqs. 13, 14, 18)?
+
+    `solve` gives f_b of L f = rhs (n,).
+    """
+    with phase("start"):
+        corners, values = pole(V, F)
+        rhs = np.zeros(len(V), dtype=np.complex128)
+        rhs[corners] = values
+        f_b = solve(rhs)
+    # The image is the outside of a curve, so the boundary runs clockwise round it.
+    return np.conj(f_b) if polygon_area(f_b) < 0 else f_b
+
+
+def on_circle(f_b: Complex) -> Complex:
+    """Centralise and normalise (Eqs. 24, 25).
+
+    Raises
+    ------
+    AlgorithmFailed
+        A vertex lies at the centre.
+
+    """
+    f_b = f_b - f_b.mean()
+    modulus = np.abs(f_b)
+    if not modulus.min() > 0:
+        raise AlgorithmFailed(
+            f"boundary vertex number {int(np.argmin(modulus))} of the loop came to lie at the "
+            "centre of the boundary, so its place on the circle is undefined (Eq. 25)"
+        )
+    return f_b / modulus
+
+
+def inverted(f: Complex) -> Complex:
+    """F / |f|^2 (Eq. 30); zero stays zero."""
+    squared = (f * np.conj(f)).real
+    return np.divide(f, squared, out=np.zeros_like(f), where=squared > 0)
+
+
+def iterate_boundary(
+    f_b: Complex,
+    dirichlet: Callable[[Complex], Complex],
+    ring: Callable[[Complex], Complex],
+    energy: Callable[[Complex, Complex], float],
+    *,
+    tolerance: float,
+    max_iterations: int,
+    inversion: bool = True,
+) -> tuple[Complex, Complex, list[float], int]:
+    """Which boundary values does CEM's iteration (30), (24), (25), (22) end with?
+
+    Parameters
+    ----------
+    f_b : complex (k,)
+        The start, on the unit circle.
+    dirichlet : function
+        The other values f_i that are harmonic for boundary values f_b (Eq. 22).
+    ring : function
+        The solution of L_bb x = -L_bi f_i for f_i (Eq. 23).
+    energy : function
+        E_C (Eq. 7) of f_i and f_b.
+    tolerance, max_iterations
+        It ends after the first step that lowers E_C by less, or after so many.
+    inversion : bool
+        Step (30); else (23). A step that would make boundary vertices change places is (23), and
+        iteration ends where (23) would do so too.
+
+    Returns
+    -------
+    f_b, f_i : complex
+        The last values.
+    history : list of float
+        E_C of the start and after each step.
+    order_kept : int
+        How many steps were changed, or left out, to keep the boundary's order.
+
+    """
+
+    def step(f_i: Complex) -> Complex:
+        with phase("boundary step"):
+            return on_circle(ring(f_i))
+
+    f_i = dirichlet(f_b)
+    history = [energy(f_i, f_b)]
+    order_kept = 0
+    for _ in range(max_iterations):
+        following = step(inverted(f_i) if inversion else f_i)
+        if backward_arcs(following) > backward_arcs(f_b):
+            order_kept += 1
+            following = step(f_i)
+            if backward_arcs(following) > backward_arcs(f_b):
+                break
+        f_b = following
+        f_i = dirichlet(f_b)
+        history.append(energy(f_i, f_b))
+        if history[-2] - history[-1] < tolerance:
+            break
+    return f_b, f_i, history, order_kept

@@ -1,0 +1,57 @@
+"""Mean curvature from the cotangent Laplacian."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.laplacian import cotangent_laplacian, half_cotangents
+from cembench.mesh import topology
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+
+def mean_curvature(mesh: TriangleMesh) -> NDArray[np.float64]:
+    """How curved is the surface at each vertex: the mean of both principal curvatures?
+
+    Shape (n,), in one over the unit of V; positive where the surface bulges outwards (1 on a unit
+    sphere). ``L V = 2 H A n`` with A the mixed Voronoi area round the vertex (Meyer et al. 2003).
+    On the boundary, where that says nothing, it is the mean over the interior neighbours, or 0.
+    """
+    V, F, n = mesh.V, mesh.F, mesh.n
+    corner = V[F[:, 0]]
+    doubled = np.cross(V[F[:, 1]] - corner, V[F[:, 2]] - corner)
+    shares = _mixed_areas(V, F, np.linalg.norm(doubled, axis=1) / 2)
+    normal = np.zeros((n, 3))
+    area = np.zeros(n)
+    for c in range(3):
+        np.add.at(normal, F[:, c], doubled)
+        np.add.at(area, F[:, c], shares[:, c])
+    length = np.linalg.norm(normal, axis=1)
+    normal /= np.where(length > 0, length, 1.0)[:, None]
+    H = np.einsum("vd,vd->v", cotangent_laplacian(V, F) @ V, normal) / (2 * area)
+    return _continued_to_boundary(mesh, H)
+
+
+def _mixed_areas(
+    V: NDArray[np.float64], F: NDArray[np.int64], areas: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What part of each triangle belongs to each of its corners? Shape (m, 3).
+
+    The Voronoi part; of an obtuse triangle half to the obtuse corner, a quarter to each other.
+    """
+    half = half_cotangents(V, F)
+    opposite = np.linalg.norm(V[F[:, [1, 2, 0]]] - V[F[:, [2, 0, 1]]], axis=2) ** 2
+    weighted = half * opposite / 4
+    voronoi = weighted.sum(axis=1, keepdims=True) - weighted
+    obtuse = half < 0
+    cut = areas[:, None] * np.where(obtuse, 0.5, 0.25)
+    return np.where(obtuse.any(axis=1, keepdims=True), cut, voronoi)
+
+
+def _continued_to_boundary(mesh: TriangleMesh, H: NDArray[np.float64]) -> NDArray[np.float64]:
+    inside = np.zeros(mesh.n)
+    inside[mesh.interior] = 1.0
+    graph = topology.vertex_graph(mesh.F, mesh.n).astype(bool).astype(float)
+    neighbours = graph @ inside
+    mean = (graph @ (inside * H)) / np.maximum(neighbours, 1)
+    return np.where(inside > 0, H, mean)

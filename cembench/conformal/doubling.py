@@ -1,0 +1,62 @@
+"""A surface glued to its mirror copy along the boundary: closed, and of genus zero for a disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.mesh.triangle_mesh import DiskMesh
+
+
+@dataclass(frozen=True)
+class DoubledSurface:
+    """The triangles of both copies; vertices 0 to n - 1 are those of the surface itself.
+
+    Parameters
+    ----------
+    F : int64 (2 m, 3)
+        The surface's own triangles, then their mirror images in the same order, turned over so
+        that the whole is oriented.
+    mirror : int64 (n,)
+        The copy of each vertex of the surface; a boundary vertex is its own.
+    size : int
+        Number of vertices of both copies together.
+
+    """
+
+    F: NDArray[np.int64]
+    mirror: NDArray[np.int64]
+    size: int
+
+    def on_both(self, values: NDArray[Any]) -> NDArray[Any]:
+        """What is known at the surface's vertices (n, ...), at those of both copies (size, ...)."""
+        both = np.empty((self.size, *values.shape[1:]), dtype=values.dtype)
+        both[self.mirror] = values
+        both[: len(values)] = values
+        return both
+
+
+def doubled(mesh: DiskMesh) -> DoubledSurface:
+    """What does the surface glued to its mirror copy look like?
+
+    A chord, an interior edge between two boundary vertices, is shared by both copies and then has
+    four triangles; sums over triangles are right all the same.
+    """
+    mirror = np.arange(mesh.n)
+    mirror[mesh.interior] = mesh.n + np.arange(len(mesh.interior))
+    return DoubledSurface(
+        np.concatenate([mesh.F, mirror[mesh.F][:, ::-1]]), mirror, mesh.n + len(mesh.interior)
+    )
+
+
+def doubled_laplacian(L: sparse.csc_array, double: DoubledSurface) -> sparse.csc_array:
+    """Which Laplacian has the doubled surface: the sum of L (n, n) over both copies."""
+    one = sparse.coo_array(L)
+    i = np.concatenate([one.row, double.mirror[one.row]])
+    j = np.concatenate([one.col, double.mirror[one.col]])
+    both = sparse.coo_array((np.tile(one.data, 2), (i, j)), shape=(double.size, double.size))
+    return sparse.csc_array(both)

@@ -1,0 +1,98 @@
+"""The cotangent Laplacian (Eq. 6).
+
+Sign convention: positive semi-definite, rows sum to zero, ``L[i, j]`` is minus half the sum of the
+cotangents opposite to edge ij; it is positive exactly where an interior edge is not Delaunay.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.core.clock import phase
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+
+def corner_products(
+    V: NDArray[np.float64], F: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Dot products (m, 3) of the edges that leave each corner, and twice the areas (m,), unsigned.
+
+    V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is that at vertex ``F[t, c]``.
+    """
+    a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
+    # Edges opposite to the corners 0, 1, 2.
+    e0, e1, e2 = c - b, a - c, b - a
+    dots = np.empty(F.shape)
+    for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
+        np.einsum("td,td->t", p, q, out=dots[:, k])
+    np.negative(dots, out=dots)
+    # Lagrange's identity through the dot products alone would cancel on slivers.
+    if V.shape[1] == 2:
+        double_area = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
+    else:
+        x = e1[:, 1] * e2[:, 2] - e1[:, 2] * e2[:, 1]
+        y = e1[:, 2] * e2[:, 0] - e1[:, 0] * e2[:, 2]
+        z = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+        double_area = np.sqrt(x * x + y * y + z * z)
+    return dots, double_area
+
+
+def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+    """What is half the cotangent of each corner's angle? Shape (m, 3), dimensionless.
+
+    V and corners as for :func:`corner_products`.
+    """
+    dots, double_area = corner_products(V, F)
+    return dots / (2 * double_area[:, None])
+
+
+def laplacian_of_weights(
+    F: NDArray[np.int64], weights: NDArray[np.float64], n: int
+) -> sparse.csc_array:
+    """Which Laplacian has these weights? `weights[t, c]` counts for the edge opposite to corner c.
+
+    The two triangles of an edge add up.
+    """
+    i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
+    one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
+    W = one_way + one_way.T
+    # Symmetric to the last bit, so its rows are its columns.
+    return sparse.csc_array(sparse.csr_array(sparse.diags_array(W.sum(axis=1)) - W).T)
+
+
+def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> sparse.csc_array:
+    """The positive semi-definite cotangent Laplacian L of Eq. (6); V (n, 2 or 3), L (n, n)."""
+    return laplacian_of_weights(F, half_cotangents(V, F), len(V))
+
+
+def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array:
+    """The Laplacian that every algorithm shares; booked as the phase "laplacian".
+
+    With `delaunay` it is that of the intrinsic Delaunay triangulation of the same surface (Fisher
+    et al. 2007): no weight is negative, so a harmonic map has discrete maximum principle.
+    """
+    with phase("laplacian"):
+        if not delaunay:
+            return cotangent_laplacian(mesh.V, mesh.F)
+        import igl  # slow to load, and rarely needed
+
+        negative, _, _ = igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)
+        return sparse.csc_array(-negative)
+
+
+def by_rows(L: sparse.csc_array) -> sparse.csr_array:
+    """A Laplacian stored by rows: it is symmetric, so its columns are its rows as they are."""
+    return sparse.csr_array(L.T)
+
+
+def non_delaunay_share(mesh: TriangleMesh) -> float:
+    """What share of the interior edges is not Delaunay (opposite angles above 180 degrees)?"""
+    F, n = mesh.F, mesh.n
+    i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
+    keys = np.minimum(i, j) * n + np.maximum(i, j)
+    _, edge, faces = np.unique(keys, return_inverse=True, return_counts=True)
+    weight = np.bincount(edge, weights=half_cotangents(mesh.V, F).ravel())
+    interior = faces == 2
+    return float((weight[interior] < -1e-12).mean()) if interior.any() else 0.0

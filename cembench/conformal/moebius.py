@@ -1,0 +1,60 @@
+"""Moebius maps z -> (a z + b) / (c z + d), the conformal maps of the sphere to itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import AlgorithmFailed
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Moebius:
+    """The map z -> (a z + b) / (c z + d); a d - b c is not zero."""
+
+    a: complex
+    b: complex
+    c: complex
+    d: complex
+
+    def __call__(self, z: Complex) -> Complex:
+        """Where do finite points z (n,) go? The one at -d / c goes to infinity."""
+        top, bottom = self.a * z + self.b, self.c * z + self.d
+        image = np.full(z.shape, complex(np.inf))
+        np.divide(top, bottom, out=image, where=bottom != 0)
+        return image
+
+    @property
+    def inverse(self) -> Moebius:
+        """The map that undoes this one."""
+        return Moebius(self.d, -self.b, -self.c, self.a)
+
+
+def three_point_map(p: Sequence[complex] | Complex, q: Sequence[complex] | Complex) -> Moebius:
+    """Which Moebius map carries the three finite points p to the three finite points q?
+
+    Raises
+    ------
+    AlgorithmFailed
+        Two of the points coincide, or are not finite.
+
+    """
+    points = np.array([p, q], dtype=np.complex128)
+    apart = np.abs(points - np.roll(points, 1, axis=1)).min()
+    if not apart > 0 or not np.isfinite(points).all():
+        raise AlgorithmFailed(
+            f"no Moebius map carries the points {points[0].tolist()} to {points[1].tolist()}: "
+            "three distinct finite points are needed on either side"
+        )
+    forth, back = (_to_zero_one_infinity(*three) for three in points)
+    a, b, c, d = np.linalg.solve(back, forth).ravel().tolist()
+    return Moebius(a, b, c, d)
+
+
+def _to_zero_one_infinity(p: complex, q: complex, r: complex) -> Complex:
+    return np.array([[q - r, -p * (q - r)], [q - p, -r * (q - p)]])

@@ -1,0 +1,110 @@
+"""What closes a hole: triangles to its centroid, or a round disk glued in along its rim.
+
+To a Dirichlet problem on the rest of the surface a patch is only the energy that its harmonic
+filling has for given values u on the rim, half of u^T P u: a dense symmetric matrix P (k, k),
+positive semi-definite with the constants as its kernel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+
+Real = NDArray[np.float64]
+Loop = NDArray[np.int64]
+
+#: How many terms of the power series below rounding errors leave, for |x| <= pi.
+_TERMS = 28
+
+
+def fan(loop: Loop, centre: int) -> NDArray[np.int64]:
+    """Which triangles fill a hole from its centre? Shape (k, 3), oriented like the surface.
+
+    `loop` has the surface on its left, as in ``mesh.loops``.
+    """
+    return np.stack([np.roll(loop, -1), loop, np.full(len(loop), centre)], axis=1)
+
+
+def filled(mesh: TriangleMesh, holes: Sequence[Loop]) -> DiskMesh:
+    """The surface with each hole filled by a fan to its centroid; those vertices come last.
+
+    Raises
+    ------
+    MeshError
+        A fan has a triangle without area: the centroid lies on the rim.
+
+    """
+    centres = np.array([mesh.V[hole].mean(axis=0) for hole in holes]).reshape(-1, 3)
+    fans = [fan(hole, mesh.n + k) for k, hole in enumerate(holes)]
+    V, F = np.concatenate([mesh.V, centres]), np.concatenate([mesh.F, *fans])
+    return DiskMesh.from_arrays(V, F, name=mesh.name)
+
+
+def fan_patch(rim: Real) -> Real:
+    """P of the fan over a rim (k, 2 or 3), its centre eliminated.
+
+    Where the centroid lies on the line of an edge, so that angles are not defined, all the fan's
+    edges count alike.
+    """
+    k = len(rim)
+    V, F = np.concatenate([rim, rim.mean(axis=0, keepdims=True)]), fan(np.arange(k), k)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        weights = half_cotangents(V, F)
+    if not np.isfinite(weights).all():
+        weights = np.ones_like(weights)
+    L = laplacian_of_weights(F, weights, k + 1).toarray()
+    spokes = L[:k, k]
+    P: Real = L[:k, :k] - np.outer(spokes, spokes) / L[k, k]
+    return P
+
+
+def disk_patch(angles: Real) -> Real:
+    """P of a round disk whose rim vertices lie at these angles (k,), increasing within one turn.
+
+    Exact for values that are linear in the angle between neighbours: with u' constant on arcs,
+    u^T P u = -(1/pi) times the double integral of u'(s) u'(t) log|2 sin((s - t)/2)|, of which a
+    second antiderivative is known (`sum_of_cosines`). Moebius maps of the disk do not change it
+    but for that interpolation.
+    """
+    ends = np.append(angles, angles[0] + 2 * np.pi)
+    table = sum_of_cosines(ends[:, None] - ends[None, :])
+    arcs = (table[1:, 1:] - table[1:, :-1] - table[:-1, 1:] + table[:-1, :-1]) / np.pi
+    lengths = np.diff(ends)
+    slopes = arcs / np.outer(lengths, lengths)
+    # u' is (u_next - u) / length on each arc: differences of rows and of columns.
+    rows = np.roll(slopes, 1, axis=0) - slopes
+    P: Real = np.roll(rows, 1, axis=1) - rows
+    return P
+
+
+def sum_of_cosines(x: Real) -> Real:
+    """The sum of (cos(k x) - 1) / k^3 over k = 1, 2, ... to rounding errors, also for small x.
+
+    Its second derivative is log|2 sin(x / 2)|: x^2 (log x / 2 - 3 / 4) less a power series in x^2
+    with coefficients |B_2k| / (2k (2k + 2)!), B the Bernoulli numbers.
+    """
+    x = np.abs(x) % (2 * np.pi)
+    x = np.minimum(x, 2 * np.pi - x)
+    squared = x * x
+    rest = np.zeros_like(x)
+    for term in _coefficients()[::-1]:
+        rest = (rest + term) * squared
+    log = np.log(np.where(x > 0, x, 1.0))
+    total: Real = squared * (log / 2 - 0.75 - rest)
+    return total
+
+
+@cache
+def _coefficients() -> Real:
+    """The numbers |B_2k| / (2k (2k + 2)!) for k = 1, 2, ..."""
+    from scipy.special import bernoulli, factorial
+
+    k = np.arange(1, _TERMS + 1)
+    numbers: Real = np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))
+    return numbers

@@ -1,0 +1,1 @@
+"""What everything else stands on: errors, the clock, whole files, what an algorithm returns."""

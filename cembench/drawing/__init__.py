@@ -1,0 +1,1 @@
+"""Pictures of a surface and of its map."""

@@ -1,0 +1,227 @@
+"""What is in a preview: everything a renderer needs, and nothing about how it draws.
+
+Window coordinates: x to the right and y upwards, both from -1 to 1 in a square panel; z towards the
+viewer. A **square** of the checkerboard has side 1 in the coordinates `board`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.planar import signed_areas
+from cembench.drawing.camera import view_rotation
+from cembench.drawing.hand_over import HandedOver
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+Real = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complex = NDArray[np.complex128]
+
+#: Squares of the coarsest checkerboard across the image.
+SQUARES = 18
+#: A finer board has squares this many times smaller; odd, so that the corners keep their colour.
+FINER = 3
+#: The board is refined where its squares would have more than this side on the drawn surface.
+LARGEST_SQUARE = 0.22
+MOST_LEVELS = 10
+#: How often the sizes of squares are averaged over neighbours, so that refinement has calm borders.
+CALMING = 3
+#: Side of the smallest thing in the image that a person does not overlook.
+LEAST_VISIBLE = 0.02
+#: Stands in for an area of zero.
+TINY = 1e-300
+#: How much of a panel's half width the drawing takes.
+FILL = 0.97
+#: Colours, each 0 to 1: the board's two, and that of a triangle that is folded over.
+LIGHT, DARK, FOLDED = (0.95, 0.935, 0.90), (0.33, 0.52, 0.72), (0.86, 0.11, 0.13)
+#: Direction to the lamp in window coordinates; how bright a face is with its back to the lamp, how
+#: much is added when it faces the lamp, how fast it falls off between; the inside of the surface.
+LAMP = np.array([-0.45, 0.55, 0.70]) / np.sqrt(0.995)
+SHADOW, LAMPLIGHT, FALL_OFF, INSIDE = 0.30, 0.78, 1.6, 0.62
+#: The image shows the same light and shade, but fainter: half of the surface is turned away there.
+FAINTER = 0.55
+
+
+@dataclass(frozen=True)
+class View:
+    """One panel, triangle by triangle: nothing is shared, so neighbours may differ.
+
+    Parameters
+    ----------
+    corners : float64 (3 m, 3)
+        The triangles' corners in turn, in window coordinates.
+    brightness : float64 (3 m,)
+        How much light each corner throws back, 0 to 1.
+
+    """
+
+    corners: Real
+    brightness: Real
+
+
+@dataclass(frozen=True)
+class Scene(HandedOver):
+    """A surface and its image, ready to be drawn side by side under one checkerboard.
+
+    All triangles stand alone, their corners in turn. They are those of the mesh, except that some
+    are cut where the board becomes finer.
+
+    Parameters
+    ----------
+    space, plane : float64 (3 m, 3)
+        Corners on the surface as the viewer sees it, and in the image; window coordinates.
+    board : float64 (3 m, 2)
+        Corners on the checkerboard that is drawn in the triangle, refined or not.
+    brightness : float64 (3 m,)
+        How much light a corner throws back to the viewer, 0 to 1.
+    folded : bool (m,)
+        Triangles whose image has no positive area.
+    refined : bool ()
+        Whether the board is finer anywhere.
+
+    """
+
+    space: Real
+    plane: Real
+    board: Real
+    brightness: Real
+    folded: NDArray[np.bool_]
+    refined: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh, uv: Complex, board_uv: Complex | None = None) -> Self:
+        """Place the surface before the viewer and the image into its frame, and light both.
+
+        The checkerboard is that of the image, or of another map `board_uv` (n,).
+        """
+        F = mesh.F
+        space = framed(mesh.V @ view_rotation(mesh).T)
+        plane = image_in_window(uv)
+        ruled = plane if board_uv is None else image_in_window(board_uv)
+        board = ruled[:, :2] * (SQUARES / 2 / FILL)
+        fineness = fineness_of(F, space, board)
+        table = np.column_stack([space, plane, board, brightness_of(F, space), fineness])[F]
+        table, origin = _cut_at_whole_numbers(table)
+        level = np.ceil(table[:, :, -1].mean(axis=1)).clip(0)
+        table[:, :, 6:8] *= FINER ** level[:, None, None]
+        corners = table.reshape(-1, table.shape[2])
+        folded = ~(signed_areas(uv, F) > 0)
+        return cls(
+            space=corners[:, 0:3],
+            plane=corners[:, 3:6],
+            board=corners[:, 6:8],
+            brightness=corners[:, 8],
+            folded=folded[origin],
+            refined=np.array(level.any()),
+        )
+
+    @property
+    def surface(self) -> View:
+        """The surface in space; its inner side, where it is turned to the viewer, is darker."""
+        inside = np.repeat(doubled_areas(self.space[:, :2]) < 0, 3)
+        return View(self.space, np.where(inside, INSIDE * self.brightness, self.brightness))
+
+    @property
+    def image(self) -> View:
+        """The image, folds on top, with the surface's light and shade so that features show."""
+        lifted = self.plane.copy()
+        lifted[np.repeat(self.folded, 3), 2] += 1.0
+        return View(lifted, 1 - FAINTER * (1 - self.brightness))
+
+    @property
+    def small_folds(self) -> Real:
+        """Middles (k, 2) of folds that are too small to be seen in the image."""
+        corners = self.plane[:, :2]
+        small = self.folded & (np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2)
+        return corners.reshape(-1, 3, 2)[small].mean(axis=1)
+
+
+def image_in_window(uv: Complex) -> Real:
+    """Where do the images of the vertices lie in the panel? Window coordinates (n, 3), z = 0."""
+    return framed(np.stack([uv.real, uv.imag, np.zeros(len(uv))], axis=1))
+
+
+def doubled_areas(corners: Real) -> Real:
+    """Twice the signed area of each triangle, its corners in turn (3 m, 2); shape (m,)."""
+    a, b, c = corners[0::3], corners[1::3], corners[2::3]
+    u, v = b - a, c - a
+    return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+
+def framed(points: Real) -> Real:
+    """Move and scale so that x and y fill the panel; depth in the same units."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    extent = float((high - low)[:2].max()) or 1.0
+    return (points - (low + high) / 2) * (2 * FILL / extent)
+
+
+def _normals(F: Ints, points: Real) -> Real:
+    """Twice the vector area of each triangle, shape (m, 3)."""
+    corner = points[F[:, 0]]
+    return np.cross(points[F[:, 1]] - corner, points[F[:, 2]] - corner)
+
+
+def _to_vertices(F: Ints, values: Real, n: int) -> Real:
+    """Sum of the values of the triangles round each vertex, shape (n,)."""
+    total = np.zeros(n)
+    for c in range(3):
+        total += np.bincount(F[:, c], weights=values, minlength=n)
+    return total
+
+
+def brightness_of(F: Ints, points: Real) -> Real:
+    """Light that wraps round the surface: no part is black, so the board stays legible."""
+    normals = _normals(F, points)
+    smooth = np.stack([_to_vertices(F, normals[:, k], len(points)) for k in range(3)], axis=1)
+    length = np.linalg.norm(smooth, axis=1)
+    facing = (smooth @ LAMP) / np.where(length > 0, length, 1.0)
+    return np.clip(SHADOW + LAMPLIGHT * ((1 + facing) / 2) ** FALL_OFF, 0.0, 1.0)
+
+
+def fineness_of(F: Ints, space: Real, board: Real) -> Real:
+    """How often must squares be divided at each vertex so that they are not too large in space?
+
+    Shape (n,); not whole numbers: the next whole number above is the answer.
+    """
+    n = len(space)
+    area = np.linalg.norm(_normals(F, space), axis=1)
+    on_board = np.abs(doubled_areas(board[F].reshape(-1, 2)))
+    weight = np.maximum(_to_vertices(F, area, n), TINY)
+    log_side = np.log(weight / np.maximum(_to_vertices(F, on_board, n), TINY)) / 2
+    for _ in range(CALMING):
+        log_side = _to_vertices(F, area * log_side[F].mean(axis=1), n) / weight
+    return np.clip((log_side - np.log(LARGEST_SQUARE)) / np.log(FINER), -1, MOST_LEVELS)
+
+
+def _cut_at_whole_numbers(table: Real) -> tuple[Real, Ints]:
+    """Cut triangles where the last of their columns passes 0, 1, 2, ...
+
+    Takes corners with all that belongs to them, (m, 3, d); returns the same for the pieces, and
+    which triangle each of them comes from.
+    """
+    steps = np.ceil(table[:, :, -1]).clip(0)
+    several = steps.min(axis=1) != steps.max(axis=1)
+    origin = np.arange(len(table))
+    pieces, of = table[several], origin[several]
+    for threshold in range(MOST_LEVELS):
+        pieces, of = _cut(pieces, of, threshold)
+    return np.concatenate([table[~several], pieces]), np.concatenate([origin[~several], of])
+
+
+def _cut(table: Real, origin: Ints, threshold: float) -> tuple[Real, Ints]:
+    """Cut the triangles that pass the threshold into a corner and two halves of the rest."""
+    above = table[:, :, -1] > threshold
+    count = above.sum(axis=1)
+    passing = (count == 1) | (count == 2)
+    alone = np.argmax(above[passing] == (count[passing] == 1)[:, None], axis=1)
+    turn = (alone[:, None] + np.arange(3)) % 3
+    p, q, r = np.take_along_axis(table[passing], turn[:, :, None], axis=1).transpose(1, 0, 2)
+    x, y = (p + ((threshold - p[:, -1]) / (s[:, -1] - p[:, -1]))[:, None] * (s - p) for s in (q, r))
+    x[:, -1] = y[:, -1] = threshold
+    new = [np.stack(corners, axis=1) for corners in ((p, x, y), (x, q, r), (x, r, y))]
+    origins = [origin[~passing], *[origin[passing]] * 3]
+    return np.concatenate([table[~passing], *new]), np.concatenate(origins)

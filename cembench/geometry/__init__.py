@@ -1,1 +1,0 @@
-"""Meshes, their files, and the linear algebra that all algorithms share."""

@@ -1,0 +1,1 @@
+"""Sparse Cholesky factorisations, their back ends, dense blocks."""

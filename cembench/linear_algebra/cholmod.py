@@ -1,0 +1,143 @@
+"""Sparse Cholesky by cvxopt's CHOLMOD: the default, the fastest that installs as a wheel.
+
+cvxopt keeps its options in one dictionary for the process, so they are set before each use:
+``supernodal = 2`` (which also makes an indefinite matrix an error), ``nmethods = 1`` (without it a
+permutation handed over may be ignored) and ``postorder``, which would mix a leading block that is
+not connected with what follows it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from cvxopt import amd, cholmod, matrix, spmatrix
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.core.clock import phase
+from cembench.core.errors import NotPositiveDefinite
+from cembench.linear_algebra.supernodes import trailing_block
+from cembench.linear_algebra.triangular import triangle_times
+
+# Codes of `cholmod.solve`: the whole system, and its four steps.
+_ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
+
+
+class CholmodFactor:
+    """A factor of the symmetric positive definite matrix A, only whose lower triangle is read.
+
+    `leading` is the order of the leading block to keep first: its own factor is then the leading
+    block of this one, which is what :meth:`solve_leading` uses.
+    """
+
+    def __init__(self, A: sparse.csc_array, leading: int | None) -> None:
+        self._leading = leading
+        with phase("ordering"):
+            self._lower, self._below = _lower_triangle(A)
+            self._permutation = _fill_reducing_order(self._lower, leading)
+        self._analyse()
+        self._factor()
+
+    def _analyse(self) -> None:
+        with phase("symbolic"):
+            _set_options()
+            cholmod.options["postorder"] = self._leading is None
+            self._symbolic = cholmod.symbolic(self._lower, self._permutation)
+
+    def _factor(self) -> None:
+        self._trailing: NDArray[np.float64] | None = None
+        with phase("factorisation"):
+            _set_options()
+            try:
+                cholmod.numeric(self._lower, self._symbolic)
+            except ArithmeticError as error:
+                raise NotPositiveDefinite(
+                    f"the matrix of order {self._lower.size[0]} is not positive definite "
+                    f"(Cholesky pivot {error})"
+                ) from None
+
+    def update(self, A: sparse.csc_array) -> None:
+        """Factor another matrix of the same pattern, keeping ordering and symbolic analysis."""
+        with phase("factorisation"):
+            self._lower.V = matrix(_in_order(A).data[self._below])
+        if self._leading is not None:
+            # Partial solves are wrong on a factor that was computed over an older one.
+            self._analyse()
+        self._factor()
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A x = B for real columns B (n, k)."""
+        x = matrix(np.asfortranarray(B))
+        cholmod.solve(self._symbolic, x, sys=_ALL)
+        return np.array(x)
+
+    def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A_ii x = B for the leading block, out of the one factor; B (leading, k)."""
+        assert self._leading is not None
+        padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
+        padded[: self._leading] = B
+        x = matrix(padded)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE)
+        cholmod.solve(self._symbolic, x, sys=_FORWARD)
+        x[self._leading :, :] = 0.0
+        cholmod.solve(self._symbolic, x, sys=_BACKWARD)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
+        return np.array(x)[: self._leading]
+
+    def schur_factor(self) -> NDArray[np.float64] | None:
+        """The factor's own trailing block, after the leading one; None where it cannot be seen."""
+        assert self._leading is not None
+        if self._trailing is None:
+            self._trailing = trailing_block(self._symbolic, self._lower.size[0], self._leading)
+        return self._trailing
+
+    def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """B_t - A_tl A_ll^-1 B_l for B (n, k): L y = B ends in y_t with C y_t the result."""
+        C = self.schur_factor()
+        if C is None:
+            return None
+        x = matrix(np.asfortranarray(B))
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE)
+        cholmod.solve(self._symbolic, x, sys=_FORWARD)
+        return triangle_times(C, np.array(x)[self._leading :])
+
+    def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """-A_ll^-1 A_lt B for B (n - leading, k): L^T x = (0, C^T B) ends in B."""
+        C = self.schur_factor()
+        if C is None:
+            return None
+        padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
+        padded[self._leading :] = triangle_times(C, B, transposed=True)
+        x = matrix(padded)
+        cholmod.solve(self._symbolic, x, sys=_BACKWARD)
+        cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
+        return np.array(x)[: self._leading]
+
+
+def _set_options() -> None:
+    cholmod.options["supernodal"] = 2
+    cholmod.options["nmethods"] = 1
+    cholmod.options["print"] = 0
+
+
+def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
+    """A's lower triangle, and which of A's entries it has."""
+    A = _in_order(A)
+    columns = np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
+    below = np.flatnonzero(A.indices >= columns)
+    rows = A.indices[below].astype(np.int64)
+    return spmatrix(A.data[below], rows, columns[below], A.shape, "d"), below
+
+
+def _in_order(A: sparse.csc_array) -> sparse.csc_array:
+    """A with every column's entries from top to bottom, as cvxopt keeps them."""
+    return A if A.has_sorted_indices else A.sorted_indices()
+
+
+def _fill_reducing_order(lower: spmatrix, leading: int | None) -> matrix:
+    """Approximate minimum degree; of the leading block alone where there is one."""
+    if leading is None:
+        return amd.order(lower)
+    n = lower.size[0]
+    first = amd.order(lower[:leading, :leading]) if leading else matrix(0, (0, 1))
+    order = np.concatenate([np.array(first).ravel(), np.arange(leading, n)])
+    return matrix(order, (n, 1), "i")

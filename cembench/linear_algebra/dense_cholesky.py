@@ -1,0 +1,44 @@
+"""Cholesky factors of the small dense matrices that are left when an interior is eliminated."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from cembench.core.clock import phase
+from cembench.core.errors import NotPositiveDefinite
+from cembench.linear_algebra.real_columns import by_real_columns
+from cembench.linear_algebra.triangular import triangle_solved
+
+Real = NDArray[np.float64]
+
+
+class DenseCholesky:
+    """Solves systems with a small dense symmetric positive definite matrix.
+
+    Raises
+    ------
+    NotPositiveDefinite
+        It is not.
+
+    """
+
+    def __init__(self, A: Real) -> None:
+        with phase("dense factorisation"):
+            try:
+                self._C, _ = linalg.cho_factor(A, lower=True, check_finite=False)
+            except linalg.LinAlgError as error:
+                raise NotPositiveDefinite(
+                    f"the dense matrix of order {len(A)} is not positive definite ({error})"
+                ) from None
+
+    def solve(self, b: NDArray[Any]) -> NDArray[Any]:
+        """A x = b, real or complex."""
+        with phase("solves"):
+            return by_real_columns(self._solve, b)
+
+    def _solve(self, B: Real) -> Real:
+        return triangle_solved(self._C, triangle_solved(self._C, B), transposed=True)

@@ -1,0 +1,1 @@
+"""Surfaces: triangle meshes, their checks, files and datasets."""

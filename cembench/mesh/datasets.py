@@ -1,0 +1,161 @@
+"""Surfaces in files that can be fetched: once, checked, and kept.
+
+`CEMBENCH_CACHE` says where they are kept. `CEMBENCH_DATA_URL` points to a mirror: a directory that
+holds the files under their own names. The libraries that download load when something is fetched:
+every process that measures reads this file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+from platformdirs import user_cache_dir
+
+from cembench.core.errors import DatasetError
+
+#: Overrides the directory of the cache.
+CACHE_VARIABLE = "CEMBENCH_CACHE"
+#: Overrides where files are fetched from.
+MIRROR_VARIABLE = "CEMBENCH_DATA_URL"
+
+
+def cache_directory() -> Path:
+    """Where are surfaces and downloads kept? `CEMBENCH_CACHE`, or the user's cache directory."""
+    return Path(os.environ.get(CACHE_VARIABLE) or user_cache_dir("cembench"))
+
+
+class Progress(Protocol):
+    """What is told how a download gets on, in bytes."""
+
+    total: int
+
+    def update(self, count: int) -> None:
+        """So many more have arrived."""
+
+    def reset(self) -> None:
+        """None have arrived."""
+
+    def close(self) -> None:
+        """It has ended."""
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """A mesh file that can be fetched: pure data, offered as an entry point.
+
+    Parameters
+    ----------
+    name, title : str
+        What the command line calls it, and what people do.
+    source_url : str
+        Where it was published, ending with the file's name.
+    sha256 : str
+        Of the file.
+    licence : str
+        SPDX identifier.
+    size : int or None
+        Bytes, if known.
+    paper_row : str
+        The model of the paper's Table 1 that it is, if any.
+    mesh_hash : str
+        Hash of the mesh in it, by which the same surface in another file is recognised; "" if not
+        known.
+
+    """
+
+    name: str
+    title: str
+    source_url: str
+    sha256: str
+    licence: str
+    size: int | None = None
+    paper_row: str = ""
+    mesh_hash: str = ""
+
+    @property
+    def file(self) -> str:
+        """The file's name."""
+        return self.source_url.rpartition("/")[2]
+
+    @property
+    def url(self) -> str:
+        """Where it is fetched from: the mirror if one is set."""
+        mirror = os.environ.get(MIRROR_VARIABLE)
+        return f"{mirror.rstrip('/')}/{self.file}" if mirror else self.source_url
+
+    @property
+    def path(self) -> Path:
+        """Where it lies once it has been fetched."""
+        return cache_directory() / "datasets" / self.file
+
+    @property
+    def origin(self) -> str:
+        """What declares it, for messages."""
+        return self.source_url
+
+
+def is_fetched(dataset: Dataset) -> bool:
+    """Does the file lie in the cache, whole? Nothing is fetched."""
+    return dataset.path.is_file() and _sha256(dataset.path) == dataset.sha256
+
+
+def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None = None) -> Path:
+    """Where is this dataset's file? Fetched if it is not in the cache, or not whole there.
+
+    `timeout` in seconds is that of the server's answer, not of the whole download.
+
+    Raises
+    ------
+    DatasetError
+        A server that does not answer, a download that breaks off, a file whose checksum is wrong;
+        the message names file and URL.
+
+    """
+    import pooch
+    import requests
+
+    d = dataset
+    pooch.get_logger().setLevel("WARNING")  # it would tell of every download
+    try:
+        found = pooch.retrieve(
+            d.url,
+            known_hash=f"sha256:{d.sha256}",
+            fname=d.path.name,
+            path=d.path.parent,
+            downloader=pooch.HTTPDownloader(timeout=timeout, progressbar=progress or False),
+        )
+    except requests.RequestException as error:
+        raise DatasetError(
+            f"cannot fetch {d.file} from {d.url}: {type(error).__name__}: {error}. Check the "
+            f"network, set {MIRROR_VARIABLE} to a mirror, or put the file at {d.path}."
+        ) from error
+    except ValueError as error:
+        raise DatasetError(
+            f"{d.file} from {d.url} is damaged or another file: its SHA-256 is not {d.sha256}. "
+            f"Try again, or set {MIRROR_VARIABLE} to another mirror."
+        ) from error
+    except OSError as error:
+        raise DatasetError(
+            f"cannot keep {d.file} from {d.url} at {d.path}: {error}. Make the directory writable "
+            f"or set {CACHE_VARIABLE} to another one."
+        ) from error
+    return Path(found)
+
+
+def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:
+    """Which dataset is it that was read from this file? Known by its bytes, or by its mesh."""
+    checksum = _sha256(path)
+    for dataset in datasets:
+        if mesh_hash == dataset.mesh_hash or checksum == dataset.sha256:
+            return dataset
+    return None
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -1,0 +1,100 @@
+"""Combinatorics of an oriented triangulation, vectorised; coordinates play no role here.
+
+F is an int64 (m, 3) array of vertex indices. Half-edge ``c`` of face ``t`` runs from ``F[t, c]`` to
+``F[t, (c + 1) % 3]`` and has its face on the left. `boundary_loops` requires what
+:class:`~cembench.mesh.triangle_mesh.TriangleMesh` guarantees: a consistently oriented 2-manifold.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+Faces = NDArray[np.int64]
+
+
+def half_edges(F: Faces) -> Faces:
+    """Which directed edges bound the faces? Shape (3m, 2); rows 3t, 3t+1, 3t+2 belong to face t."""
+    return F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+
+
+def undirected_edges(F: Faces) -> tuple[Faces, NDArray[np.int64]]:
+    """Which edges are there (e, 2), smaller index first, and how many faces has each (e,)?"""
+    ends = np.sort(half_edges(F), axis=1)
+    stride = int(F.max()) + 1
+    keys, faces = np.unique(ends[:, 0] * stride + ends[:, 1], return_counts=True)
+    return np.stack([keys // stride, keys % stride], axis=1), faces
+
+
+def repeated_half_edges(F: Faces) -> Faces:
+    """Which directed edges belong to more than one face? None do where orientation agrees."""
+    directed = half_edges(F)
+    stride = int(F.max()) + 1
+    keys, uses = np.unique(directed[:, 0] * stride + directed[:, 1], return_counts=True)
+    keys = keys[uses > 1]
+    return np.stack([keys // stride, keys % stride], axis=1)
+
+
+def vertex_graph(F: Faces, n: int) -> sparse.csr_array:
+    """Which vertices share an edge? A symmetric pattern (n, n) whose values mean nothing."""
+    i, j = half_edges(F).T
+    ones = np.ones(len(i))
+    return sparse.coo_array((np.r_[ones, ones], (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsr()
+
+
+def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
+    """How many connected pieces has the graph of the mesh, and in which lies each vertex?"""
+    i, j = half_edges(F).T
+    graph = sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
+    count, labels = csgraph.connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int64)
+
+
+def euler_characteristic(F: Faces, n: int) -> int:
+    """V - E + F: 1 for a disk, 2 for a sphere, 2 - 2 g - b for genus g with b boundary loops."""
+    return n - len(undirected_edges(F)[0]) + len(F)
+
+
+def boundary_half_edges(F: Faces, n: int) -> Faces:
+    """Which half-edges have no twin? Shape (k, 2).
+
+    Around an interior vertex every neighbour is once the next corner of a face and once the
+    previous one, so the sum of (next - previous) vanishes; on the boundary it is the difference of
+    two distinct vertices. This finds the boundary without sorting any edges.
+    """
+    imbalance = np.zeros(n)
+    for c in range(3):
+        step = F[:, (c + 1) % 3] - F[:, (c + 2) % 3]
+        imbalance += np.bincount(F[:, c], weights=step, minlength=n)
+    on_boundary = imbalance != 0
+    chosen = [
+        F[on_boundary[F[:, c]] & on_boundary[F[:, (c + 1) % 3]]][:, [c, (c + 1) % 3]]
+        for c in range(3)
+    ]
+    near = np.concatenate(chosen)
+    twinned = np.isin(near[:, 0] * n + near[:, 1], near[:, 1] * n + near[:, 0])
+    return near[~twinned]
+
+
+def boundary_loops(F: Faces, n: int) -> list[NDArray[np.int64]]:
+    """What closed curves bound the surface?
+
+    Each is an array of vertices in order, the surface on its left, starting at its smallest
+    vertex; the loops are sorted by that vertex. An empty list means a closed surface.
+    """
+    directed = boundary_half_edges(F, n)
+    if not len(directed):
+        return []
+    vertices, local = np.unique(directed, return_inverse=True)
+    tail, head = local.reshape(-1, 2).T
+    successor = sparse.csr_array(
+        (np.ones(len(tail)), (tail, head)), shape=(len(vertices), len(vertices))
+    )
+    _, labels = csgraph.connected_components(successor, directed=False)
+    starts = np.unique(labels, return_index=True)[1]
+    return [
+        vertices[csgraph.breadth_first_order(successor, start, return_predecessors=False)]
+        for start in np.sort(starts)
+    ]

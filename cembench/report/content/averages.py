@@ -1,0 +1,78 @@
+"""How do rates of speedup average? The two readings of the paper's means.
+
+A rate is Eq. 33, t / t_CEM - 1. The paper averages rates arithmetically (8.5, 17.2, 4.1), where one
+large ratio counts as much as many small ones, and turns that mean into a saving. The geometric
+mean of the ratios and the mean of the savings treat every model alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cembench.report.content.evidence import REFERENCE
+from cembench.report.content.printed_beside_measured import Footer
+from cembench.results import paper
+
+#: What the paper states in words under Table 2.
+STATED_RATE = {"qiem": 8.5, "fdm": 17.2, "ldm": 4.1}
+STATED_SAVING = {"qiem": 0.89, "fdm": 0.94, "ldm": 0.80}
+COMPARED = tuple(a for a in paper.ALGORITHMS if a != REFERENCE)
+
+
+def mean_rate(rates: Sequence[float]) -> float:
+    """The arithmetic mean of the rates, as the paper takes it."""
+    return float(np.mean(rates))
+
+
+def geometric_rate(rates: Sequence[float]) -> float:
+    """The geometric mean of the ratios 1 + rate, minus one."""
+    return float(np.exp(np.mean(np.log1p(rates))) - 1)
+
+
+def saving_of_mean(rates: Sequence[float]) -> float:
+    """The share of time that the mean rate saves, 1 - 1/(1 + mean), as the paper takes it."""
+    return 1 - 1 / (1 + mean_rate(rates))
+
+
+def mean_saving(rates: Sequence[float]) -> float:
+    """The mean over the models of the share of time saved on each, 1 - 1/(1 + rate)."""
+    return float(np.mean([1 - 1 / (1 + rate) for rate in rates]))
+
+
+def _rate(number: float) -> str:
+    return f"{number:.1f}"
+
+
+def percent(number: float) -> str:
+    """A share in whole percent."""
+    return f"{100 * number:.0f} %"
+
+
+#: Label, function and form of each reading, the paper's own first.
+READINGS = (
+    Footer("mean rate (as the paper)", mean_rate, _rate),
+    Footer("geometric mean of ratios - 1", geometric_rate, _rate),
+    Footer("saving, 1 - 1/(1 + mean)", saving_of_mean, percent),
+    Footer("mean of the savings", mean_saving, percent),
+)
+
+
+def printed_rates(algorithm: str, models: Sequence[str] | None = None) -> list[float]:
+    """The paper's Table 2 for these models, default all, misprints replaced by Table 1's ratio."""
+    rates = []
+    for model in paper.table(2) if models is None else models:
+        rate = corrected_rate(model, algorithm)
+        if rate is not None:
+            rates.append(rate)
+    return rates
+
+
+def corrected_rate(model: str, algorithm: str) -> float | None:
+    """A rate of Table 2; where it is a misprint, the one that follows from Table 1."""
+    if (2, model, algorithm) not in paper.ERRATA:
+        return paper.table(2)[model][algorithm]
+    times = paper.table(1)[model]
+    ours, theirs = times[REFERENCE], times[algorithm]
+    return None if ours is None or theirs is None else theirs / ours - 1

@@ -1,0 +1,39 @@
+"""What the paper's text claims, put to the test on a run: one function a claim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from cembench.report.content.claims import accuracy, efficiency, iteration, premises
+from cembench.report.content.evidence import Evidence
+from cembench.report.content.inspection import Inspection
+from cembench.report.document import Claim
+
+#: Every claim in the order of the paper's text.
+CLAIMS: tuple[Callable[[Evidence, Mapping[str, Inspection]], Claim], ...] = (
+    premises.delaunay,
+    premises.well_conditioned,
+    iteration.inversion_converges_better,
+    iteration.energy_decreases_monotonically,
+    premises.iteration_matrix,
+    premises.circular_holes,
+    accuracy.no_folding,
+    accuracy.angles_preserved,
+    iteration.iteration_lowers_energy,
+    accuracy.below_one_degree,
+    efficiency.always_faster,
+    efficiency.average_rates,
+    efficiency.average_savings,
+    efficiency.table_2_follows,
+    accuracy.energy_similar,
+    accuracy.deviation_similar,
+    accuracy.means_slightly_better,
+    efficiency.more_than_80_percent,
+    efficiency.less_than_one_second,
+    iteration.at_most_20_iterations,
+)
+
+
+def claims(evidence: Evidence, inspections: Mapping[str, Inspection]) -> list[Claim]:
+    """All claims with their verdicts on this run."""
+    return [claim(evidence, inspections) for claim in CLAIMS]

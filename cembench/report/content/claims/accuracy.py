@@ -1,0 +1,172 @@
+"""Claims about how good the maps are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from cembench.report.content.claims.verdicts import tested_on, verdict_of
+from cembench.report.content.evidence import REFERENCE, Evidence, SurfaceFacts
+from cembench.report.content.figures.angle_histograms import MODELS
+from cembench.report.content.inspection import Inspection
+from cembench.report.document import Claim
+from cembench.results.records import Record
+
+Inspections = Mapping[str, Inspection]
+#: "Similar": within this share of the smallest of the three; "slightly": by at most that.
+SIMILAR = 0.25
+
+
+def cem_records(evidence: Evidence) -> list[tuple[SurfaceFacts, Record]]:
+    """CEM's records that ended ok or invalid: those with a map that can be judged."""
+    series = evidence.series_of(REFERENCE)
+    found = [(s, evidence.find(s, series)) for s in evidence.surfaces] if series else []
+    return [(s, r) for s, r in found if r is not None and r.outcome.metrics]
+
+
+def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Are CEM's maps free of folds?"""
+    found = cem_records(evidence)
+    clean = [s for s, r in found if r.outcome.metrics.get("flipped_triangles") == 0]
+    folded = [
+        f"{s.title}: {r.outcome.metrics['flipped_triangles']} triangles"
+        for s, r in found
+        if s not in clean
+    ]
+    repaired = sum(bool(r.outcome.extras.get("fold_repairs")) for _, r in found)
+    return Claim(
+        "no-folding",
+        "no folding would occur even when the geometry of the surface is a bit complicated",
+        "Section 5, on Fig. 2",
+        "Every triangle's image by CEM has positive area, on every surface of the run.",
+        f"{len(clean)} of {len(found)} maps without a fold"
+        + (f"; folded: {'; '.join(folded)}" if folded else "")
+        + f". The repair of folds was needed in {repaired}.",
+        verdict_of(len(clean), len(found)),
+        f"{tested_on([s for s, _ in found])} The paper shows it on Left Hand; weights that are "
+        "negative can fold a triangle, and are raised here until none is.",
+    )
+
+
+def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Do CEM's maps keep angles?"""
+    found = cem_records(evidence)
+    errors = [r.outcome.metrics.get("angle_error_mean_deg") for _, r in found]
+    known = [float(e) for e in errors if e is not None]
+    small = sum(e < 5 for e in known)
+    words = (
+        f"mean distortion below 5 degrees on {small} of {len(known)}; from {min(known):.2f} to "
+        f"{max(known):.2f}, median {float(np.median(known)):.2f} degrees"
+        if known
+        else "No map by CEM in this run."
+    )
+    return Claim(
+        "angles-preserved",
+        "The checkerboard patterns in figures 3-7 indicate that the conformal parameterizations "
+        "computed by CEM algorithm preserve angles",
+        "Section 5",
+        "The mean angular distortion is below 5 degrees, which the paper's worst model (Chinese "
+        "Vase, 4.50) keeps.",
+        words,
+        verdict_of(small, len(known)),
+        f"{tested_on([s for s, _ in found])} The pictures are in this report; the bound is ours.",
+    )
+
+
+def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Are most angular distortions of the paper's faces below one degree?"""
+    series = evidence.series_of(REFERENCE)
+    label = series.label if series else ""
+    shares = {
+        surface: inspections[surface.mesh_hash].angles[label].below_one
+        for surface in evidence.surfaces
+        if label in inspections[surface.mesh_hash].angles
+    }
+    named = {s: share for s, share in shares.items() if s.paper_row in MODELS}
+    held = sum(share > 0.5 for share in named.values())
+    every = sum(share > 0.5 for share in shares.values())
+    listed = "; ".join(f"{s.title}: {share:.1%}" for s, share in named.items())
+    return Claim(
+        "below-one-degree",
+        "As shown in Fig. 9, most of the angular distortions are less than one degree",
+        "Section 5, on Fig. 9",
+        "On each of the four faces of Fig. 9 more than half of the corners change by less than one "
+        "degree; recomputed from the stored maps.",
+        (listed or "None of the four faces is in this run")
+        + f". Of all surfaces of the run it is so on {every} of {len(shares)}.",
+        verdict_of(held, len(named)),
+        tested_on(list(named)),
+    )
+
+
+def energy_similar(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Are the energies of FDM, LDM and CEM similar?"""
+    return _similar(
+        evidence, "energy-similar", "conformal_energy", "the conformal energy", "figures 11 and 12"
+    )
+
+
+def deviation_similar(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Are the standard deviations of the distortions by FDM, LDM and CEM similar?"""
+    what = "the standard deviation of the angular distortions"
+    return _similar(evidence, "deviation-similar", "angle_error_sd_deg", what, "Fig. 12")
+
+
+def _similar(evidence: Evidence, name: str, metric: str, what: str, figure: str) -> Claim:
+    found = _triples(evidence, metric)
+    spreads = {s: max(values) / min(values) - 1 for s, values in found.items() if min(values) > 0}
+    held = sum(spread <= SIMILAR for spread in spreads.values())
+    worst = max(spreads, key=lambda s: spreads[s], default=None)
+    return Claim(
+        name,
+        "both the conformal energy and the standard deviation of angular distortions produced by "
+        f"FDM, LDM and CEM are similar [here: {what}]",
+        f"Section 5, on {figure}",
+        f"On each model the largest of the three is within {SIMILAR:.0%} of the smallest.",
+        f"{held} of {len(spreads)} models; the widest apart is {worst.title}: "
+        f"{spreads[worst]:.0%}, the median {float(np.median(list(spreads.values()))):.1%}"
+        if worst
+        else "No model with all three in this run.",
+        verdict_of(held, len(spreads)),
+        f"{tested_on(list(spreads))} What counts as similar is our reading.",
+    )
+
+
+def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Are the mean distortions of FDM and LDM slightly better than CEM's?"""
+    found = _triples(evidence, "angle_error_mean_deg")
+    better, held = 0, 0
+    gaps = []
+    for fdm, ldm, cem in found.values():
+        gap = cem / min(fdm, ldm) - 1
+        gaps.append(gap)
+        better += fdm <= cem and ldm <= cem
+        held += fdm <= cem and ldm <= cem and gap <= SIMILAR
+    return Claim(
+        "means-slightly-better",
+        "the mean of angular distortions by FDM and LDM are slightly better than that of CEM",
+        "Section 5, on Fig. 12",
+        "On each model both means are not above CEM's, and CEM's is within "
+        f"{SIMILAR:.0%} of the smaller.",
+        f"both not above CEM's on {better} of {len(found)} models, and close on {held}; CEM's is "
+        f"{float(np.median(gaps)):+.1%} from the better one in the median"
+        if gaps
+        else "No model with all three in this run.",
+        verdict_of(held, len(found)),
+        tested_on(list(found)),
+    )
+
+
+def _triples(evidence: Evidence, metric: str) -> dict[SurfaceFacts, tuple[float, ...]]:
+    """The figures of FDM, LDM and CEM on the models where all three ended ok."""
+    value: Callable[[Record | None], float | None] = lambda r: (  # noqa: E731
+        r.outcome.metrics.get(metric) if r is not None and r.outcome.status == "ok" else None
+    )
+    found = {}
+    chosen = [evidence.series_of(a) for a in ("fdm", "ldm", REFERENCE)]
+    for surface in evidence.models:
+        values = [value(evidence.find(surface, s)) for s in chosen if s]
+        if len(values) == 3 and all(values):
+            found[surface] = tuple(float(v) for v in values if v is not None)
+    return found

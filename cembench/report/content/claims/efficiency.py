@@ -1,0 +1,200 @@
+"""Claims about time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+import numpy as np
+
+from cembench.report.content.averages import (
+    COMPARED,
+    STATED_RATE,
+    STATED_SAVING,
+    geometric_rate,
+    mean_rate,
+    mean_saving,
+    percent,
+    saving_of_mean,
+)
+from cembench.report.content.claims.verdicts import OURS, tested_on, under, verdict_of
+from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.printed_beside_measured import significant
+from cembench.report.content.table_2 import measured_rates
+from cembench.report.document import Claim, Verdict
+from cembench.results import paper
+from cembench.results.records import DEFAULT_ROUNDS
+
+Inspections = Mapping[str, Inspection]
+#: A figure agrees with a stated one where it reaches this share of it.
+ABOUT = 0.9
+
+
+def _compared(evidence: Evidence) -> Iterator[tuple[str, str, list[float]]]:
+    """Name, words for a list, and rates of each algorithm under each policy that has any."""
+    for policy in evidence.policies:
+        for algorithm in COMPARED:
+            rates, _ = measured_rates(evidence, algorithm, policy)
+            if rates:
+                yield algorithm, f"{algorithm.upper()}{under(policy, evidence)}", rates
+
+
+def _tally(
+    evidence: Evidence,
+    holds: Callable[[str, list[float]], bool],
+    told: Callable[[list[float]], str],
+) -> tuple[str, Verdict]:
+    """What is found of the average rates, and for how many of them does it hold?"""
+    found = list(_compared(evidence))
+    words = [f"{label}: {told(rates)} (n = {len(rates)})" for _, label, rates in found]
+    held = sum(holds(algorithm, rates) for algorithm, _, rates in found)
+    return "; ".join(words) or "No pair of times in this run.", verdict_of(held, len(found))
+
+
+def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Is CEM faster than QIEM, FDM and LDM on every model?"""
+    held = tested = sure = 0
+    parts = []
+    for _, label, rates in _compared(evidence):
+        faster = sum(rate > 0 for rate in rates)
+        held, tested = held + faster, tested + len(rates)
+        parts.append(f"{label}: {faster} of {len(rates)}, lowest rate {min(rates):.2f}")
+    for record in evidence.records:
+        compared = record.cell.algorithm in COMPARED and record.mesh.paper_row
+        sure += bool(compared) and evidence.row(record)["verdict"] == "slower"
+    return Claim(
+        "always-faster",
+        "According to Table 2, CEM algorithm always has a better efficiency than QIEM/FDM/LDM",
+        "Section 5, below Eq. (33)",
+        "The rate of speedup (Eq. 33) is above 0 for every model and each of the three algorithms.",
+        (f"rates above 0: {'; '.join(parts)}. The 95 % interval excludes equality in {sure}.")
+        if parts
+        else "No pair of times in this run.",
+        verdict_of(held, tested),
+        f"{tested_on(evidence.one_each)} {OURS} An interval needs {DEFAULT_ROUNDS} rounds.",
+    )
+
+
+def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Is the average rate of speedup 8.5 / 17.2 / 4.1?"""
+    found, verdict = _tally(
+        evidence,
+        lambda algorithm, rates: mean_rate(rates) >= ABOUT * STATED_RATE[algorithm],
+        lambda rates: f"mean {mean_rate(rates):.1f}, geometric {geometric_rate(rates):.1f}",
+    )
+    return Claim(
+        "average-rates",
+        "with the average rate of the speedup 8.5/17.2/4.1",
+        "Section 5, below Eq. (33)",
+        f"The arithmetic mean of the rates, as the paper takes it, reaches {ABOUT:.0%} of the "
+        "stated value for each algorithm; the geometric mean is given beside it.",
+        found,
+        verdict,
+        f"{tested_on(evidence.one_each)} {OURS} In print the geometric means are 6.8 / 12.4 / 3.5, "
+        "and n is 20 / 18 / 20.",
+    )
+
+
+def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does CEM save 89 / 94 / 80 % of the time?"""
+    found, verdict = _tally(
+        evidence,
+        lambda algorithm, rates: saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm],
+        lambda rates: (
+            f"{percent(saving_of_mean(rates))} of the mean rate, "
+            f"{percent(mean_saving(rates))} in the mean"
+        ),
+    )
+    return Claim(
+        "average-savings",
+        "CEM algorithm saves about 89%/94%/80% of the computational time of QIEM/FDM/LDM in "
+        "average",
+        "Section 5, below Eq. (33)",
+        f"1 - 1/(1 + mean rate), as the paper takes it, reaches {ABOUT:.0%} of the stated value.",
+        found,
+        verdict,
+        f"{tested_on(evidence.one_each)} {OURS} The mean of the savings on each model, which the "
+        "words suggest, is 83 / 89 / 73 % in print.",
+    )
+
+
+def more_than_80_percent(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does CEM save more than 80 % of the cost on average?"""
+    found, verdict = _tally(
+        evidence,
+        lambda _, rates: mean_saving(rates) > 0.8,
+        lambda rates: percent(mean_saving(rates)),
+    )
+    return Claim(
+        "more-than-80-percent",
+        "saves more than 80% of computational cost on average",
+        "Section 5, summary",
+        "The mean over the models of 1 - t_CEM / t is above 80 % for each of the three algorithms.",
+        found,
+        verdict,
+        f"{tested_on(evidence.one_each)} {OURS} By the printed times themselves this mean is 83 / "
+        "89 / 73 %: for LDM it does not reach 80 %.",
+    )
+
+
+def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does CEM map more than 100,000 triangles in less than a second?"""
+    series = evidence.series_of(REFERENCE)
+    times: list[tuple[float, str, int, str]] = []
+    for surface in evidence.surfaces if series else ():
+        for policy in evidence.policies:
+            record = evidence.find(surface, series, policy) if series else None
+            seconds = record.outcome.median_seconds if record else None
+            if surface.faces > 100_000 and seconds is not None:
+                times.append((seconds, surface.title, surface.faces, policy))
+    largest = max((t for t in times if t[0] < 1), key=lambda t: t[2], default=None)
+    fits = f", the largest {largest[2]:,} triangles ({largest[1]})" if largest else ""
+    smallest = min(times, key=lambda t: (t[2], t[0]), default=None)
+    words = (
+        f"{sum(t[0] < 1 for t in times)} of {len(times)} times below a second{fits}; the smallest "
+        f"above 100,000 is {smallest[1]} with {smallest[2]:,}: {significant(smallest[0])} s"
+        if smallest
+        else "No surface of more than 100,000 triangles in this run."
+    )
+    return Claim(
+        "less-than-one-second",
+        "a conformal parameterization can be computed in less than one second for a mesh model of "
+        "more than 100,000 triangular elements by CEM algorithm",
+        "Section 7",
+        "CEM takes less than a second on the smallest surface above 100,000 triangles ('can be'); "
+        "it need not on all larger ones.",
+        words,
+        verdict_of(int(bool(smallest and smallest[0] < 1)), int(bool(times))),
+        f"{OURS} The machine is in the report's head.",
+    )
+
+
+def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does the printed Table 2 follow from the printed Table 1?"""
+    agree, tested, odd = 0, 0, []
+    for model, times in paper.table(1).items():
+        for algorithm in COMPARED:
+            other, ours = times[algorithm], times[REFERENCE]
+            printed = paper.table(2)[model][algorithm]
+            if other is None or ours is None or printed is None:
+                continue
+            tested += 1
+            low, high = (other - 0.005) / (ours + 0.005), (other + 0.005) / (ours - 0.005)
+            if low - 1.005 <= printed <= high - 0.995:
+                agree += 1
+            else:
+                odd.append(
+                    f"{model} / {algorithm.upper()}: {printed}, by Table 1 {other / ours - 1:.2f}"
+                )
+    spread = float(np.mean([r["fdm"] or 0 for r in paper.table(2).values() if r["fdm"]]))
+    return Claim(
+        "table-2-follows",
+        "The rate of speedup of CEM algorithm with respect to QIEM, FDM, and LDM, defined by "
+        "Eq. (33)",
+        "Table 2",
+        "Each printed rate lies within what the rounding of the printed seconds allows.",
+        f"{agree} of {tested} cells agree; not: {'; '.join(odd) or 'none'}. With the misprint the "
+        f"mean over FDM would be {spread:.2f}.",
+        verdict_of(agree, tested),
+        "Of the printed tables alone; nothing measured takes part.",
+    )

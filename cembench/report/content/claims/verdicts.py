@@ -1,0 +1,44 @@
+"""What verdicts have in common: when one is given, and on what it rests."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cembench.report.content.evidence import Evidence, SurfaceFacts
+from cembench.report.document import Verdict
+
+OURS = (
+    "All algorithms are this project's implementations on one linear algebra; the paper timed the "
+    "MATLAB programs of their authors on a laptop."
+)
+
+
+def verdict_of(held: int, tested: int) -> Verdict:
+    """Holds everywhere, somewhere, nowhere, or was not tested?"""
+    if tested == 0:
+        return "not tested here"
+    if held == tested:
+        return "holds"
+    return "holds in part" if held else "does not hold here"
+
+
+def tested_on(surfaces: Sequence[SurfaceFacts]) -> str:
+    """On what kind of surfaces a verdict rests."""
+    kinds = {
+        "model": "the paper's own models",
+        "stand-in": "stand-ins for the paper's models",
+        "surface": "surfaces that are not in the paper",
+    }
+    counts = {kind: sum(s.origin == kind for s in surfaces) for kind in kinds}
+    said = [f"{count} on {kinds[kind]}" for kind, count in counts.items() if count]
+    if not said:
+        return "Nothing in this run to test it on."
+    words = f"Surfaces tested: {', '.join(said)}."
+    if not counts["model"]:
+        words += " None is a model of the paper itself: the verdict is about the algorithms here."
+    return words
+
+
+def under(policy: str, evidence: Evidence) -> str:
+    """Which policy a figure is of, where the run has several."""
+    return f" ({policy})" if len(evidence.policies) > 1 else ""

@@ -1,0 +1,299 @@
+"""What a run knows, arranged as a report asks for it."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import RecordError
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.report.palette import Look, looks
+from cembench.results import paper
+from cembench.results import record_rows as frame
+from cembench.results.comparison import compare
+from cembench.results.exhibits import Exhibit, read_exhibits
+from cembench.results.records import Cell, MeshOrigin, Record
+from cembench.results.store import Store
+
+REFERENCE = frame.REFERENCE
+DISK = "disk"
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Series:
+    """An algorithm with one choice of parameters: a column of the tables, a colour of the plots.
+
+    `label` tells it apart from the same algorithm with other parameters in the same run.
+    """
+
+    algorithm: str
+    title: str
+    target: str
+    parameters: str
+    label: str
+    #: Is it the choice of parameters that most cells of the run have? Tables show that one.
+    main: bool = True
+
+    @property
+    def name(self) -> str:
+        """The algorithm's name for the first choice of parameters, which the tables show."""
+        return self.algorithm if self.main else self.label
+
+
+@dataclass(frozen=True)
+class SurfaceFacts:
+    """A surface of the run."""
+
+    name: str
+    mesh_hash: str
+    vertices: int
+    faces: int
+    boundary_vertices: int
+    non_delaunay_share: float
+    paper_row: str
+    origin: MeshOrigin
+
+    @property
+    def title(self) -> str:
+        """The paper's name of the model, or its own."""
+        return self.paper_row or self.name
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A run, read once; every table, figure and claim is computed from it.
+
+    Raises
+    ------
+    RecordError
+        From :meth:`of`: the folder holds no run, or one without a single record.
+
+    """
+
+    store: Store
+    records: tuple[Record, ...]
+    exhibits: tuple[Exhibit, ...]
+    #: Records left out because the same cell was measured again later.
+    superseded: int = 0
+
+    @classmethod
+    def of(cls, run: Path) -> Evidence:
+        """Read a run."""
+        store = Store(run)
+        if not run.is_dir():
+            raise RecordError(
+                f"{run} holds no run: there is no such folder. Make one with `cembench run`, or "
+                "`cembench reproduce`."
+            )
+        records = store.records()
+        if not records:
+            raise RecordError(
+                f"{run} holds no record: no cell of it is finished. `cembench status {run}` says "
+                "what was asked for; the same `cembench run` again goes on with it."
+            )
+        kept = _latest(records)
+        return cls(store, tuple(kept), tuple(read_exhibits(run)), len(records) - len(kept))
+
+    @cached_property
+    def rows(self) -> dict[str, dict[str, Any]]:
+        """The records as flat rows, by key."""
+        return {row["key"]: row for row in frame.rows(self.records)}
+
+    @cached_property
+    def policies(self) -> tuple[str, ...]:
+        """How systems were solved in this run, "reuse" first."""
+        return tuple(sorted({r.cell.solves for r in self.records}, key=lambda p: p != "reuse"))
+
+    @cached_property
+    def surfaces(self) -> tuple[SurfaceFacts, ...]:
+        """The paper's models in its order, then other surfaces from small to large."""
+        order = list(paper.table(1))
+        found: dict[str, SurfaceFacts] = {}
+        for record in self.records:
+            facts = record.mesh
+            found[record.cell.mesh_hash] = SurfaceFacts(
+                name=record.cell.mesh,
+                mesh_hash=record.cell.mesh_hash,
+                vertices=facts.vertices,
+                faces=facts.faces,
+                boundary_vertices=facts.boundary_vertices,
+                non_delaunay_share=facts.non_delaunay_share,
+                paper_row=facts.paper_row if facts.paper_row in order else "",
+                origin=facts.origin if facts.paper_row in order else "surface",
+            )
+
+        def place(s: SurfaceFacts) -> tuple[int, int, str]:
+            return (order.index(s.paper_row) if s.paper_row else len(order), s.faces, s.name)
+
+        return tuple(sorted(found.values(), key=place))
+
+    @property
+    def models(self) -> tuple[SurfaceFacts, ...]:
+        """The surfaces that are, or stand for, models of the paper."""
+        return tuple(s for s in self.surfaces if s.paper_row)
+
+    @cached_property
+    def one_each(self) -> tuple[SurfaceFacts, ...]:
+        """One surface for each model of the paper: the model itself before what stands for it."""
+        real_first = sorted(self.models, key=lambda s: s.origin != "model")
+        chosen = {s.paper_row: s for s in reversed(real_first)}
+        return tuple(s for s in self.models if chosen[s.paper_row] is s)
+
+    @cached_property
+    def set_aside(self) -> tuple[SurfaceFacts, ...]:
+        """The stand-ins that averages leave out, since the run has the model or another one."""
+        return tuple(s for s in self.models if s not in self.one_each)
+
+    def standing_for(self, model: str) -> SurfaceFacts | None:
+        """The surface that is, or stands for, this model of the paper; None if none does."""
+        return next((s for s in self.one_each if s.paper_row == model), None)
+
+    @property
+    def others(self) -> tuple[SurfaceFacts, ...]:
+        """The surfaces that are not in the paper."""
+        return tuple(s for s in self.surfaces if not s.paper_row)
+
+    @cached_property
+    def series(self) -> tuple[Series, ...]:
+        """Every algorithm of the run: the paper's in its order, then others by name."""
+        variants: dict[str, Counter[str]] = {}
+        about: dict[str, Record] = {}
+        for record in self.records:
+            name = record.cell.algorithm
+            variants.setdefault(name, Counter())[_variant(record.cell)] += 1
+            about[name] = record
+        found = []
+        for name in sorted(variants, key=lambda n: (n not in paper.ALGORITHMS, _place(n), n)):
+            choices = [choice for choice, _ in variants[name].most_common()]
+            for k, choice in enumerate(choices):
+                title, target = about[name].title, about[name].target
+                label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
+                found.append(Series(name, title, target, choice, label, main=k == 0))
+        return tuple(found)
+
+    @property
+    def disk_series(self) -> tuple[Series, ...]:
+        """Those that map to the unit disk: only they are compared with one another."""
+        return tuple(s for s in self.series if s.target == DISK)
+
+    @cached_property
+    def _index(self) -> dict[tuple[str, str, str, str], Record]:
+        return {
+            (r.cell.mesh_hash, r.cell.algorithm, _variant(r.cell), r.cell.solves): r
+            for r in self.records
+        }
+
+    @cached_property
+    def looks(self) -> dict[str, Look]:
+        """Colour, marker and dash of each series, by its label: the same in every plot."""
+        found = looks([s.name for s in self.series])
+        return {s.label: found[s.name] for s in self.series}
+
+    def find(
+        self, surface: SurfaceFacts, series: Series, policy: str | None = None
+    ) -> Record | None:
+        """The record of an algorithm on a surface; without a policy, the first that ended ok."""
+        held = [
+            self._index.get((surface.mesh_hash, series.algorithm, series.parameters, p))
+            for p in ([policy] if policy else self.policies)
+        ]
+        there = [record for record in held if record is not None]
+        return next((r for r in there if r.outcome.status == "ok"), there[0] if there else None)
+
+    def series_of(self, algorithm: str) -> Series | None:
+        """The main series of an algorithm; None where the run has none."""
+        return next((s for s in self.series if s.algorithm == algorithm and s.main), None)
+
+    def row(self, record: Record) -> dict[str, Any]:
+        """A record as a flat row, compared with the reference."""
+        return self.rows[record.cell.key]
+
+    def rate(self, record: Record) -> float | None:
+        """The rate of speedup of CEM over a record's algorithm (Eq. 33); None without both times.
+
+        It is the median ratio within rounds; CEM with its main parameters, the same surface and
+        way of solving.
+        """
+        reference = self.series_of(REFERENCE)
+        base = reference and self._index.get(
+            (record.cell.mesh_hash, REFERENCE, reference.parameters, record.cell.solves)
+        )
+        if not base or base.cell.key == record.cell.key:
+            return None
+        found = compare(record, base)
+        return None if found is None else found.speedup
+
+    def name_of(self, surface: SurfaceFacts) -> str:
+        """A file name and anchor for a surface, unlike that of any other of the run."""
+        plain = slug(surface.name)
+        alike = [s for s in self.surfaces if slug(s.name) == plain]
+        return plain if len(alike) == 1 else f"{plain}-{surface.mesh_hash[:8]}"
+
+    def why_not(self, record: Record | None) -> str:
+        """Why is there no figure of this cell?"""
+        if record is None:
+            return "not in this run"
+        cause = record.outcome.cause
+        return record.outcome.status + (f": {cause}" if cause else "")
+
+    def mesh(self, surface: SurfaceFacts) -> TriangleMesh | None:
+        """The surface itself, or None where the run did not keep it."""
+        record = next(r for r in self.records if r.cell.mesh_hash == surface.mesh_hash)
+        return self.store.mesh(record.cell)
+
+    def uv(self, record: Record | None) -> NDArray[np.complex128] | None:
+        """The map of a record that ended ok, or None."""
+        if record is None or record.outcome.status != "ok":
+            return None
+        return self.store.uv(record.cell)
+
+
+def slug(name: str) -> str:
+    """A name of letters, digits and hyphens alone, which every file system and form can take."""
+    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"
+
+
+def model_surface(model: str) -> str:
+    """What is the registered surface called that stands for a model? The model's name if none."""
+    from cembench.registry import load_registry
+
+    surfaces = load_registry().surfaces.values()
+    return next((s.name for s in surfaces if s.paper_row == model), model)
+
+
+def _place(algorithm: str) -> int:
+    known = algorithm in paper.ALGORITHMS
+    return paper.ALGORITHMS.index(algorithm) if known else len(paper.ALGORITHMS)
+
+
+def _variant(cell: Cell) -> str:
+    """What else than surface and policy tells two cells of an algorithm apart, in words."""
+    chosen = [f"{name}={value}" for name, value in sorted(cell.parameters.items())]
+    return ", ".join([*chosen, f"backend={cell.backend}", f"threads={cell.threads}"])
+
+
+def _difference(choice: str, main: str) -> str:
+    usual = set(main.split(", "))
+    return ", ".join(part for part in choice.split(", ") if part not in usual) or choice
+
+
+def _latest(records: Sequence[Record]) -> list[Record]:
+    """Of records that differ in code or rounds alone: one that ended ok first, then the later."""
+    best: dict[tuple[str, str, str, str], Record] = {}
+    for record in records:
+        cell = record.cell
+        key = (cell.mesh_hash, cell.algorithm, _variant(cell), cell.solves)
+        rank = (record.outcome.status == "ok", record.started_at)
+        if key not in best or (best[key].outcome.status == "ok", best[key].started_at) < rank:
+            best[key] = record
+    kept = {record.cell.key for record in best.values()}
+    return [record for record in records if record.cell.key in kept]

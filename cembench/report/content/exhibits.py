@@ -1,0 +1,111 @@
+"""What verbs have laid into the run beside its cells, as sections of the report."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path, PurePosixPath
+
+from cembench.report.content.evidence import Evidence, slug
+from cembench.report.document import (
+    ORIGINS,
+    Column,
+    Figure,
+    Gallery,
+    Gap,
+    Item,
+    Section,
+    Table,
+    Text,
+    Value,
+    missing,
+)
+from cembench.results.exhibits import FOLDER, Exhibit
+from cembench.results.exhibits import Table as ExhibitTable
+from cembench.results.records import MeshOrigin
+
+#: The paper's figures that are exhibits, what they show, and the verb that makes them.
+EXPECTED = (
+    ("Figure 1", "the steps of Koebe's method", "holes"),
+    ("Figure 7", "a surface with holes and its map to a disk with circular holes", "holes"),
+    ("Figure 13", "a morph between three faces", "morph"),
+    ("Figure 14", "how the registration maps are made", "morph"),
+)
+
+
+def exhibit_gaps(evidence: Evidence) -> list[Gap]:
+    """The paper's figures that an exhibit would show, where the run has none."""
+    return [
+        Gap(
+            f"{figure}: {what}",
+            "the run has no exhibit that shows it.",
+            f"cembench {verb} --run {evidence.store.folder}",
+        )
+        for figure, what, verb in EXPECTED
+        if not any(figure in figures_of(e) for e in evidence.exhibits)
+    ]
+
+
+def figures_of(exhibit: Exhibit) -> list[str]:
+    """The paper's figures that an exhibit names: one, or several with commas."""
+    return [name.strip() for name in exhibit.figure.split(",") if name.strip()]
+
+
+def exhibit_sections(evidence: Evidence, folder: Path) -> list[Section]:
+    """A section for each exhibit; its pictures are copied into the report."""
+    return [_section(evidence, exhibit, folder) for exhibit in evidence.exhibits]
+
+
+def _section(evidence: Evidence, exhibit: Exhibit, folder: Path) -> Section:
+    name = f"exhibit-{slug(exhibit.name)}"
+    source = evidence.store.folder / FOLDER / exhibit.name
+    items: list[Item] = [Text(part) for part in exhibit.text.split("\n\n") if part.strip()]
+    items.append(Text(f"Made on: {ORIGINS[exhibit.origin][0].removeprefix('measured here on ')}."))
+    figures, lost = [], []
+    for k, picture in enumerate(exhibit.pictures):
+        file = source / picture.file
+        if not file.is_file():
+            lost.append(Gap(picture.caption, f"the picture {file} is gone.", exhibit.command))
+            continue
+        path = PurePosixPath("figures", f"{name}-{slug(file.stem)}{file.suffix.lower()}")
+        (folder / "figures").mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(file, folder / path)
+        figures.append(
+            Figure(
+                f"{name}-{k + 1}", picture.caption, (path,), picture.caption,
+                alternative=picture.alternative or picture.caption, paper=exhibit.figure,
+            )
+        )  # fmt: skip
+    if len(figures) == 1:
+        items += figures
+    elif figures:
+        items.append(Gallery(f"{name}-pictures", exhibit.title, tuple(figures)))
+    items += lost
+    items += [
+        _table(table, f"{name}-table-{k + 1}", exhibit.origin)
+        for k, table in enumerate(exhibit.tables)
+    ]
+    items.append(Text(f"Made by: {exhibit.command}"))
+    title = exhibit.title + (f" ({exhibit.figure})" if exhibit.figure else "")
+    return Section(name, title, tuple(items))
+
+
+def _table(table: ExhibitTable, name: str, origin: MeshOrigin) -> Table:
+    numeric = [
+        all(isinstance(row[k], int | float) or row[k] is None for row in table.rows)
+        for k in range(len(table.columns))
+    ]
+    columns = tuple(
+        Column(title, numeric=is_number)
+        for title, is_number in zip(table.columns, numeric, strict=True)
+    )
+    rows = tuple(tuple(_value(entry, origin) for entry in row) for row in table.rows)
+    return Table(name, table.title, columns, rows, notes=table.notes)
+
+
+def _value(entry: str | float | int | None, origin: MeshOrigin) -> Value:
+    if entry is None:
+        return missing("not measured")
+    if isinstance(entry, str):
+        return Value(entry)
+    text = f"{entry:,}" if isinstance(entry, int) else f"{entry:.6g}"
+    return Value(text, float(entry), origin)

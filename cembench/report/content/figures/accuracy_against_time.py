@@ -1,0 +1,76 @@
+"""Which algorithms give the best accuracy for their time (Pareto)?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cembench.report.content.evidence import Evidence
+from cembench.report.plots import Axis, Panel, Plot, Point, through
+from cembench.results.records import Record
+
+METRIC = "angle_error_mean_deg"
+
+
+def accuracy_against_time(evidence: Evidence) -> Plot | None:
+    """A point for each cell, relative to the best on its surface, and the middle of each cloud."""
+    panels = tuple(p for policy in evidence.policies if (p := _panel(evidence, policy)))
+    if not panels:
+        return None
+    return Plot(
+        "accuracy-against-time",
+        "Accuracy against time, relative to the best on each surface",
+        panels,
+        "Right: times as slow as the fastest algorithm on the same surface; up: times the smallest "
+        "mean angular distortion there. At (1, 1) an algorithm is best in both. Joined points are "
+        "the geometric means of the algorithms that no other one beats in both; maps to the disk "
+        "alone.",
+        "A cloud of points for each algorithm; the nearer to the lower left corner, the better.",
+    )
+
+
+def _panel(evidence: Evidence, policy: str) -> Panel | None:
+    clouds: dict[str, list[Point]] = {s.label: [] for s in evidence.disk_series}
+    for surface in evidence.surfaces:
+        found = [(s, evidence.find(surface, s, policy)) for s in evidence.disk_series]
+        known = {s.label: figures for s, r in found if r and (figures := _figures(r))}
+        if len(known) < 2:
+            continue
+        fastest, finest = (min(figures[k] for figures in known.values()) for k in (0, 1))
+        for label, (seconds, error) in known.items():
+            clouds[label].append(Point(seconds / fastest, error / finest, surface.title))
+    if not any(clouds.values()):
+        return None
+    drawn = [
+        through(s.label, clouds[s.label], "points", evidence.looks[s.label])
+        for s in evidence.disk_series
+        if clouds[s.label]
+    ]
+    middles = [_middle(label, cloud) for label, cloud in clouds.items() if cloud]
+    front = sorted(m for m in middles if not any(_beats(other, m) for other in middles))
+    return Panel(
+        Axis("time, times the fastest", log=True),
+        Axis("mean angular distortion, times the smallest", log=True),
+        (*drawn, through("not beaten in the mean", front, "both")),
+        f"solves: {policy}",
+    )
+
+
+def _middle(label: str, cloud: Sequence[Point]) -> Point:
+    """Geometric mean of a cloud."""
+    x, y = (float(np.exp(np.mean(np.log([p[k] for p in cloud])))) for k in (0, 1))
+    return Point(x, y, label)
+
+
+def _beats(one: Point, other: Point) -> bool:
+    return one.x <= other.x and one.y <= other.y and one[:2] != other[:2]
+
+
+def _figures(record: Record) -> tuple[float, float] | None:
+    """Seconds and mean distortion; None where the cell has not both, above zero."""
+    outcome = record.outcome
+    error = outcome.metrics.get(METRIC)
+    if outcome.status != "ok" or not outcome.median_seconds or not error:
+        return None
+    return outcome.median_seconds, float(error)

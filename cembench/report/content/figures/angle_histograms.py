@@ -1,0 +1,71 @@
+"""Figure 9: how the angular distortions are distributed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.figures.energy_by_iteration import model_gap
+from cembench.report.content.inspection import BIN, LAST, Angles, Inspection
+from cembench.report.document import Gap
+from cembench.report.palette import Look, looks
+from cembench.report.plots import Axis, Panel, Plot, Series
+
+#: The models of the paper's figure, in its order.
+MODELS = ("Liu's Neutral Face", "Liu's Smile Face", "Liu's Wry Face", "Liu's Pouting Face")
+#: Degrees that the paper's figure is about.
+SHOWN = 4.0
+
+
+def angle_histograms(
+    evidence: Evidence, inspections: Mapping[str, Inspection]
+) -> tuple[Plot | None, list[Gap]]:
+    """The plot of the paper's models that the run has, and a gap for each of the others."""
+    series = evidence.series_of(REFERENCE)
+    panels, gaps = [], []
+    for model in MODELS:
+        surface = evidence.standing_for(model)
+        seen = inspections[surface.mesh_hash] if surface else None
+        angles = seen.angles.get(series.label) if seen and series else None
+        if angles and surface:
+            panels.append(_panel(f"{model} ({surface.origin})", angles))
+        elif seen and not seen.kept:
+            gaps.append(Gap(f"Figure 9: {model}", seen.why_not))
+        else:
+            gaps.append(model_gap(evidence, model, "Figure 9"))
+    if not panels:
+        return None, gaps
+    plot = Plot(
+        "figure-9",
+        "Histograms of the angular distortion of CEM's maps",
+        tuple(panels),
+        f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps; in "
+        f"each heading the share below one degree. Bars beyond {SHOWN:g} degrees are left out.",
+        "Bars that are highest near zero degrees and fall off quickly.",
+        "Figure 9",
+    )
+    return plot, gaps
+
+
+def _panel(title: str, angles: Angles) -> Panel:
+    bars = histogram("CEM", angles, looks([REFERENCE])[REFERENCE], SHOWN)
+    heading = f"{title}: {angles.below_one:.1%} below 1°"
+    return Panel(
+        Axis("angular distortion (degrees)", low=0, high=SHOWN),
+        Axis("corners (%)"),
+        (bars,),
+        heading,
+    )
+
+
+def histogram(
+    name: str, angles: Angles, look: Look, shown: float = LAST, kind: str = "bars"
+) -> Series:
+    """The bins up to so many degrees, in percent of all corners."""
+    count = round(shown / BIN)
+    middles = (np.arange(count) + 0.5) * BIN
+    shares = 100 * angles.shares[:count]
+    x, y = [round(float(v), 6) for v in middles], [float(v) for v in shares]
+    return Series(name, x, y, "bars" if kind == "bars" else "line", look)

@@ -1,0 +1,130 @@
+"""Figure 10: what a map costs against the number of triangles, with fitted exponents."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cembench.report.content.evidence import Evidence
+from cembench.report.document import Column, Table, Value, missing, words
+from cembench.report.palette import Look, looks
+from cembench.report.plots import Axis, Panel, Plot, Point, Series, through
+from cembench.results import paper
+
+#: Fewer points determine no exponent that says anything.
+FEWEST = 3
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Seconds = factor * faces ** exponent, by least squares of logarithms; `error` is the SE."""
+
+    exponent: float
+    factor: float
+    error: float
+    n: int
+
+
+def fit(points: Sequence[Point]) -> Fit | None:
+    """Which power law runs through these (faces, seconds)? None for too few or equal sizes."""
+    if len(points) < FEWEST or len({p.x for p in points}) < FEWEST:
+        return None
+    x, y = (np.log([p[k] for p in points]) for k in (0, 1))
+    spread = float(((x - x.mean()) ** 2).sum())
+    exponent = float(((x - x.mean()) * (y - y.mean())).sum()) / spread
+    rest = y - y.mean() - exponent * (x - x.mean())
+    error = float(np.sqrt((rest**2).sum() / (len(x) - 2) / spread))
+    return Fit(exponent, float(np.exp(y.mean() - exponent * x.mean())), error, len(x))
+
+
+def measured_points(evidence: Evidence, label: str, policy: str) -> list[Point]:
+    """(faces, seconds, surface) of every cell of a series that has times."""
+    series = next(s for s in evidence.series if s.label == label)
+    found = []
+    for surface in evidence.surfaces:
+        record = evidence.find(surface, series, policy)
+        if record and record.outcome.status == "ok" and record.outcome.median_seconds:
+            found.append(Point(surface.faces, record.outcome.median_seconds, surface.title))
+    return found
+
+
+def printed_points(algorithm: str) -> list[Point]:
+    """(faces, seconds, model) of the paper's Table 1."""
+    return [
+        Point(paper.faces(model), seconds, model)
+        for model, row in paper.table(1).items()
+        if (seconds := row[algorithm]) is not None
+    ]
+
+
+def cost_by_faces(evidence: Evidence) -> Plot:
+    """A panel for each way of solving, and one of the printed seconds."""
+    panels = []
+    for policy in evidence.policies:
+        groups = [
+            (s.label, evidence.looks[s.label], measured_points(evidence, s.label, policy))
+            for s in evidence.disk_series
+        ]
+        panels.append(_panel(groups, f"measured here, solves: {policy}"))
+    usual = looks(paper.ALGORITHMS)
+    groups = [(a.upper(), usual[a], printed_points(a)) for a in paper.ALGORITHMS]
+    panels.append(_panel(groups, "printed in the paper (Table 1)"))
+    return Plot(
+        "figure-10",
+        "Computational cost against number of triangles",
+        tuple(panels),
+        "Seconds against triangles on logarithmic axes; straight lines are fitted powers, whose "
+        "exponents stand in the table below. Here all surfaces of the run count, also those that "
+        "are not in the paper; the printed seconds are of another machine.",
+        "Points along straight lines that rise from left to right, one for each algorithm.",
+        "Figure 10",
+    )
+
+
+def _panel(groups: Sequence[tuple[str, Look, list[Point]]], title: str) -> Panel:
+    drawn = []
+    for label, look, points in groups:
+        if not points:
+            continue
+        drawn.append(through(label, points, "points", look))
+        law = fit(points)
+        if law:
+            ends = [min(p.x for p in points), max(p.x for p in points)]
+            line = [law.factor * e**law.exponent for e in ends]
+            words = [f"{label}: exponent {law.exponent:.2f}"] * 2
+            drawn.append(Series(f"{label}, fitted", ends, line, "line", look, words, named=False))
+    return Panel(Axis("triangles", log=True), Axis("seconds", log=True), tuple(drawn), title)
+
+
+def exponents_table(evidence: Evidence) -> Table:
+    """The fitted exponents, printed and here, with standard errors and n."""
+    columns = [Column("algorithm", numeric=False)]
+    for group in ("printed", *(f"here, {policy}" for policy in evidence.policies)):
+        columns += [Column("exponent", group), Column("n", group)]
+    rows = []
+    for series in evidence.disk_series:
+        printed = (
+            fit(printed_points(series.algorithm)) if series.algorithm in paper.ALGORITHMS else None
+        )
+        cells = [words(series.label), *_fit_cells(printed)]
+        for policy in evidence.policies:
+            cells += _fit_cells(fit(measured_points(evidence, series.label, policy)))
+        rows.append(tuple(cells))
+    return Table(
+        "exponents",
+        "Fitted exponents: seconds grow as the number of triangles to this power",
+        tuple(columns),
+        tuple(rows),
+        "Least squares of logarithms; ± one standard error. The size of a surface is not all that "
+        "matters: iterations differ from surface to surface.",
+        (f"fewer than {FEWEST} sizes determine no exponent",),
+    )
+
+
+def _fit_cells(law: Fit | None) -> list[Value]:
+    if law is None:
+        return [missing(f"fewer than {FEWEST} sizes"), missing("no fit")]
+    text = f"{law.exponent:.2f} ± {law.error:.2f}"
+    return [Value(text, law.exponent, "derived"), Value(str(law.n), law.n, "derived")]

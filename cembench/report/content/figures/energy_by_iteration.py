@@ -1,0 +1,77 @@
+"""Figure 8: the conformal energy after each iteration of CEM."""
+
+from __future__ import annotations
+
+from cembench.report.content.evidence import REFERENCE, Evidence, SurfaceFacts, model_surface
+from cembench.report.document import Gap
+from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.results import paper
+
+#: The models of the paper's figure.
+MODELS = ("Chinese Vase", "Bourbon Bottle", "David Head", "Human Brain")
+
+
+def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
+    """The plot of the paper's models that the run has, and a gap for each of the others."""
+    panels = []
+    gaps = []
+    for model in MODELS:
+        surface = evidence.standing_for(model)
+        panel = surface and history_panel(evidence, surface, f"{model} ({surface.origin})")
+        if panel:
+            panels.append(panel)
+        else:
+            gaps.append(model_gap(evidence, model, "Figure 8"))
+    if not panels:
+        return None, gaps
+    plot = Plot(
+        "figure-8",
+        "Conformal energy against iterations of CEM",
+        tuple(panels),
+        "E_C of the start (0) and after each iteration. The last value need not be the smallest: "
+        "CEM's iteration ends after the first step that lowers E_C by less than the tolerance. "
+        "Curves other than CEM's are not in the paper.",
+        "For each surface, a curve of the conformal energy that falls with the iterations.",
+        "Figure 8",
+    )
+    return plot, gaps
+
+
+def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Panel | None:
+    """The energies of CEM's iterations on a surface; None where there are none.
+
+    CEM with other parameters, and algorithms that are not in the paper and tell E_C after each
+    iteration, have curves of their own.
+    """
+    shown = []
+    for series in evidence.disk_series:
+        record = evidence.find(surface, series)
+        if not record or not record.outcome.energy_history:
+            continue
+        is_cem = series.algorithm == REFERENCE
+        if not is_cem and (
+            series.algorithm in paper.ALGORITHMS or "energy_of" in record.outcome.extras
+        ):
+            continue
+        history = record.outcome.energy_history
+        look = evidence.looks[series.label]
+        shown.append(Series(series.label, list(range(len(history))), history, "both", look))
+        if is_cem and series.main:
+            shown.insert(0, shown.pop())
+    main = evidence.series_of(REFERENCE)
+    if not main or not any(s.name == main.label for s in shown):
+        return None
+    return Panel(Axis("iteration"), Axis("conformal energy E_C"), tuple(shown), title)
+
+
+def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
+    """What is missing where a run does not have a model's map by CEM."""
+    surface = evidence.standing_for(model)
+    series = evidence.series_of(REFERENCE)
+    record = evidence.find(surface, series) if surface and series else None
+    why = evidence.why_not(record) if surface else "no surface of this run is or stands for it"
+    return Gap(
+        f"{figure}: {model}",
+        f"no map of {model} by CEM: {why}.",
+        f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
+    )

@@ -1,0 +1,70 @@
+"""Figures 11 and 12: energy, and mean and SD of the angular distortion, over the models."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cembench.report.content.evidence import Evidence
+from cembench.report.palette import looks
+from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.results import paper
+
+
+def energy_over_models(evidence: Evidence) -> Plot:
+    """Figure 11: the conformal energy of every algorithm on every model of the run."""
+    axis = Axis("conformal energy E_C", log=True)
+    return Plot(
+        "figure-11",
+        "Conformal energy over the models",
+        _pair(evidence, "conformal_energy", axis, 3, lambda a: a),
+        "Left on this run's surfaces, right as printed for the models that they are or stand for.",
+        "A line for each algorithm over the models; the lines lie close together.",
+        "Figure 11",
+    )
+
+
+def angles_over_models(evidence: Evidence) -> Plot:
+    """Figure 12: (a) mean and (b) SD of the angular distortion on every model of the run."""
+    panels: tuple[Panel, ...] = ()
+    for what, words in (("mean", "mean"), ("sd", "SD")):
+        axis = Axis(f"{words} of angular distortion (degrees)", log=True)
+        column = _column(what)
+        panels += _pair(evidence, f"angle_error_{what}_deg", axis, 4, column)
+    return Plot(
+        "figure-12",
+        "Mean and standard deviation of the angular distortion over the models",
+        panels,
+        "Above the mean, below the standard deviation; left here, right as printed.",
+        "A line for each algorithm over the models.",
+        "Figure 12",
+    )
+
+
+def _column(what: str) -> Callable[[str], str]:
+    return lambda algorithm: f"{algorithm}_{what}"
+
+
+def _pair(
+    evidence: Evidence, metric: str, axis: Axis, table: int, column: Callable[[str], str]
+) -> tuple[Panel, Panel]:
+    """Measured and printed side by side, for the same models."""
+    style = looks(paper.ALGORITHMS)
+    measured, printed = [], []
+    for algorithm in paper.ALGORITHMS:
+        series = evidence.series_of(algorithm)
+        names = [s.title for s in evidence.models]
+        values = []
+        for surface in evidence.models:
+            record = evidence.find(surface, series) if series else None
+            ok = record is not None and record.outcome.status == "ok"
+            values.append(record.outcome.metrics.get(metric) if record and ok else None)
+        title = series.title if series else algorithm.upper()
+        if series:
+            measured.append(Series(title, names, values, "both", style[algorithm]))
+        rows = [paper.table(table)[s.paper_row][column(algorithm)] for s in evidence.models]
+        printed.append(Series(title, names, rows, "both", style[algorithm], named=not series))
+    origins = sorted({s.origin for s in evidence.models})
+    return (
+        Panel(Axis(""), axis, tuple(measured), f"measured here ({', '.join(origins)})"),
+        Panel(Axis(""), axis, tuple(printed), "printed in the paper"),
+    )

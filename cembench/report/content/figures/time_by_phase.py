@@ -1,0 +1,89 @@
+"""Where does the time of a call go?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cembench.report.content.evidence import Evidence, SurfaceFacts
+from cembench.report.palette import PARTS, REST, Look
+from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.results.records import Record
+
+
+def time_by_phase(evidence: Evidence) -> Plot | None:
+    """Shares of the time by phase, a bar for each algorithm, in the mean over the surfaces."""
+    panels = []
+    for policy in evidence.policies:
+        bars = []
+        for series in evidence.series:
+            records = [evidence.find(s, series, policy) for s in evidence.surfaces]
+            shares = [_shares(r) for r in records if r is not None and r.outcome.phases]
+            if shares:
+                names = dict.fromkeys(name for share in shares for name in share)
+                mean = {n: sum(s.get(n, 0.0) for s in shares) / len(shares) for n in names}
+                bars.append((f"{series.label} (n={len(shares)})", mean))
+        if bars:
+            axis = Axis("share of the time (%)", low=0, high=100)
+            panels.append(Panel(Axis(""), axis, _stacked(bars), f"solves: {policy}"))
+    if not panels:
+        return None
+    return Plot(
+        "time-by-phase",
+        "Time by phase",
+        tuple(panels),
+        "Shares of the time that is measured, which the phases add up to; the mean over the "
+        "surfaces of the run (n).",
+        "A bar for each algorithm, divided into its phases.",
+    )
+
+
+def phases_panel(evidence: Evidence, surface: SurfaceFacts, policy: str) -> Panel | None:
+    """Seconds by phase of every algorithm on one surface; None where nothing was timed."""
+    found = [(s, evidence.find(surface, s, policy)) for s in evidence.series]
+    bars = [(s.label, r.outcome.phases) for s, r in found if r and r.outcome.phases]
+    if not bars:
+        return None
+    return Panel(Axis(""), Axis("seconds"), _stacked(bars), f"time by phase, solves: {policy}")
+
+
+def _shares(record: Record) -> dict[str, float]:
+    total = sum(record.outcome.phases.values()) or 1.0
+    return {name: 100 * seconds / total for name, seconds in record.outcome.phases.items()}
+
+
+def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[Series, ...]:
+    """A series for each phase, the largest first; what is left over last."""
+    total: dict[str, float] = {}
+    for _, phases in bars:
+        for name, value in phases.items():
+            total[name] = total.get(name, 0.0) + value
+    order = sorted(total, key=lambda name: (name == "other", -total[name], name))
+    labels = [label for label, _ in bars]
+    return tuple(
+        Series(
+            name, labels, [phases.get(name, 0.0) for _, phases in bars], "stack", colour_of(name)
+        )
+        for name in order
+    )
+
+
+#: A phase has the same colour in every plot.
+_KNOWN = (
+    "solves",
+    "factorisation",
+    "assembly",
+    "laplacian",
+    "ordering",
+    "symbolic",
+    "boundary",
+    "beltrami",
+    "boundary step",
+    "folds",
+    "energy",
+    "start",
+)
+
+
+def colour_of(phase: str) -> Look:
+    """The colour of a phase; what is left over, and what no built-in algorithm books, is grey."""
+    return Look(PARTS[_KNOWN.index(phase)] if phase in _KNOWN else REST)

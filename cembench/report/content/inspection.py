@@ -1,0 +1,174 @@
+"""One look at a surface and its maps: pictures of all of them, and every corner's angle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.curvature import mean_curvature
+from cembench.conformal.metrics import angle_errors
+from cembench.core.atomic import write
+from cembench.drawing import shading
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.report.content.evidence import (
+    DISK,
+    REFERENCE,
+    Evidence,
+    Series,
+    SurfaceFacts,
+    slug,
+)
+from cembench.report.document import Figure
+from cembench.results.records import Record
+
+#: Pixels of one panel of a picture.
+SIDE = 236
+#: Degrees of a bin of the histograms, and where they end.
+BIN, LAST = 0.1, 10.0
+#: Recomputed angles may differ from the record's mean by this share, from rounding.
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Angles:
+    """How the angular distortions of a map are distributed.
+
+    Parameters
+    ----------
+    shares : float64 (k,)
+        Share of the corners in each bin of :data:`BIN` degrees from 0 to :data:`LAST`.
+    below_one : float
+        Share of the corners that change by less than one degree.
+    corners : int
+        How many there are.
+    agrees : bool
+        Whether their mean is the one in the record.
+
+    """
+
+    shares: NDArray[np.float64]
+    below_one: float
+    corners: int
+    agrees: bool
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """What was seen of a surface; empty where the run did not keep it.
+
+    `checkerboards` and `angles` are by the label of the series.
+    """
+
+    surface: SurfaceFacts
+    kept: bool
+    checkerboards: Mapping[str, Figure] = field(default_factory=lambda: MappingProxyType({}))
+    curvature: Figure | None = None
+    mesh: Figure | None = None
+    angles: Mapping[str, Angles] = field(default_factory=lambda: MappingProxyType({}))
+
+    @property
+    def why_not(self) -> str:
+        """Why are there no pictures?"""
+        return (
+            f"the run does not hold the surface {self.surface.name}: it was measured before runs "
+            "kept their surfaces"
+        )
+
+
+def inspect_surface(evidence: Evidence, surface: SurfaceFacts, folder: Path) -> Inspection:
+    """Draw a surface with every map that ended ok, and take its angles."""
+    mesh = evidence.mesh(surface)
+    if mesh is None:
+        return Inspection(surface, kept=False)
+    found = [(s, evidence.find(surface, s)) for s in evidence.series]
+    maps = [(s, r, evidence.uv(r)) for s, r in found if r is not None]
+    drawer = _Drawer(evidence, surface, mesh, folder)
+    checkerboards: dict[str, Figure] = {}
+    angles: dict[str, Angles] = {}
+    shown: tuple[Series, shading.Panel] | None = None
+    for series, record, uv in maps:
+        if uv is None:
+            continue
+        panel = shading.image_panel(mesh, uv, SIDE)
+        checkerboards[series.label] = drawer.checkerboard(series, record, panel, uv)
+        if series.target == DISK:
+            angles[series.label] = _angles(mesh, uv, record)
+        if shown is None or (series.algorithm == REFERENCE and series.main):
+            shown = (series, panel)
+    curved, meshed = drawer.curvature_and_mesh(*shown) if shown else (None, None)
+    return Inspection(surface, True, checkerboards, curved, meshed, angles)
+
+
+def _angles(mesh: TriangleMesh, uv: NDArray[np.complex128], record: Record) -> Angles:
+    errors = angle_errors(mesh, uv).ravel()
+    counts, _ = np.histogram(errors, bins=round(LAST / BIN), range=(0.0, LAST))
+    recorded = record.outcome.metrics.get("angle_error_mean_deg")
+    agrees = recorded is not None and bool(np.isclose(errors.mean(), recorded, rtol=ROUNDING))
+    return Angles(counts / len(errors), float((errors < 1).mean()), len(errors), agrees)
+
+
+class _Drawer:
+    """Draws one surface; what is seen of it in space is found out once for all maps."""
+
+    def __init__(
+        self, evidence: Evidence, surface: SurfaceFacts, mesh: TriangleMesh, folder: Path
+    ) -> None:
+        self.surface, self.mesh, self.folder = surface, mesh, folder
+        self.name = evidence.name_of(surface)
+        self.space = shading.surface_panel(mesh, SIDE)
+
+    def checkerboard(
+        self, series: Series, record: Record, panel: shading.Panel, uv: NDArray[np.complex128]
+    ) -> Figure:
+        pictures = [
+            shading.paint(p, shading.checkerboard(p, self.mesh, uv, self.space))
+            for p in (self.space, panel)
+        ]
+        metrics = record.outcome.metrics
+        error, folds = metrics.get("angle_error_mean_deg"), metrics.get("flipped_triangles")
+        target = "" if series.target == DISK else f" (not a map to the disk: {series.target})"
+        words = "" if error is None else f"; angles off by {error:.2f} degrees in the mean"
+        caption = f"{self.surface.title}, {series.label}{target}{words}; {folds} folded triangles."
+        return self._figure(
+            f"{slug(series.label)}-checkerboard",
+            f"{series.label}",
+            caption,
+            f"{self.surface.title} and its image by {series.label} under one checkerboard",
+            pictures,
+        )
+
+    def curvature_and_mesh(self, series: Series, panel: shading.Panel) -> tuple[Figure, Figure]:
+        H = mean_curvature(self.mesh)
+        panels = (self.space, panel)
+        coloured = [shading.paint(p, shading.curvature(p, H)) for p in panels]
+        drawn = [shading.paint(p, shading.edges(p)) for p in panels]
+        of = f"{self.surface.title} and its image by {series.label}"
+        return (
+            self._figure(
+                "curvature",
+                "mean curvature",
+                f"{of}, coloured by the mean curvature of the surface: orange where it bulges "
+                "outwards, blue where inwards.",
+                f"{of}, coloured by mean curvature",
+                coloured,
+            ),
+            self._figure("mesh", "mesh", f"The mesh of {of}.", f"{of}, with their edges", drawn),
+        )
+
+    def _figure(
+        self,
+        what: str,
+        title: str,
+        caption: str,
+        alternative: str,
+        pictures: list[NDArray[np.uint8]],
+    ) -> Figure:
+        path = PurePosixPath("figures", f"{self.name}-{what}.jpg")
+        content = shading.jpeg(shading.beside(pictures))
+        write(self.folder / path, lambda file: file.write(content))
+        return Figure(f"{self.name}-{what}", title, (path,), caption, alternative=alternative)

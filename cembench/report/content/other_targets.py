@@ -1,0 +1,66 @@
+"""Maps to other targets than the disk: they are never in one table with disks unmarked."""
+
+from __future__ import annotations
+
+from cembench.report.content.evidence import DISK, Evidence
+from cembench.report.content.printed_beside_measured import significant
+from cembench.report.document import Column, Table, Value, words
+
+
+def other_targets(evidence: Evidence) -> Table | None:
+    """A line a surface and algorithm; None where all algorithms map to the disk."""
+    rows = []
+    policy = evidence.policies[0]
+    for surface in evidence.surfaces:
+        for series in evidence.series:
+            record = evidence.find(surface, series, policy)
+            if series.target == DISK or record is None:
+                continue
+            outcome, key = record.outcome, record.cell.key
+            why = evidence.why_not(record) if outcome.status != "ok" else ""
+
+            def value(number: float | None, form: str, key: str = key, why: str = why) -> Value:
+                if number is None:
+                    return Value("-", None, "", key, why or "not measured")
+                return Value(format(number, form), float(number), surface.origin, key)  # noqa: B023
+
+            m = outcome.metrics
+            energy, area = m.get("conformal_energy"), m.get("image_area")
+            scaled = energy / area if energy is not None and area else None
+            seconds = outcome.median_seconds
+            timed = Value("-", None, "", key, why or "not timed")
+            if seconds is not None:
+                timed = Value(significant(seconds), seconds, surface.origin, key)
+            rows.append(
+                (
+                    words(surface.title),
+                    words(series.label),
+                    words(series.target),
+                    Value(outcome.status, None, "", key, why),
+                    timed,
+                    value(scaled, ".4f"),
+                    value(m.get("angle_error_mean_deg"), ".2f"),
+                    value(m.get("angle_error_sd_deg"), ".2f"),
+                    value(m.get("flipped_triangles"), ".0f"),
+                )
+            )
+    if not rows:
+        return None
+    return Table(
+        "other-targets",
+        "Maps that do not go to the disk",
+        (
+            Column("surface", numeric=False),
+            Column("algorithm", numeric=False),
+            Column("target", numeric=False),
+            Column("status", numeric=False),
+            Column("seconds", unit="s"),
+            Column("E_C / A"),
+            Column("mean°"),
+            Column("SD°"),
+            Column("folds"),
+        ),
+        tuple(rows),
+        f"E_C is divided by the area of the image, whose size is free here; angles compare with "
+        f"those of disks, but a free boundary makes the problem an easier one. Solves: {policy}.",
+    )

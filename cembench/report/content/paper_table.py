@@ -1,0 +1,84 @@
+"""One table of the paper becomes up to three: its own, and what the paper does not have.
+
+The paper's four algorithms on its models stand beside what was printed. Other algorithms that map
+to the disk, and other surfaces, are in tables of their own that say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from cembench.report.content.evidence import Evidence, Series
+from cembench.report.content.printed_beside_measured import (
+    Footer,
+    Quantity,
+    absent_models,
+    in_policy,
+    slug,
+    table_beside,
+)
+from cembench.report.document import Table
+from cembench.results import paper
+
+#: The quantities of one algorithm; the second argument is its column in the paper, or None.
+Quantities = Callable[[Series | None, str | None], Sequence[Quantity]]
+
+
+def three_kinds(
+    evidence: Evidence,
+    number: int,
+    title: str,
+    quantities: Quantities,
+    *,
+    policy: str | None = None,
+    caption: str = "",
+    footers: Sequence[Footer] = (),
+    algorithms: Sequence[str] = paper.ALGORITHMS,
+    notes: Sequence[str] = (),
+) -> list[Table]:
+    """The paper's table `number`, then other algorithms, then other surfaces, as far as there."""
+    tail = slug(policy, evidence) if policy else ""
+    add = in_policy(evidence, policy) if policy else ""
+    name = f"table-{number}{tail}"
+    tables = []
+    if evidence.models:
+        left_out = absent_models(evidence)
+        said = [*notes, f"not in this run: {', '.join(left_out)}"] if left_out else list(notes)
+        columns = [q for a in algorithms for q in quantities(evidence.series_of(a), a)]
+        tables.append(
+            table_beside(
+                evidence, name, f"Table {number}: {title}{add}", evidence.models, columns,
+                policy=policy, caption=caption, footers=footers, notes=said,
+            )
+        )  # fmt: skip
+    others = [s for s in evidence.disk_series if not (s.algorithm in paper.ALGORITHMS and s.main)]
+    if evidence.models and others:
+        columns = [q for s in others for q in quantities(s, None)]
+        tables.append(
+            table_beside(
+                evidence, f"{name}-other-algorithms",
+                f"{_capitalised(title)}: algorithms that are not in the paper{add}",
+                evidence.models, columns,
+                policy=policy, footers=footers,
+            )
+        )  # fmt: skip
+    if evidence.others:
+        columns = [
+            q
+            for s in evidence.disk_series
+            if s.algorithm in algorithms or s.algorithm not in paper.ALGORITHMS
+            for q in quantities(s, None)
+        ]
+        tables.append(
+            table_beside(
+                evidence, f"{name}-other-surfaces",
+                f"{_capitalised(title)}: surfaces that are not in the paper{add}",
+                evidence.others, columns,
+                policy=policy, footers=footers,
+            )
+        )  # fmt: skip
+    return tables
+
+
+def _capitalised(title: str) -> str:
+    return title[0].upper() + title[1:]

@@ -1,0 +1,134 @@
+"""How much of a time is book-keeping: factors kept (reuse) against factored anew (backslash)?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cembench.report.content.averages import geometric_rate
+from cembench.report.content.evidence import REFERENCE, Evidence, Series, SurfaceFacts
+from cembench.report.content.printed_beside_measured import significant
+from cembench.report.content.table_2 import measured_rates
+from cembench.report.document import Column, Gap, Table, Value, missing, words
+from cembench.report.plots import Axis, Panel, Plot
+from cembench.report.plots import Series as Bars
+
+BOTH = ("reuse", "backslash")
+
+
+def has_both(evidence: Evidence) -> bool:
+    """Did the run measure both ways of solving?"""
+    return all(policy in evidence.policies for policy in BOTH)
+
+
+def both_gap(evidence: Evidence) -> Gap:
+    """What is missing in a run of one policy."""
+    other = next(policy for policy in BOTH if policy not in evidence.policies)
+    return Gap(
+        "Factors kept against factored anew",
+        f"this run solved systems in one way: {', '.join(evidence.policies)}.",
+        f"the same `cembench run` with --solves reuse,backslash (lacking here: {other})",
+    )
+
+
+def seconds_under(
+    evidence: Evidence, surface: SurfaceFacts, series: Series, policy: str
+) -> tuple[Value, float | None]:
+    """A cell's seconds under a policy, as a value and as a number."""
+    record = evidence.find(surface, series, policy)
+    if record is None or record.outcome.status != "ok" or record.outcome.median_seconds is None:
+        key = record.cell.key if record else ""
+        text = record.outcome.status if record and record.outcome.status != "ok" else "-"
+        return Value(text, None, "", key, evidence.why_not(record)), None
+    seconds = record.outcome.median_seconds
+    return Value(significant(seconds), seconds, surface.origin, record.cell.key), seconds
+
+
+def policies_table(evidence: Evidence) -> Table:
+    """Seconds under both policies side by side, and their ratio, for every algorithm."""
+    columns = [Column("surface", numeric=False)]
+    for series in evidence.series:
+        columns += [Column(title, series.label) for title in (*BOTH, "ratio")]
+    rows = []
+    ratios: dict[str, list[float]] = {s.label: [] for s in evidence.series}
+    for surface in evidence.surfaces:
+        cells = [words(surface.title)]
+        for series in evidence.series:
+            (kept, a), (anew, b) = (
+                seconds_under(evidence, surface, series, policy) for policy in BOTH
+            )
+            cells += [kept, anew]
+            if a and b:
+                ratios[series.label].append(b / a)
+                cells.append(Value(f"{b / a:.2f}", b / a, "derived"))
+            else:
+                cells.append(missing("not both were measured"))
+        rows.append(tuple(cells))
+    means, counts = [words("geometric mean")], [words("n, surfaces counted")]
+    for series in evidence.series:
+        found = ratios[series.label]
+        mean = geometric_rate([r - 1 for r in found]) + 1 if found else None
+        value = missing("nothing to average") if mean is None else Value(f"{mean:.2f}", mean)
+        means += [words(""), words(""), value]
+        counts += [words(""), words(""), Value(str(len(found)), len(found), "derived")]
+    return Table(
+        "reuse-against-backslash",
+        "Seconds with factors kept (reuse) and factored anew at every solve (backslash)",
+        tuple(columns),
+        (*rows, tuple(means), tuple(counts)),
+        "The ratio is what an implementation saves by keeping a factor while its matrix stands, "
+        "whatever the algorithm. The paper's MATLAB factored anew.",
+        footer_rows=2,
+    )
+
+
+def speedups_table(evidence: Evidence) -> Table:
+    """The average rates of speedup of CEM under both policies."""
+    series = [s for s in evidence.disk_series if s.algorithm != REFERENCE and s.main]
+    columns = [Column("CEM over", numeric=False)]
+    for policy in BOTH:
+        columns += [
+            Column("mean rate", policy),
+            Column("geometric mean - 1", policy),
+            Column("n", policy),
+        ]
+    rows = []
+    for s in series:
+        cells = [words(s.label)]
+        for policy in BOTH:
+            rates, _ = measured_rates(evidence, s.algorithm, policy)
+            if not rates:
+                cells += [missing("no rate"), missing("no rate")]
+            else:
+                mean, geometric = float(np.mean(rates)), geometric_rate(rates)
+                cells += [
+                    Value(f"{mean:.2f}", mean, "derived"),
+                    Value(f"{geometric:.2f}", geometric, "derived"),
+                ]
+            cells.append(Value(str(len(rates)), len(rates), "derived"))
+        rows.append(tuple(cells))
+    return Table(
+        "speedup-by-policy",
+        "How much of the speedup of CEM is the algorithm, and how much keeping factors",
+        tuple(columns),
+        tuple(rows),
+        "Rates of speedup (Eq. 33) on the surfaces that are or stand for models of the paper.",
+    )
+
+
+def policies_plot(evidence: Evidence) -> Plot:
+    """The ratios as points over the surfaces."""
+    drawn = []
+    for series in evidence.series:
+        names, values = [], []
+        for surface in evidence.surfaces:
+            a, b = (seconds_under(evidence, surface, series, p)[1] for p in BOTH)
+            names.append(surface.title)
+            values.append(b / a if a and b else None)
+        drawn.append(Bars(series.label, names, values, "both", evidence.looks[series.label]))
+    return Plot(
+        "reuse-against-backslash",
+        "What factoring anew costs",
+        (Panel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
+        "Seconds with a factorisation at every solve over seconds with factors kept.",
+        "A line for each algorithm over the surfaces; iterative ones lie high.",
+    )

@@ -1,0 +1,241 @@
+"""The whole report of a run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from cembench import __version__
+from cembench.report.content import policies
+from cembench.report.content.claims import claims
+from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
+from cembench.report.content.failures import not_ok
+from cembench.report.content.figures.accuracy_against_time import accuracy_against_time
+from cembench.report.content.figures.angle_histograms import angle_histograms
+from cembench.report.content.figures.cost_by_faces import cost_by_faces, exponents_table
+from cembench.report.content.figures.energy_by_iteration import energy_by_iteration, model_gap
+from cembench.report.content.figures.over_models import angles_over_models, energy_over_models
+from cembench.report.content.figures.performance_profile import performance_profile
+from cembench.report.content.figures.time_by_phase import time_by_phase
+from cembench.report.content.inspection import Inspection, inspect_surface
+from cembench.report.content.other_targets import other_targets
+from cembench.report.content.surface_page import surface_page
+from cembench.report.content.table_1 import table_1
+from cembench.report.content.table_2 import table_2
+from cembench.report.content.table_3 import table_3
+from cembench.report.content.table_4 import table_4
+from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Text
+from cembench.report.plots import Plot, write_plot
+from cembench.results.records import MeshOrigin
+
+#: Is told what is drawn next: words, how many steps are done, how many there are.
+Progress = Callable[[str, int, int], None]
+Inspections = Mapping[str, Inspection]
+
+#: The paper's figures that show one model with one map.
+PICTURES = (
+    ("Figure 2", "Left Hand"),
+    ("Figure 3", "Liu's Neutral Face"),
+    ("Figure 4", "Liu's Smile Face"),
+    ("Figure 5", "Liu's Wry Face"),
+    ("Figure 6", "Liu's Pouting Face"),
+)
+
+
+#: What is said of surfaces by their origin.
+_KINDS: Mapping[MeshOrigin, str] = {
+    "model": "of the paper's models",
+    "stand-in": "stand-ins for models of the paper",
+    "surface": "not in the paper",
+}
+
+
+def build_report(
+    evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
+) -> Report:
+    """Compute everything that a report of this run holds, and draw its figures into `folder`."""
+    n = len(evidence.surfaces) + 2
+    inspections: dict[str, Inspection] = {}
+    for k, surface in enumerate(evidence.surfaces):
+        progress(f"surface {surface.title}", k, n)
+        inspections[surface.mesh_hash] = inspect_surface(evidence, surface, folder)
+    progress("tables, plots and claims", n - 2, n)
+    sections = [
+        _summary(evidence),
+        _tables(evidence),
+        Section("claims", "Claims of the paper", tuple(claims(evidence, inspections))),
+        _figures(evidence, inspections, folder),
+        _beyond(evidence, folder),
+        *exhibit_sections(evidence, folder),
+    ]
+    progress("pages of the surfaces", n - 1, n)
+    sections.append(_pages(evidence, inspections, folder))
+    progress("done", n, n)
+    return Report(
+        title="Conformal surface parameterizations: the paper's tables and figures, measured",
+        command=command,
+        facts=tuple(facts(evidence)),
+        sections=tuple(sections),
+        records=evidence.rows,
+    )
+
+
+def facts(evidence: Evidence) -> list[tuple[str, str]]:
+    """What stands at the head of a report."""
+    statuses = Counter(record.outcome.status for record in evidence.records)
+    dates = sorted(record.started_at[:10] for record in evidence.records)
+    rounds = sorted({len(r.outcome.rounds) for r in evidence.records if r.outcome.rounds})
+    origins = Counter(surface.origin for surface in evidence.surfaces)
+    found = [
+        ("run", str(evidence.store.folder)),
+        ("measured", " to ".join(dict.fromkeys((dates[0], dates[-1])))),
+        ("cells", ", ".join(f"{count} {status}" for status, count in statuses.most_common())),
+        ("surfaces", ", ".join(f"{count} {_KINDS[o]}" for o, count in origins.items())),
+        ("algorithms", ", ".join(series.label for series in evidence.series)),
+        ("solves", ", ".join(evidence.policies)),
+        ("rounds", ", ".join(map(str, rounds)) or "none"),
+        ("threads", ", ".join(sorted({str(r.cell.threads) for r in evidence.records}))),
+        ("backend", ", ".join(sorted({r.cell.backend for r in evidence.records}))),
+    ]
+    if evidence.superseded:
+        found.append(("left out", f"{evidence.superseded} older records of cells measured again"))
+    used = {record.environment for record in evidence.records}
+    for key, machine in evidence.store.environments().items():
+        if key in used:
+            found.append(("machine", _machine(machine)))
+    found.append(("report by", f"cembench {__version__}"))
+    return found
+
+
+def _machine(about: Mapping[str, object]) -> str:
+    memory = about.get("memory_bytes")
+    size = f", {memory / 2**30:.0f} GiB" if isinstance(memory, int) else ""
+    libraries = about.get("libraries")
+    versions = ""
+    if isinstance(libraries, dict):
+        chosen = [f"{k} {libraries[k]}" for k in ("numpy", "scipy", "cvxopt") if libraries.get(k)]
+        versions = f"; {', '.join(chosen)}"
+    git = about.get("git")
+    commit = f"; commit {str(git.get('commit'))[:12]}" if isinstance(git, dict) else ""
+    return (
+        f"{about.get('cpu')}, {about.get('cores')} cores{size}; Python {about.get('python')}"
+        f"{versions}{commit}"
+    )
+
+
+def _summary(evidence: Evidence) -> Section:
+    marks = "; ".join(
+        f"{words}{f' ({mark})' if mark else ''}" for words, mark in ORIGINS.values() if words
+    )
+    items: list[Item] = [
+        Text(
+            "Every number is measured here unless it is marked otherwise. Where numbers come from: "
+            f"{marks}. A dagger marks a misprint, an exclamation mark an unstable time."
+        )
+    ]
+    if evidence.models and not any(s.origin == "model" for s in evidence.models):
+        items.append(
+            Text(
+                "No model of the paper is in this run. Its rows are measured on stand-ins with the "
+                "same number of triangles and boundary vertices: times are of like size, energies "
+                "and angles are of other surfaces."
+            )
+        )
+    items.append(not_ok(evidence))
+    return Section("summary", "What this is", tuple(items))
+
+
+def _tables(evidence: Evidence) -> Section:
+    items: list[Item] = []
+    if not evidence.models:
+        items.append(
+            Gap(
+                "Tables 1 to 4 beside the printed ones",
+                "no surface of this run is or stands for a model of the paper.",
+                f"cembench run --profile quick -o {evidence.store.folder}",
+            )
+        )
+    for make in (table_1, table_2, table_3, table_4):
+        items += make(evidence)
+    return Section("tables", "Tables 1 to 4", tuple(items))
+
+
+def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
+    items: list[Item] = []
+    gaps: list[Gap] = []
+    for figure, model in PICTURES:
+        found = _pictures(evidence, inspections, figure, model)
+        if found:
+            items += found
+        else:
+            gaps.append(model_gap(evidence, model, figure))
+    for plot, lacking in (
+        energy_by_iteration(evidence),
+        angle_histograms(evidence, inspections),
+    ):
+        items += _drawn([plot], folder)
+        gaps += lacking
+    items += _drawn([cost_by_faces(evidence)], folder)
+    items.append(exponents_table(evidence))
+    if evidence.models:
+        items += _drawn([energy_over_models(evidence), angles_over_models(evidence)], folder)
+    gaps += exhibit_gaps(evidence)
+    return Section("figures", "Figures of the paper", (*items, *gaps))
+
+
+def _pictures(
+    evidence: Evidence, inspections: Inspections, figure: str, model: str
+) -> list[Figure]:
+    """CEM's pictures of a model, as the paper shows them."""
+    surface = evidence.standing_for(model)
+    series = evidence.series_of(REFERENCE)
+    if surface is None or series is None:
+        return []
+    seen = inspections[surface.mesh_hash]
+    checkerboard = seen.checkerboards.get(series.label)
+    if checkerboard is None:
+        return []
+    chosen = [seen.curvature, seen.mesh] if figure == "Figure 2" else [checkerboard]
+    return [
+        Figure(
+            f"{figure.lower().replace(' ', '-')}-{k + 1}",
+            f"{model} ({surface.origin}) and its map by CEM: {picture.title}",
+            picture.files,
+            picture.caption,
+            alternative=picture.alternative,
+            paper=figure,
+        )
+        for k, picture in enumerate(chosen)
+        if picture
+    ]
+
+
+def _beyond(evidence: Evidence, folder: Path) -> Section:
+    items: list[Item] = _drawn(
+        [performance_profile(evidence), accuracy_against_time(evidence), time_by_phase(evidence)],
+        folder,
+    )
+    if policies.has_both(evidence):
+        items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
+        items += _drawn([policies.policies_plot(evidence)], folder)
+    else:
+        items.append(policies.both_gap(evidence))
+    others = other_targets(evidence)
+    if others:
+        items.append(others)
+    return Section("beyond", "Beyond the paper", tuple(items))
+
+
+def _pages(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
+    pages = []
+    for surface in evidence.surfaces:
+        page, plot = surface_page(evidence, surface, inspections[surface.mesh_hash])
+        items = (*page.items, *_drawn([plot], folder))
+        pages.append(Section(page.name, page.title, items, page.sections, page.page))
+    return Section("surfaces", "Surfaces", (), tuple(pages))
+
+
+def _drawn(plots: Sequence[Plot | None], folder: Path) -> list[Item]:
+    return [write_plot(plot, folder) for plot in plots if plot]

@@ -1,0 +1,194 @@
+"""A page a surface: every algorithm's picture side by side, and all figures of merit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cembench.report.content.evidence import DISK, Evidence, SurfaceFacts
+from cembench.report.content.figures.angle_histograms import histogram
+from cembench.report.content.figures.energy_by_iteration import history_panel
+from cembench.report.content.figures.time_by_phase import phases_panel
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.printed_beside_measured import significant
+from cembench.report.document import (
+    ORIGINS,
+    Column,
+    Gallery,
+    Gap,
+    Item,
+    Section,
+    Table,
+    Text,
+    Value,
+    words,
+)
+from cembench.report.plots import Axis, Panel, Plot
+from cembench.results.records import Record
+
+#: Degrees up to which the histograms of a page go.
+SHOWN = 5.0
+#: Heading, figure of the record, and how it is written.
+_METRICS = (
+    ("E_C", "conformal_energy", ".4f"),
+    ("mean°", "angle_error_mean_deg", ".2f"),
+    ("SD°", "angle_error_sd_deg", ".2f"),
+    ("folds", "flipped_triangles", "d"),
+    ("dilatation", "dilatation_mean", ".3f"),
+    ("largest", "dilatation_max", ".2f"),
+)
+
+
+def surface_page(
+    evidence: Evidence, surface: SurfaceFacts, seen: Inspection
+) -> tuple[Section, Plot | None]:
+    """The page without its plot, which goes where :func:`with_plot` puts it, and the plot."""
+    name = evidence.name_of(surface)
+    items: list[Item] = [Text(_about(surface)), *notices(evidence, surface)]
+    if seen.checkerboards:
+        items.append(
+            Gallery(
+                f"{name}-maps",
+                "The surface and its image by each algorithm, under one checkerboard",
+                tuple(seen.checkerboards.values()),
+                "Squares stay squares where a map is conformal. Where they would be large on the "
+                "surface they are divided 3 by 3, in both panels alike. Folded triangles are red.",
+            )
+        )
+    if seen.curvature and seen.mesh:
+        items.append(
+            Gallery(f"{name}-surface", "Mean curvature and mesh", (seen.curvature, seen.mesh))
+        )
+    if not seen.kept:
+        command = "the command of the run, again: it adds the surfaces and measures nothing twice"
+        items.append(Gap("Pictures", f"{seen.why_not}.", command))
+    items.append(figures_table(evidence, surface, name))
+    section = Section(f"surface-{name}", surface.title, tuple(items), page=True)
+    return section, _plot(evidence, surface, seen, name)
+
+
+def _about(surface: SurfaceFacts) -> str:
+    about = (
+        f"{surface.vertices:,} vertices, {surface.faces:,} triangles, "
+        f"{surface.boundary_vertices:,} boundary vertices; {surface.non_delaunay_share:.1%} of the "
+        "interior edges are not Delaunay. "
+    )
+    if surface.paper_row and surface.origin == "stand-in":
+        return about + f"{surface.name}: a stand-in for {surface.paper_row}, not the paper's model."
+    kind = ORIGINS[surface.origin][0].removeprefix("measured here on ")
+    return about + f"{surface.name}: {kind}."
+
+
+def notices(evidence: Evidence, surface: SurfaceFacts) -> list[Text]:
+    """What was noticed of the mesh when it was read."""
+    record = next(r for r in evidence.records if r.cell.mesh_hash == surface.mesh_hash)
+    return [Text(f"Note: {notice}.") for notice in record.mesh.notices]
+
+
+def figures_table(evidence: Evidence, surface: SurfaceFacts, name: str) -> Table:
+    """All figures of merit of every algorithm on one surface, a line a cell."""
+    columns = [
+        Column("algorithm", numeric=False),
+        Column("solves", numeric=False),
+        Column("status", numeric=False),
+        Column("seconds", unit="s"),
+        Column("±%"),
+        Column("iterations"),
+        *(Column(heading) for heading, _, _ in _METRICS),
+        Column("memory", unit="MiB"),
+    ]
+    rows, causes = [], []
+    for series in evidence.series:
+        for policy in evidence.policies:
+            record = evidence.find(surface, series, policy)
+            if record is None:
+                continue
+            star = "" if series.target == DISK else " *"
+            rows.append(_line(evidence, surface, record, series.label + star))
+            if record.outcome.cause:
+                causes.append(f"{series.label} ({policy}): {evidence.why_not(record)}")
+            causes += [f"{series.label} ({policy}): {note}" for note in record.outcome.notes]
+    starred = sorted({s.target for s in evidence.series if s.target != DISK})
+    if starred and any(row[0].text.endswith("*") for row in rows):
+        causes.append(
+            f"* not a map to the disk ({', '.join(starred)}): its E_C is not comparable with those "
+            "of disks"
+        )
+    return Table(
+        f"figures-{name}",
+        f"{surface.title}: all figures",
+        tuple(columns),
+        tuple(rows),
+        "Seconds are the median of the rounds, ±% is half the width of its 95 % interval; "
+        "dilatation is the largest over the smallest stretch of a triangle, in the mean and at "
+        "most; memory is what the call adds.",
+        tuple(dict.fromkeys(causes)),
+    )
+
+
+def _line(
+    evidence: Evidence, surface: SurfaceFacts, record: Record, label: str
+) -> tuple[Value, ...]:
+    outcome, row, key = record.outcome, evidence.row(record), record.cell.key
+    why = evidence.why_not(record)
+
+    def value(number: float | None, text: str, lacking: str = "not measured") -> Value:
+        if number is None:
+            reason = why if outcome.status != "ok" else lacking
+            return Value("-", None, "", key, reason)
+        return Value(text, float(number), surface.origin, key)
+
+    seconds = outcome.median_seconds
+    low, high = row["seconds_low"], row["seconds_high"]
+    half = None if low is None or not seconds else 50 * (high - low) / seconds
+    mark = "!" if row["unstable"] else ""
+    cells = [
+        words(label),
+        words(record.cell.solves),
+        Value(outcome.status, None, "", key, outcome.cause or ""),
+        value(seconds, significant(seconds or 0.0) + mark),
+        value(half, f"{half or 0:.0f}", "fewer than six rounds"),
+        value(outcome.iterations, str(outcome.iterations)),
+    ]
+    for _, metric, form in _METRICS:
+        number = outcome.metrics.get(metric)
+        lacking = "infinite" if metric in outcome.metrics else "not measured"
+        cells.append(value(number, "" if number is None else format(number, form), lacking))
+    memory = outcome.memory_increase_bytes
+    mib = None if memory is None else memory / 2**20
+    cells.append(value(mib, f"{mib or 0:,.0f}"))
+    return tuple(cells)
+
+
+def _plot(evidence: Evidence, surface: SurfaceFacts, seen: Inspection, name: str) -> Plot | None:
+    """Histograms, the energies of the iterations and the phases, as far as there are any."""
+    panels: list[Panel] = []
+    curves = [
+        histogram(s.label, seen.angles[s.label], evidence.looks[s.label], SHOWN, "line")
+        for s in evidence.series
+        if s.label in seen.angles
+    ]
+    if curves:
+        axis = Axis("angular distortion (degrees)", low=0, high=SHOWN)
+        panels.append(Panel(axis, Axis("corners (%)", low=0), tuple(curves), "angles"))
+    history = history_panel(evidence, surface, "energy against iterations")
+    phases = phases_panel(evidence, surface, evidence.policies[0])
+    panels += [panel for panel in (history, phases) if panel]
+    if not panels:
+        return None
+    return Plot(
+        f"{name}-plots",
+        f"{surface.title}: angles, energy and time",
+        tuple(panels),
+        _caption(panels),
+        "Curves of the angular distortion for each algorithm, and bars of the time by phase.",
+        columns=3,
+    )
+
+
+def _caption(panels: Sequence[Panel]) -> str:
+    about = {
+        "angles": "share of the corners by angular distortion, in bins of a tenth of a degree",
+        "energy against iterations": "conformal energy after each iteration of CEM",
+    }
+    parts = [about.get(panel.title, "seconds by phase of the measured call") for panel in panels]
+    return "From left to right: " + "; ".join(parts) + "."

@@ -1,0 +1,53 @@
+"""Table 1: what does a map cost, in seconds, and how many iterations does CEM take?"""
+
+from __future__ import annotations
+
+from cembench.report.content.evidence import REFERENCE, Evidence, Series
+from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.printed_beside_measured import POLICIES, Quantity, significant
+from cembench.report.document import Table
+
+CAPTION = (
+    "Seconds from the arrays V and F in memory to the map: the median of the rounds here, and what "
+    "the paper printed of MATLAB programs on a laptop of 2.60 GHz. Machines, languages and "
+    "libraries differ: compare within a column pair only how the algorithms stand to each other. "
+)
+
+
+def table_1(evidence: Evidence) -> list[Table]:
+    """Seconds and iterations; a table for each way of solving that the run has."""
+    tables = []
+    for policy in evidence.policies:
+        caption = CAPTION + f"Here {POLICIES.get(policy, policy)}."
+        tables += three_kinds(
+            evidence,
+            1,
+            "computational cost in seconds, and iterations of CEM",
+            _quantities,
+            policy=policy,
+            caption=caption,
+        )
+    return tables
+
+
+def _quantities(series: Series | None, column: str | None) -> list[Quantity]:
+    title = series.label if series else str(column).upper()
+    seconds = Quantity(
+        title,
+        series,
+        lambda record: record.outcome.median_seconds,
+        significant,
+        (1, column) if column else None,
+        timed=True,
+    )
+    if column != REFERENCE:
+        return [seconds]
+    iterations = Quantity(
+        f"{title} iterations",
+        series,
+        lambda record: record.outcome.iterations,
+        lambda number: f"{number:.0f}",
+        (1, "cem_iterations"),
+        digits=0,
+    )
+    return [seconds, iterations]

@@ -1,0 +1,146 @@
+"""Table 2: the rate of speedup of CEM over the others (Eq. 33), and its averages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cembench.report.content.averages import (
+    COMPARED,
+    READINGS,
+    STATED_RATE,
+    STATED_SAVING,
+    percent,
+    printed_rates,
+)
+from cembench.report.content.evidence import REFERENCE, Evidence, Series
+from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.printed_beside_measured import (
+    POLICIES,
+    Number,
+    Quantity,
+    absent_models,
+    in_policy,
+    slug,
+)
+from cembench.report.document import Column, Table, Value, missing, words
+from cembench.results.records import Record
+
+CAPTION = (
+    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 where CEM takes half the time, negative where "
+    "CEM is slower. Here it is the median of the ratios within rounds. "
+)
+
+
+def table_2(evidence: Evidence) -> list[Table]:
+    """Rates of speedup with their averages in both readings; a set for each way of solving."""
+    tables: list[Table] = []
+    for policy in evidence.policies:
+        tables += three_kinds(
+            evidence,
+            2,
+            "rate of speedup of CEM",
+            _quantities(evidence.rate),
+            policy=policy,
+            caption=CAPTION + f"Here {POLICIES.get(policy, policy)}.",
+            footers=READINGS,
+            algorithms=COMPARED,
+            notes=("averages over the printed column take its numbers as printed, misprint too",),
+        )
+        if evidence.models:
+            tables.append(averages_table(evidence, policy))
+    return tables
+
+
+def _quantities(
+    rate: Callable[[Record], Number],
+) -> Callable[[Series | None, str | None], list[Quantity]]:
+    def quantities(series: Series | None, column: str | None) -> list[Quantity]:
+        if series is not None and series.algorithm == REFERENCE:
+            return []
+        title = series.label if series else str(column).upper()
+        place = (2, column) if column else None
+        return [Quantity(title, series, rate, lambda x: f"{x:.2f}", place)]
+
+    return quantities
+
+
+def averages_table(evidence: Evidence, policy: str) -> Table:
+    """Both readings of the averages: stated, over all printed models, over the run's, measured."""
+    columns = [Column("reading", numeric=False)]
+    for algorithm in COMPARED:
+        columns += [
+            Column(heading, algorithm.upper())
+            for heading in ("stated", "printed, all", "printed, these", "here")
+        ]
+    stated = {0: STATED_RATE, 2: STATED_SAVING}
+    rows = []
+    sets = {a: _rate_sets(evidence, a, policy) for a in COMPARED}
+    for k, reading in enumerate(READINGS):
+        cells = [words(reading.label)]
+        for algorithm in COMPARED:
+            claim = stated.get(k, {}).get(algorithm)
+            show = _stated if k == 0 else percent
+            cells.append(
+                missing("the paper does not state it")
+                if claim is None
+                else Value(show(claim), claim, "printed")
+            )
+            for rates in sets[algorithm]:
+                if rates:
+                    cells.append(
+                        Value(reading.show(reading.of(rates)), reading.of(rates), "derived")
+                    )
+                else:
+                    cells.append(missing("no rate to average"))
+        rows.append(tuple(cells))
+    counts = [words("n, models counted")]
+    for algorithm in COMPARED:
+        counts.append(words(""))
+        counts += [Value(str(len(r)), len(r), "derived") for r in sets[algorithm]]
+    origins = sorted({s.origin for s in evidence.models})
+    return Table(
+        name=f"averages{slug(policy, evidence)}",
+        title=f"Averages of Table 2, in both readings{in_policy(evidence, policy)}",
+        columns=tuple(columns),
+        rows=(*rows, tuple(counts)),
+        caption=(
+            "The mean of rates lets single large ratios dominate; the geometric mean and the mean "
+            "of the savings count every model alike. 'Printed, these' are the printed rates of "
+            "the models that were measured here too. A model counts once: where it was measured "
+            "itself, its stand-in does not count."
+        ),
+        notes=(
+            "the misprint (Knit Cap Man, FDM) is replaced by the 28.07 that Table 1 gives",
+            f"measured on: {', '.join(origins)}; {len(absent_models(evidence))} of the paper's "
+            "models are not in this run",
+        ),
+        footer_rows=1,
+    )
+
+
+def _stated(number: float) -> str:
+    return f"{number:.1f}"
+
+
+def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[float], ...]:
+    """Printed for all models; printed for those measured; measured."""
+    measured, there = measured_rates(evidence, algorithm, policy)
+    return printed_rates(algorithm), printed_rates(algorithm, there), measured
+
+
+def measured_rates(
+    evidence: Evidence, algorithm: str, policy: str
+) -> tuple[list[float], list[str]]:
+    """The rates of speedup of CEM over an algorithm, one for each model; and which these are."""
+    rates, models = [], []
+    series = evidence.series_of(algorithm)
+    for surface in evidence.one_each if series else ():
+        assert series is not None
+        record = evidence.find(surface, series, policy)
+        rate = None
+        if record is not None:
+            rate = evidence.rate(record)
+        if rate is not None:
+            rates.append(float(rate))
+            models.append(surface.paper_row)
+    return rates, models

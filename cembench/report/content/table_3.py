@@ -1,0 +1,26 @@
+"""Table 3: the conformal energy of the maps."""
+
+from __future__ import annotations
+
+from cembench.report.content.evidence import Evidence, Series
+from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.printed_beside_measured import Quantity, metric
+from cembench.report.document import Table
+
+CAPTION = (
+    "E_C = E_D - A (Eq. 7), zero for a conformal map, A being the area that the image of the "
+    "boundary encloses (Eq. 8). It does not depend on the machine, but on the mesh: on a stand-in "
+    "it is another number than on the paper's model."
+)
+
+
+def table_3(evidence: Evidence) -> list[Table]:
+    """Conformal energies; how systems are solved does not change them."""
+    return three_kinds(evidence, 3, "conformal energy", _quantities, caption=CAPTION)
+
+
+def _quantities(series: Series | None, column: str | None) -> list[Quantity]:
+    title = series.label if series else str(column).upper()
+    place = (3, column) if column else None
+    energy = metric("conformal_energy")
+    return [Quantity(title, series, energy, lambda x: f"{x:.4f}", place, digits=4)]

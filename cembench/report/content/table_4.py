@@ -1,0 +1,35 @@
+"""Table 4: by how many degrees the angles change, mean and standard deviation."""
+
+from __future__ import annotations
+
+from cembench.report.content.evidence import Evidence, Series
+from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.printed_beside_measured import Quantity, metric
+from cembench.report.document import Table
+
+CAPTION = (
+    "Angular distortion: the absolute difference between the angle on the surface and on the disk, "
+    "in degrees, over all corners of all triangles. It depends on the mesh: on a stand-in it is "
+    "another number than on the paper's model."
+)
+
+
+def table_4(evidence: Evidence) -> list[Table]:
+    """Mean and standard deviation of angular distortions."""
+    return three_kinds(
+        evidence, 4, "angular distortion in degrees, mean and SD", _quantities, caption=CAPTION
+    )
+
+
+def _quantities(series: Series | None, column: str | None) -> list[Quantity]:
+    title = series.label if series else str(column).upper()
+    return [
+        Quantity(
+            f"{title} {heading}",
+            series,
+            metric(f"angle_error_{what}_deg"),
+            lambda x: f"{x:.2f}",
+            (4, f"{column}_{what}") if column else None,
+        )
+        for heading, what in (("mean", "mean"), ("SD", "sd"))
+    ]

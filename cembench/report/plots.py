@@ -1,0 +1,346 @@
+"""A plot as data, drawn by several hands.
+
+A :class:`Plot` holds what is to be seen and nothing of how; :func:`write_plot` draws it with
+matplotlib (PNG, SVG, PDF), lays its data beside it (CSV), and describes it for Plotly, all from
+the same values. The same plot gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from PIL import Image
+
+from cembench.report.document import Figure
+from cembench.report.palette import PLAIN, Look
+
+#: How a series is drawn: points joined or not, a staircase, bars side by side or on one another.
+Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values of one thing; `x` are numbers or names, `words` what is told of each point.
+
+    What is stacked stands on names.
+    """
+
+    name: str
+    x: Sequence[float | str]
+    y: Sequence[float | None]
+    kind: Kind
+    look: Look = PLAIN
+    words: Sequence[str] = ()
+    #: Shown in the legend; one of several series of one name is enough.
+    named: bool = True
+
+
+class Point(NamedTuple):
+    """A point with what is told of it."""
+
+    x: float
+    y: float
+    words: str = ""
+
+
+def through(name: str, points: Sequence[Point], kind: Kind, look: Look = PLAIN) -> Series:
+    """A series of points that have words."""
+    x, y = [p.x for p in points], [p.y for p in points]
+    return Series(name, x, y, kind, look, [p.words for p in points])
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Words with the unit, and the scale."""
+
+    title: str
+    log: bool = False
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes."""
+
+    x: Axis
+    y: Axis
+    series: tuple[Series, ...]
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Panels side by side, at most `columns` in a row, under one legend."""
+
+    name: str
+    title: str
+    panels: tuple[Panel, ...]
+    caption: str = ""
+    alternative: str = ""
+    paper: str = ""
+    columns: int = 2
+
+
+#: Inches of a panel; dots an inch of the PNG.
+WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
+#: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
+DECADES = 300
+#: The same bytes at any time: identifiers from a fixed salt, no date. Words in SVG stay words.
+_STYLE: Any = {
+    "svg.hashsalt": "cembench",
+    "svg.fonttype": "none",
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#e3e7eb",
+    "grid.linewidth": 0.6,
+    "axes.edgecolor": "#6b7683",
+    "axes.axisbelow": True,
+    "text.parse_math": False,
+}
+_NO_DATE = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+
+
+def write_plot(plot: Plot, folder: Path) -> Figure:
+    """Draw a plot into ``folder/figures``; the report's figure, with its files and its data."""
+    place = folder / "figures"
+    place.mkdir(parents=True, exist_ok=True)
+    files = []
+    for form, content in _drawn(plot).items():
+        (place / f"{plot.name}.{form}").write_bytes(content)
+        files.append(PurePosixPath("figures", f"{plot.name}.{form}"))
+    (place / f"{plot.name}.csv").write_text(data_of(plot), encoding="utf-8")
+    return Figure(
+        name=plot.name,
+        title=plot.title,
+        files=tuple(files),
+        caption=plot.caption,
+        data=PurePosixPath("figures", f"{plot.name}.csv"),
+        plot=plotly_of(plot),
+        alternative=plot.alternative,
+        paper=plot.paper,
+    )
+
+
+def data_of(plot: Plot) -> str:
+    """The plotted values as CSV: a line a point."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["panel", "series", "x", "y", "about"])
+    for panel in plot.panels:
+        for series in panel.series:
+            words = series.words or [""] * len(series.x)
+            for x, y, about in zip(series.x, series.y, words, strict=True):
+                writer.writerow([panel.title, series.name, _plain(x), _plain(y), about])
+    return text.getvalue()
+
+
+def _plain(value: Any) -> Any:
+    return float(value) if isinstance(value, np.floating) else value
+
+
+def _drawn(plot: Plot) -> dict[str, bytes]:
+    """The files' contents by form, PNG first."""
+    columns = min(plot.columns, len(plot.panels))
+    rows = -(-len(plot.panels) // columns)
+    tall = max((_names_room(panel) for panel in plot.panels), default=0.0)
+    with rc_context(_STYLE), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
+        single = 1.35 if columns == 1 else 1.0
+        size = (columns * WIDTH * single, rows * (HEIGHT + tall) + 0.35)
+        canvas = Canvas(figsize=size, dpi=DPI, layout="constrained", facecolor="white")
+        FigureCanvasAgg(canvas)
+        for k, panel in enumerate(plot.panels):
+            _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
+        _draw_legend(canvas)
+        canvas.draw_without_rendering()  # arranges the parts, once for all forms
+        canvas.set_layout_engine("none")
+        contents = {}
+        for form in ("png", "svg", "pdf"):
+            buffer = io.BytesIO()
+            canvas.savefig(buffer, format=form, metadata=_NO_DATE[form])
+            contents[form] = buffer.getvalue()
+    return contents | {"png": _with_few_colours(contents["png"])}
+
+
+def _with_few_colours(png: bytes) -> bytes:
+    """The same picture with a table of colours: less than half as large."""
+    buffer = io.BytesIO()
+    with Image.open(io.BytesIO(png)) as picture:
+        few = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
+        few.save(buffer, "PNG", optimize=True, dpi=(DPI, DPI))
+    return buffer.getvalue()
+
+
+def _names_room(panel: Panel) -> float:
+    """Inches for names that stand upright below the axis."""
+    names = [x for series in panel.series for x in series.x if isinstance(x, str)]
+    return min(0.055 * max(map(len, names), default=0), 1.3) if len(set(names)) > 4 else 0.0
+
+
+def _draw_panel(axes: Axes, panel: Panel) -> None:
+    names = list(dict.fromkeys(x for s in panel.series for x in s.x if isinstance(x, str)))
+    bars = [s for s in panel.series if s.kind == "bars"]
+    bottom = np.zeros(len(names))
+    for series in panel.series:
+        x = np.array([names.index(v) if isinstance(v, str) else v for v in series.x], dtype=float)
+        y = np.array([np.nan if v is None else v for v in series.y], dtype=float)
+        label = series.name if series.named else "_"
+        look = series.look
+        if series.kind == "bars":
+            wide = (x[1] - x[0] if not names and len(x) > 1 else 0.8) / len(bars)
+            shift = (bars.index(series) - (len(bars) - 1) / 2) * wide
+            axes.bar(x + shift, y, wide, label=label, color=look.colour, linewidth=0)
+        elif series.kind == "stack":
+            below = bottom[x.astype(int)]
+            axes.bar(x, np.nan_to_num(y), 0.75, below, label=label, color=look.colour)
+            bottom[x.astype(int)] += np.nan_to_num(y)
+        else:
+            style: dict[str, Any] = {"color": look.colour, "label": label, "linewidth": 1.5}
+            style["linestyle"] = "" if series.kind == "points" else look.dash[0]
+            if series.kind == "steps":
+                style["drawstyle"] = "steps-post"
+            if series.kind in ("points", "both"):
+                style |= {"marker": look.marker[0], "markersize": 4.5}
+            axes.plot(x, y, **style)
+    _draw_axes(axes, panel, names)
+
+
+def _draw_axes(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+    axes.set_title(panel.title, fontsize=9.5)
+    axes.set_xlabel(panel.x.title)
+    axes.set_ylabel(panel.y.title)
+    if panel.x.log:
+        axes.set_xscale("log")
+    if panel.y.log:
+        axes.set_yscale("log")
+    axes.set_xlim(panel.x.low, panel.x.high)
+    axes.set_ylim(panel.y.low, panel.y.high)
+    for scale, axis, ends in (
+        (panel.x, axes.xaxis, axes.get_xlim()),
+        (panel.y, axes.yaxis, axes.get_ylim()),
+    ):
+        if scale.log:
+            few = ends[1] < DECADES * ends[0]
+            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value)))
+            axis.set_minor_formatter(NullFormatter())
+    if not panel.x.log and all(isinstance(x, int) for s in panel.series for x in s.x):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    if names:
+        upright = len(names) > 4
+        axes.set_xticks(range(len(names)), names, rotation=90 if upright else 0, fontsize=8)
+        axes.grid(visible=False, axis="x")
+
+
+def _tick(value: float) -> str:
+    """A power of ten, or 2 or 5 times one, as a person writes it."""
+    return f"{value:,.0f}" if value >= 1 else f"{value:.8f}".rstrip("0")
+
+
+def _draw_legend(canvas: Canvas) -> None:
+    found: dict[str, Any] = {}
+    for axes in canvas.axes:
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    if found:
+        across = max(2, int(canvas.get_figwidth() / 1.35))
+        canvas.legend(
+            list(found.values()),
+            list(found),
+            loc="outside lower center",
+            ncols=min(len(found), across),
+            frameon=False,
+            fontsize=8.5,
+        )
+
+
+def plotly_of(plot: Plot) -> dict[str, Any]:
+    """The same as a Plotly figure: ``data`` and ``layout``, values that JSON can hold."""
+    columns = min(plot.columns, len(plot.panels))
+    rows = -(-len(plot.panels) // columns)
+    data: list[dict[str, Any]] = []
+    layout: dict[str, Any] = {
+        "grid": {"rows": rows, "columns": columns, "pattern": "independent"},
+        "barmode": "group",
+        "legend": {"orientation": "h", "y": -0.2 / rows},
+        "margin": {"l": 60, "r": 15, "t": 40, "b": 60},
+        "height": 340 * rows + 90,
+        "annotations": [],
+    }
+    shown: set[str] = set()
+    for k, panel in enumerate(plot.panels):
+        suffix = "" if k == 0 else str(k + 1)
+        layout[f"xaxis{suffix}"] = _plotly_axis(panel.x)
+        layout[f"yaxis{suffix}"] = _plotly_axis(panel.y)
+        if panel.title:
+            layout["annotations"].append(
+                {
+                    "text": panel.title,
+                    "showarrow": False,
+                    "xref": f"x{suffix} domain",
+                    "yref": f"y{suffix} domain",
+                    "x": 0.5,
+                    "y": 1.1,
+                }
+            )
+        for series in panel.series:
+            if series.kind == "stack":
+                layout["barmode"] = "stack"
+            trace = _plotly_trace(series) | {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+            trace["legendgroup"] = series.name
+            trace["showlegend"] = series.named and series.name not in shown
+            shown.add(series.name)
+            data.append(trace)
+    return {"data": data, "layout": layout}
+
+
+def _plotly_axis(axis: Axis) -> dict[str, Any]:
+    described: dict[str, Any] = {"title": {"text": axis.title}, "automargin": True}
+    if axis.log:
+        described |= {"type": "log", "dtick": 1, "exponentformat": "power"}
+    if axis.low is not None or axis.high is not None:
+        ends = [axis.low, axis.high]
+        described["range"] = [np.log10(e).item() if e and axis.log else e for e in ends]
+        if None in described["range"]:
+            described["autorange"] = "max" if axis.high is None else "min"
+    return described
+
+
+def _plotly_trace(series: Series) -> dict[str, Any]:
+    trace: dict[str, Any] = {
+        "name": series.name,
+        "x": [_plain(x) for x in series.x],
+        "y": [_plain(y) for y in series.y],
+    }
+    if series.words:
+        trace |= {"text": list(series.words), "hovertemplate": "%{text}<br>%{x}, %{y}"}
+    look = series.look
+    if series.kind in ("bars", "stack"):
+        return trace | {"type": "bar", "marker": {"color": look.colour}}
+    mode = {"points": "markers", "both": "lines+markers"}.get(series.kind, "lines")
+    trace |= {"type": "scatter", "mode": mode}
+    trace["line"] = {"color": look.colour, "dash": look.dash[1]}
+    if series.kind == "steps":
+        trace["line"]["shape"] = "hv"
+    trace["marker"] = {"color": look.colour, "symbol": look.marker[1]}
+    return trace

@@ -1,0 +1,242 @@
+"""A report as LaTeX: ``report.tex``, and every table as a file of its own.
+
+``pdflatex report.tex`` in the report's folder compiles as it is, with packages that every
+distribution has.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from cembench.core.atomic import write
+from cembench.report.document import (
+    Claim,
+    Column,
+    Figure,
+    Gallery,
+    Gap,
+    Item,
+    Report,
+    Section,
+    Table,
+    Text,
+    marked,
+    tables_of,
+    tex_of,
+)
+
+#: What a character of text becomes; everything else that is not Latin loses its accents or is "?".
+_CHARACTERS = {
+    "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#",
+    "%": r"\%", "_": r"\_", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
+    "<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", '"': r"\textquotedbl{}",
+    "\u1d56": r"\textsuperscript{p}", "\u1d50": r"\textsuperscript{m}",
+    "\u02e2": r"\textsuperscript{s}", "\u2020": r"\textdagger{}",
+    "\u2013": "--", "\u2014": "---", "\u2018": "`", "\u2019": "'", "\u201c": "``", "\u201d": "''",
+    "\u2026": r"\dots{}", "\u2212": "$-$", "\u00b1": r"$\pm$", "\u00b0": r"$^\circ$",
+    "\u00b7": r"$\cdot$", "\u00d7": r"$\times$", "\u2264": r"$\le$", "\u2265": r"$\ge$",
+    "\u221e": r"$\infty$", "\u03c4": r"$\tau$", "\u03c0": r"$\pi$", "\u03c1": r"$\rho$",
+    "\u03bb": r"$\lambda$", "\u00b5": r"$\mu$", "\u00b2": r"\textsuperscript{2}",
+    "\u00b3": r"\textsuperscript{3}", "\n": " ", "\u00a0": "~",
+}  # fmt: skip
+#: Rows of a table that fit on a page; longer ones are continued.
+ROWS = 38
+#: Characters above which a column of words is broken into lines, and parts of the line it gets.
+LONG = 36
+
+PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
+\usepackage[T1]{fontenc}
+\usepackage[utf8]{inputenc}
+\usepackage{textcomp}
+\IfFileExists{lmodern.sty}{\usepackage{lmodern}}{}
+\usepackage[margin=2cm]{geometry}
+\usepackage{booktabs}
+\usepackage{graphicx}
+\usepackage{array}
+\usepackage{caption}
+\captionsetup{labelformat=empty} % titles carry the paper's own numbers
+\usepackage[hidelinks]{hyperref}
+\setlength{\parindent}{0pt}
+\setlength{\parskip}{4pt}
+\sloppy
+"""
+
+
+def write_latex(report: Report, folder: Path) -> Path:
+    """Write ``report.tex`` and ``tables/*.tex``; where is the first?"""
+    for table in tables_of(report):
+        _write(folder / tex_of(table), table_lines(table))
+    lines = [f"% Made by: {escape(report.command)}", PREAMBLE]
+    lines += [rf"\title{{{escape(report.title)}}}", r"\author{}", r"\date{}"]
+    lines += [r"\begin{document}", r"\maketitle", rf"Made by \texttt{{{escape(report.command)}}}."]
+    lines += [r"\begin{description}"]
+    lines += [rf"\item[{escape(name)}] {escape(words)}" for name, words in report.facts]
+    lines += [r"\end{description}", r"\tableofcontents", r"\clearpage"]
+    for section in report.sections:
+        lines += _section(section, 0)
+    lines.append(r"\end{document}")
+    path = folder / "report.tex"
+    _write(path, lines)
+    return path
+
+
+def escape(text: str) -> str:
+    """Text in which every character prints as it is, as far as the fonts have it."""
+    return "".join(_character(c) for c in text)
+
+
+def _character(character: str) -> str:
+    known = _CHARACTERS.get(character)
+    if known is not None:
+        return known
+    if " " <= character <= "~" or "¡" <= character <= "ž":
+        return character
+    plain = unicodedata.normalize("NFKD", character).encode("ascii", "ignore").decode()
+    return "".join(_CHARACTERS.get(c, c) for c in plain) or "?"
+
+
+_LEVELS = ("section", "subsection", "subsubsection", "paragraph")
+
+
+def _section(section: Section, depth: int) -> list[str]:
+    level = _LEVELS[min(depth, len(_LEVELS) - 1)]
+    lines = [r"\clearpage" if section.page else "", rf"\{level}{{{escape(section.title)}}}"]
+    lines.append(rf"\label{{sec:{section.name}}}")
+    for item in section.items:
+        lines += ["", *_item(item)]
+    for below in section.sections:
+        lines += _section(below, depth + 1)
+    return [*lines, r"\clearpage"] if depth == 0 else lines
+
+
+def _item(item: Item) -> list[str]:
+    if isinstance(item, Text):
+        return [escape(item.words)]
+    if isinstance(item, Table):
+        return [rf"\input{{{tex_of(item).with_suffix('')}}}"]
+    if isinstance(item, Figure):
+        return _figures((item,), _title(item), item.caption, f"fig:{item.name}")
+    if isinstance(item, Gallery):
+        return _figures(item.figures, item.title, item.caption, f"fig:{item.name}")
+    if isinstance(item, Gap):
+        how = rf" Made by: \texttt{{{escape(item.command)}}}." if item.command else ""
+        return [rf"\textbf{{Not here: {escape(item.title)}.}} {escape(item.why)}{how}"]
+    return _claim(item)
+
+
+def _title(figure: Figure) -> str:
+    return f"{figure.paper}: {figure.title}" if figure.paper else figure.title
+
+
+def _claim(claim: Claim) -> list[str]:
+    parts = [("Test", claim.test), ("Found", claim.figures), ("Remark", claim.remark)]
+    lines = [
+        rf"\subsubsection*{{{escape(claim.verdict)}: {escape(claim.name)}}}",
+        rf"\begin{{quote}}``{escape(claim.sentence)}'' ({escape(claim.place)})\end{{quote}}",
+        r"\begin{description}",
+    ]
+    lines += [rf"\item[{name}] {escape(words)}" for name, words in parts if words]
+    return [*lines, r"\end{description}"]
+
+
+def _figures(figures: Sequence[Figure], title: str, caption: str, label: str) -> list[str]:
+    """One figure over the whole line, several two in a line, over pages where they are many."""
+    alone = len(figures) == 1
+    width = r"0.95\linewidth" if alone else r"0.47\linewidth"
+    lines = []
+    for k in range(0, len(figures), 8):
+        lines += [r"\begin{figure}[htbp]", r"\centering"]
+        for figure in figures[k : k + 8]:
+            graphic = rf"\includegraphics[width=\linewidth]{{{_printable(figure)}}}"
+            words = "" if alone else rf"\\ {{\small {escape(figure.title)}}}"
+            lines.append(
+                rf"\begin{{minipage}}{{{width}}}\centering {graphic}{words}\end{{minipage}}"
+            )
+        more = " (continued)" if k else ""
+        lines.append(rf"\caption{{{escape(title)}{more}. {escape(caption)}}}")
+        lines.append(rf"\label{{{label}}}" if not k else "")
+        lines.append(r"\end{figure}")
+    return lines
+
+
+def _printable(figure: Figure) -> str:
+    """The form of a figure that pdflatex takes, lines rather than pixels."""
+    forms = {path.suffix: path for path in figure.files}
+    chosen = next((forms[f] for f in (".pdf", ".png", ".jpg", ".jpeg") if f in forms), None)
+    return str(chosen or figure.files[0])
+
+
+def table_lines(table: Table) -> list[str]:
+    """The table as floats; needs the packages booktabs and graphicx."""
+    body = table.rows[: len(table.rows) - table.footer_rows]
+    footer = table.rows[len(body) :]
+    portions = [body[k : k + ROWS] for k in range(0, len(body), ROWS)] or [()]
+    lines = [r"% needs \usepackage{booktabs,graphicx}"]
+    for k, portion in enumerate(portions):
+        last = k == len(portions) - 1
+        more = " (continued)" if k else ""
+        rows = [_row(table, row) for row in portion]
+        if last and footer:
+            rows += [r"\midrule", *(_row(table, row) for row in footer)]
+        lines += [
+            r"\begin{table}[htbp]",
+            r"\centering\small",
+            rf"\caption{{{escape(table.title)}{more}}}",
+            "" if k else rf"\label{{tab:{table.name}}}",
+            # As wide as the line at most, never enlarged.
+            r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
+            rf"\begin{{tabular}}{{{_alignment(table)}}}",
+            r"\toprule",
+            *_heads(table.columns),
+            r"\midrule",
+            *rows,
+            r"\bottomrule",
+            r"\end{tabular}}",
+        ]
+        remarks = [table.caption, *table.notes] if last else []
+        lines += [rf"\par\footnotesize {escape(remark)}" for remark in remarks if remark]
+        lines.append(r"\end{table}")
+    return lines
+
+
+def _alignment(table: Table) -> str:
+    letters = []
+    for k, column in enumerate(table.columns):
+        longest = max((len(row[k].text) for row in table.rows), default=0)
+        words = r"p{0.3\linewidth}" if longest > LONG else "l"
+        letters.append("r" if column.numeric else words)
+    return "".join(letters)
+
+
+def _heads(columns: Sequence[Column]) -> list[str]:
+    """The groups over their columns, with a rule below each, then the titles."""
+    titles = [
+        escape(c.title + (f" [{c.unit}]" if c.unit else "")) if c.title else "" for c in columns
+    ]
+    lines = []
+    if any(column.group for column in columns):
+        cells, rules, place = [], [], 1
+        for group, members in groupby(columns, key=lambda column: column.group):
+            count = len(list(members))
+            cells.append(rf"\multicolumn{{{count}}}{{c}}{{{escape(group)}}}")
+            if group:
+                rules.append(rf"\cmidrule(lr){{{place}-{place + count - 1}}}")
+            place += count
+        lines += [" & ".join(cells) + r" \\", "".join(rules)]
+    return [*lines, " & ".join(titles) + r" \\"]
+
+
+def _row(table: Table, row: Sequence[object]) -> str:
+    cells = [
+        escape(marked(value, column))  # type: ignore[arg-type]
+        for column, value in zip(table.columns, row, strict=True)
+    ]
+    return " & ".join(cells) + r" \\"
+
+
+def _write(path: Path, lines: Iterable[str]) -> None:
+    content = ("\n".join(line for line in lines if line is not None) + "\n").encode()
+    write(path, lambda file: file.write(content))

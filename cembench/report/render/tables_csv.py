@@ -1,0 +1,52 @@
+"""A report's tables as CSV: what is printed, and behind it the full number and its origin."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+from cembench.core.atomic import write
+from cembench.report.document import Column, Report, Table, csv_of, tables_of
+
+
+def write_tables_csv(report: Report, folder: Path) -> list[Path]:
+    """Write every table; which files are they?"""
+    paths = []
+    for table in tables_of(report):
+        path = folder / csv_of(table)
+        content = table_csv(table).encode()
+        write(path, lambda file, content=content: file.write(content))  # type: ignore[misc]
+        paths.append(path)
+    return paths
+
+
+def table_csv(table: Table) -> str:
+    """A line a row; numbers with full precision.
+
+    A numeric column is followed by one with the origins of its numbers and one with what is to be
+    known of them; a gap is empty, its cause is there.
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    headings: list[str] = []
+    for column in table.columns:
+        name = heading(column)
+        headings += [name, f"{name}: origin", f"{name}: note"] if column.numeric else [name]
+    writer.writerow(headings)
+    for row in table.rows:
+        cells: list[str | float | None] = []
+        for column, value in zip(table.columns, row, strict=True):
+            if column.numeric:
+                status = value.text if value.number is None and value.record else ""
+                cells += [value.number, value.origin or status, value.why]
+            else:
+                cells.append(value.text)
+        writer.writerow(cells)
+    return text.getvalue()
+
+
+def heading(column: Column) -> str:
+    """Group, title and unit in one."""
+    named = " ".join(part for part in (column.group, column.title) if part)
+    return f"{named} [{column.unit}]" if column.unit else named

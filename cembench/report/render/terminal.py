@@ -1,0 +1,370 @@
+"""Records as tables on a terminal of 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from cembench.mesh.datasets import Dataset
+from cembench.registry import Algorithm, Surface
+from cembench.report.surface_facts import SurfaceFacts, row_check
+from cembench.results import paper
+from cembench.results.comparison import (
+    UNSTABLE_WIDTH,
+    Change,
+    Comparison,
+    circumstances,
+    compare,
+    is_unstable,
+    references,
+    seconds_interval,
+)
+from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
+from cembench.running.estimate import Estimate
+
+_STYLES = {"ok": "green", "skipped": "yellow"}
+
+
+def status_style(status: str) -> str:
+    """The colour of a status."""
+    return _STYLES.get(status, "bold red")
+
+
+def results_table(records: Iterable[Record]) -> RenderableType:
+    """One line a cell, surfaces apart, policies of solving in tables of their own.
+
+    Mean and SD are of the angles' errors in degrees; seconds are the median of the rounds, and
+    beside them stands half the width of its 95 % interval in percent, with a ! where that is wide.
+    The causes of what did not end ok stand below.
+    """
+    ordered = list(records)
+    policies = list(dict.fromkeys(record.cell.solves for record in ordered))
+    parts: list[RenderableType] = []
+    for policy in policies:
+        chosen = [record for record in ordered if record.cell.solves == policy]
+        if len(policies) > 1:
+            parts.append(Text(f"\nsolves: {policy}", style="bold"))
+        parts.append(_cells_table(chosen))
+    return Group(*parts, *_remarks(ordered))
+
+
+def _cells_table(records: Sequence[Record]) -> Table:
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    longest = max((len(record.cell.algorithm) + 2 for record in records), default=9)
+    room = max(8, min(16, 80 - 53 - longest))
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=room)
+    table.add_column("algorithm", no_wrap=True)
+    for heading in ("E_C", "mean", "SD", "folds", "iter", "seconds", "±%"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("status", no_wrap=True)
+    for mesh, group in groupby(records, key=lambda record: record.cell.mesh):
+        for k, record in enumerate(group):
+            outcome = record.outcome
+            table.add_row(
+                mesh if k == 0 else "",
+                record.cell.algorithm + ("" if record.target == "disk" else " *"),
+                _figure(record, "conformal_energy", ".4f"),
+                _figure(record, "angle_error_mean_deg", ".2f"),
+                _figure(record, "angle_error_sd_deg", ".2f"),
+                _figure(record, "flipped_triangles", "d"),
+                "-" if outcome.iterations is None else str(outcome.iterations),
+                "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
+                _spread(record),
+                Text(outcome.status, style=status_style(outcome.status)),
+            )
+        table.add_section()
+    return table
+
+
+def _spread(record: Record) -> Text:
+    interval, figure = seconds_interval(record), record.outcome.median_seconds
+    if interval is None or not figure:
+        return Text("-")
+    half = f"{50 * (interval.high - interval.low) / figure:.0f}"
+    return Text(half + "!", style="yellow") if is_unstable(record) else Text(half)
+
+
+def _remarks(records: Sequence[Record]) -> list[Text]:
+    remarks = []
+    if any(record.target != "disk" for record in records):
+        kinds = sorted({f"{r.cell.algorithm}: {r.target}" for r in records if r.target != "disk"})
+        remarks.append(Text(f"* not a map to the disk ({'; '.join(kinds)})", style="dim"))
+    if any(is_unstable(record) for record in records):
+        words = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
+        remarks.append(Text(words, style="yellow"))
+    for record in records:
+        name = f"{record.cell.mesh} / {record.cell.algorithm}"
+        remarks += [Text(f"{name}: {note}") for note in record.outcome.notes]
+        if record.outcome.cause:
+            remarks.append(Text(f"{name}: {record.outcome.cause}"))
+    return remarks
+
+
+def speedups_table(records: Sequence[Record], reference: str) -> RenderableType | None:
+    """How much faster is the reference than the others (Eq. 33), and how sure is that?
+
+    Where no cell has rounds enough for an interval that is said once, and a surface has one line.
+    None where there is nothing to compare.
+    """
+    known = references(records, reference)
+    compared = []
+    for record in records:
+        base = known.get(circumstances(record.cell))
+        if base is None or base.cell.algorithm == record.cell.algorithm:
+            continue
+        found = compare(record, base)
+        if found is not None:
+            compared.append((record, found))
+    if not compared:
+        return None
+    heading = Text(
+        f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)", style="bold"
+    )
+    if all(found.verdict == "too few rounds" for _, found in compared):
+        words = (
+            f"How sure these are is not known: that takes {DEFAULT_ROUNDS} rounds "
+            f"(cembench run --repeats {DEFAULT_ROUNDS})."
+        )
+        return Group(heading, _bare_speedups(compared), Text(words, style="dim"))
+    return Group(heading, _sure_speedups(compared, reference))
+
+
+def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str) -> Table:
+    """A line a comparison."""
+    several = _several_policies(compared)
+    table = _surfaces_column(16)
+    table.add_column("algorithm", no_wrap=True)
+    for heading in ("speedup", "95 % interval"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column(f"than {reference}")
+    for record, found in compared:
+        i = found.speedup_interval
+        sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
+        name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
+        table.add_row(record.cell.mesh, name, f"{found.speedup:.2f}", sure, found.verdict)
+    return table
+
+
+def _bare_speedups(compared: Sequence[tuple[Record, Comparison]]) -> Table:
+    """A line a surface, a column an algorithm."""
+    several = _several_policies(compared)
+    names = list(dict.fromkeys(record.cell.algorithm for record, _ in compared))
+    table = _surfaces_column(28)
+    for name in names:
+        table.add_column(name, justify="right", overflow="fold")
+    lines: dict[tuple[str, str], dict[str, str]] = {}
+    for record, found in compared:
+        line = lines.setdefault((record.cell.mesh, record.cell.solves), {})
+        line[record.cell.algorithm] = f"{found.speedup:.2f}"
+    for (mesh, solves), line in lines.items():
+        label = f"{mesh} ({solves})" if several else mesh
+        table.add_row(label, *(line.get(name, "-") for name in names))
+    return table
+
+
+def _surfaces_column(width: int) -> Table:
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=width)
+    return table
+
+
+def _several_policies(compared: Sequence[tuple[Record, Comparison]]) -> bool:
+    return len({record.cell.solves for record, _ in compared}) > 1
+
+
+def changes_table(changes: Sequence[Change]) -> RenderableType:
+    """What became faster or slower from one run to another: the ratio of the seconds."""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=16)
+    table.add_column("algorithm", no_wrap=True)
+    for heading in ("before", "after", "ratio", "interval"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("verdict")
+    for change in changes:
+        found, i = change.comparison, change.comparison.interval
+        table.add_row(
+            change.after.cell.mesh,
+            change.after.cell.algorithm,
+            f"{change.before.outcome.median_seconds:.3f}",
+            f"{change.after.outcome.median_seconds:.3f}",
+            f"{found.ratio:.2f}",
+            "unknown" if i is None else f"{i.low:.2f}-{i.high:.2f}",
+            found.verdict,
+        )
+    return table
+
+
+def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> RenderableType:
+    """What would be run: cell, triangles, what is there already, and what the rest will cost."""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=18)
+    for heading in ("algorithm", "solves"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("faces", "a call", "in all", "memory"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("from", no_wrap=True)
+    for cell, faces, state, cost in lines:
+        figures = ("-", "-", "-")
+        if cost is not None:
+            gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
+            figures = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
+        named = (cell.mesh, cell.algorithm, cell.solves, f"{faces:,}")
+        table.add_row(*named, *figures, state)
+    return table
+
+
+def _figure(record: Record, name: str, form: str) -> str:
+    if name not in record.outcome.metrics:
+        return "-"
+    value = record.outcome.metrics[name]
+    return "inf" if value is None else format(value, form)
+
+
+def figures_table(record: Record) -> Table:
+    """All figures of one record, a line each."""
+    outcome, facts = record.outcome, record.mesh
+    table = Table(box=None, show_header=False, pad_edge=False)
+    table.add_column(style="bold", no_wrap=True)
+    table.add_column()
+    table.add_row(
+        "surface",
+        f"{record.cell.mesh}: {facts.vertices:,} vertices, {facts.faces:,} "
+        f"faces, {facts.boundary_vertices:,} on the boundary, "
+        f"{facts.non_delaunay_share:.1%} of the edges not Delaunay",
+    )
+    if facts.paper_row:
+        table.add_row("in the paper", _printed(record))
+    table.add_row("algorithm", f"{record.title} ({record.target})" + _given(record))
+    for label, name, form, unit in (
+        ("conformal energy", "conformal_energy", ".6f", ""),
+        ("angle error", "angle_error_mean_deg", ".4f", " degrees in the mean"),
+        ("", "angle_error_sd_deg", ".4f", " degrees standard deviation"),
+        ("folded triangles", "flipped_triangles", "d", ""),
+        ("dilatation", "dilatation_mean", ".4f", " in the mean"),
+        ("", "dilatation_max", ".4f", " at most"),
+        ("image area", "image_area", ".6f", ""),
+        ("circularity", "boundary_circularity", ".1e", " off the circle at most"),
+    ):
+        if name in outcome.metrics:
+            table.add_row(label, _figure(record, name, form) + unit)
+    if outcome.iterations:
+        table.add_row("iterations", str(outcome.iterations))
+    if outcome.seconds:
+        phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
+        table.add_row("seconds", f"{outcome.median_seconds:.3f} ({phases})")
+    interval = seconds_interval(record)
+    if interval is not None:
+        sure = f"{interval.low:.4f} to {interval.high:.4f} s over {len(outcome.rounds)} rounds"
+        table.add_row("95 % interval", sure + (", unstable" if is_unstable(record) else ""))
+        table.add_row("fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s")
+    if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
+        table.add_row(
+            "memory",
+            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, "
+            f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
+        )
+    for note in outcome.notes:
+        table.add_row("note", note)
+    return table
+
+
+def _printed(record: Record) -> str:
+    """What the paper says of this surface, and of this algorithm on it; printed, not measured."""
+    row, name = record.mesh.paper_row, record.cell.algorithm
+    what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
+    figures = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
+    energy, mean, sd = (figures.get(name + end) for end in ("", "_mean", "_sd"))
+    if energy is None or mean is None or sd is None:
+        return what
+    return f"{what}; printed: E_C {energy:.4f}, angles {mean:.2f} in the mean, SD {sd:.2f}"
+
+
+def _given(record: Record) -> str:
+    shown = ", ".join(f"{name}={value}" for name, value in record.cell.parameters.items())
+    return f" with {shown}" if shown else ""
+
+
+def algorithms_table(algorithms: Sequence[Algorithm], *, verbose: bool) -> RenderableType:
+    """What algorithms are there; with `verbose` also what each is faithful to and decides."""
+    if not verbose:
+        table = Table(box=None, pad_edge=False, header_style="bold")
+        for heading in ("algorithm", "maps to", "from", "parameters (defaults)"):
+            table.add_column(heading)
+        for a in algorithms:
+            table.add_row(a.name, a.target, a.mesh_type.__name__, _parameters(a))
+        return table
+    parts: list[RenderableType] = []
+    for a in algorithms:
+        parts += [
+            Text.assemble((a.name, "bold"), f"  {a.title}: {a.mesh_type.__name__} to {a.target}"),
+            Text(f"  source: {a.source or 'not given'}"),
+            Text(f"  parameters: {_parameters(a) or 'none'}"),
+            Padding(_flowing(a.notes), (0, 0, 1, 2)),
+        ]
+    return Group(*parts)
+
+
+def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableType:
+    """What surface families are there?"""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("surface", "title", "parameters (defaults)"):
+        table.add_column(heading)
+    if verbose:
+        table.add_column("about")
+    for s in surfaces:
+        row = [s.name, s.title, _parameters(s)]
+        table.add_row(*row, *([_flowing(s.notes)] if verbose else []))
+    return table
+
+
+def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
+    """Counts of surfaces, do they meet the paper's Table 2, and how hard are they to flatten?"""
+    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    table.add_column("surface", no_wrap=True)
+    for heading in ("vertices", "faces", "boundary", "not Delaunay", "span"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("Table 2", no_wrap=True)
+    for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
+        mesh, check = facts.mesh, row_check(facts.mesh)
+        verdict = "-" if check is None else "ok" if check["ok"] else "off"
+        table.add_row(
+            name,
+            f"{mesh.vertices:,}",
+            f"{mesh.faces:,}",
+            f"{mesh.boundary_vertices:,}",
+            f"{mesh.non_delaunay_share:.1%}",
+            f"{facts.conformal_factor_span:.2g}",
+            Text(verdict, style="bold red" if verdict == "off" else ""),
+        )
+    folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
+    words = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
+    return Group(table, Text(f"{words}\nthumbnails: {', '.join(folders)}", style="dim"))
+
+
+def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
+    """What can be fetched, and is it there already?"""
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("dataset", "title", "in the paper"):
+        table.add_column(heading)
+    table.add_column("size", justify="right")
+    table.add_column("licence")
+    table.add_column("here")
+    for d, here in datasets:
+        size = "-" if d.size is None else f"{d.size / 1e6:.1f} MB"
+        table.add_row(d.name, d.title, d.paper_row or "-", size, d.licence, "yes" if here else "no")
+    return table
+
+
+def _flowing(text: str) -> str:
+    """Let paragraphs of a docstring wrap at the terminal's width."""
+    return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
+
+
+def _parameters(registered: Algorithm | Surface) -> str:
+    return ", ".join(f"{p.name}={p.default}" for p in registered.parameters)

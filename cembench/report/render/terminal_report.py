@@ -1,0 +1,82 @@
+"""A report's tables on a terminal of 80 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table as Lines
+from rich.text import Text
+
+from cembench.report.document import ORIGINS, Column, Report, Table, Value, marked, tables_of
+
+#: The tables that `report` and `reproduce` show, and those that stand in where there are none.
+SHOWN = ("table-1", "table-2", "table-3", "table-4")
+_BESIDE = ("printed", "here")
+#: Characters of a line, and the fewest that are left for a surface's name.
+WIDTH, NAME = 80, 12
+_ABSENT = "not in this run: "
+
+
+def paper_tables(report: Report) -> RenderableType:
+    """The paper's four tables, what was printed above what was measured, surface by surface."""
+    tables = {table.name: table for table in tables_of(report)}
+    chosen = [
+        tables[name]
+        for name in (n if n in tables else f"{n}-other-surfaces" for n in SHOWN)
+        if name in tables
+    ]
+    parts: list[RenderableType] = []
+    for table in chosen:
+        parts += [Text(table.title, style="bold"), _folded(table)]
+        notes = [note for note in table.notes if not note.startswith(_ABSENT)]
+        parts += [Padding(Text(note, style="dim"), (0, 0, 0, 2)) for note in notes]
+        parts.append(Text(""))
+    absent = {note for table in chosen for note in table.notes if note.startswith(_ABSENT)}
+    parts += [Text(note, style="dim") for note in sorted(absent)]
+    marks = [f"{mark} {words}" for words, mark in ORIGINS.values() if mark and mark != "ᵖ"]
+    return Group(*parts, Text(f"{'; '.join(marks)}; † misprint; ! unstable", style="dim"))
+
+
+def _folded(table: Table) -> Lines:
+    """A line a row and kind: "printed" and "here" stand below each other, not side by side."""
+    places = [k for k, column in enumerate(table.columns) if column.numeric and column.group]
+    groups = list(dict.fromkeys(table.columns[k].group for k in places))
+    kinds = [k for k in _BESIDE if any(table.columns[p].title == k for p in places)]
+    lines = Lines(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
+    wide = [_width(table, group) for group in groups]
+    room = max(NAME, WIDTH - len("paper") - 2 - sum(wide) - len(wide))
+    lines.add_column("surface", no_wrap=True, overflow="ellipsis", max_width=room)
+    lines.add_column("", no_wrap=True)
+    for group, width in zip(groups, wide, strict=True):
+        lines.add_column(group, justify="right", min_width=width)
+    body = len(table.rows) - table.footer_rows
+    for number, row in enumerate(table.rows):
+        if number == body:
+            lines.add_section()
+        for k, kind in enumerate(kinds):
+            cells = [_cell(table.columns, row, group, kind) for group in groups]
+            name = row[0].text if k == 0 or number >= body else ""
+            short = "paper" if kind == "printed" else kind
+            lines.add_row(name, short, *cells, style="dim" if kind == "printed" else "")
+    return lines
+
+
+def _width(table: Table, group: str) -> int:
+    """Characters of the longest entry of a group, and of the longest word over it."""
+    entries = [
+        marked(row[k], column)
+        for k, column in enumerate(table.columns)
+        if column.group == group
+        for row in table.rows
+    ]
+    return max(map(len, [*entries, *group.split()]), default=0)
+
+
+def _cell(columns: Sequence[Column], row: Sequence[Value], group: str, kind: str) -> Text:
+    for column, value in zip(columns, row, strict=True):
+        if column.group == group and column.title == kind:
+            lacking = value.number is None and value.record
+            return Text(marked(value, column), style="bold red" if lacking else "")
+    return Text("")

@@ -1,0 +1,172 @@
+"""What is known of a registered surface: its counts, how hard it is to flatten, and how it looks.
+
+A surface that is kept on disk once it has been made has its facts and a thumbnail beside it, so
+that they are there at once the next time.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from cembench.conformal.metrics import all_metrics
+from cembench.conformal.planar import signed_areas
+from cembench.core.atomic import read_model, write_model
+from cembench.core.errors import RecordError, RegistryError
+from cembench.mesh.datasets import CACHE_VARIABLE
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import Algorithm, Registry, Surface
+from cembench.results import paper
+from cembench.results.records import MeshFacts
+from cembench.running.plan import code_hash, generate_surface, mesh_facts, standing_of
+
+#: Whose map tells how unevenly a surface is scaled when it is flattened.
+MAPPED_BY = "cem"
+#: How far a stand-in's counts may be from its row's (relative).
+FACES_OFF, BOUNDARY_OFF = 0.01, 0.10
+
+
+class SurfaceFacts(BaseModel):
+    """A surface at its own size, and a conformal map of it to the disk."""
+
+    mesh: MeshFacts
+    mesh_hash: str
+    #: Source of the algorithm that made the map: of another one the facts are not these.
+    code_hash: str
+    iterations: int | None
+    #: Of the map (cembench.conformal.metrics).
+    metrics: dict[str, float | int]
+    #: See :func:`factor_spans`.
+    conformal_factor_span: float
+    conformal_factor_span_99_8: float
+    #: The PNG file with its picture.
+    thumbnail: str
+
+
+def kept_facts(registry: Registry, surface: Surface) -> SurfaceFacts | None:
+    """What was found of this surface before? None: nothing, or nothing that still holds."""
+    if surface.kept is None:
+        return None
+    place = _place(surface)
+    if not place.is_file():
+        return None
+    try:
+        facts = read_model(place, SurfaceFacts)
+    except (RecordError, OSError):  # damaged, of another version or another user: found anew
+        return None
+    held = facts.code_hash == code_hash(_mapper(registry)) and Path(facts.thumbnail).is_file()
+    return facts if held else None
+
+
+def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
+    """Make a surface, map it, draw it, and keep what was found beside it.
+
+    Raises
+    ------
+    RegistryError
+        A surface that is not kept on disk.
+    RecordError
+        The place where it is kept cannot be written to.
+    MeshError, AlgorithmFailed, RenderError
+        It cannot be made, mapped, or drawn.
+
+    """
+    if surface.kept is None:
+        raise RegistryError(
+            f"surface {surface.name!r} is not kept on disk; declare it with @surface(..., kept=...)"
+        )
+    from cembench.drawing.preview import write_thumbnail  # slow to import, and seldom needed
+
+    place, mapper = _place(surface), _mapper(registry)
+    _check_writable(place.parent)
+    mesh = generate_surface(registry, surface.name)
+    found = mapper.function(mesh, **mapper.arguments({}))
+    thumbnail = place.with_suffix(".png")
+    write_thumbnail(mesh, found.uv, thumbnail)
+    facts = SurfaceFacts(
+        mesh=mesh_facts(mesh, **_standing(registry, surface)),
+        mesh_hash=mesh.hash,
+        code_hash=code_hash(mapper),
+        iterations=found.iterations,
+        metrics=all_metrics(mesh, found.uv),
+        **factor_spans(mesh, found.uv),
+        thumbnail=str(thumbnail),
+    )
+    write_model(place, facts)
+    return facts
+
+
+def factor_spans(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, float]:
+    """How unevenly does a map scale lengths: largest over smallest factor of a triangle?
+
+    The factor is the root of image area over surface area, a ratio of lengths.
+    `conformal_factor_span` is the ratio of the extremes, `conformal_factor_span_99_8` that of the
+    99.9 and 0.1 percentiles over the triangles.
+    """
+    image = np.abs(signed_areas(uv, mesh.F))
+    p, q, r = (mesh.V[mesh.F[:, k]] for k in range(3))
+    flat = np.linalg.norm(np.cross(q - p, r - p), axis=1) / 2
+    factor = np.sqrt(np.maximum(image, 1e-300) / flat)
+    low, high = np.percentile(factor, [0.1, 99.9])
+    return {
+        "conformal_factor_span": float(factor.max() / factor.min()),
+        "conformal_factor_span_99_8": float(high / low),
+    }
+
+
+def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
+    """How near does a surface come to its row of the paper's Table 2? None: it has no row.
+
+    Deviations are relative to the row's counts; a disk with V vertices and F triangles has
+    2 V - F - 2 vertices on its boundary.
+    """
+    row: Mapping[str, float | None] = paper.table(2).get(mesh.paper_row, {})
+    vertices, faces = row.get("vertices"), row.get("faces")
+    if vertices is None or faces is None:
+        return None
+    boundary = 2 * vertices - faces - 2
+    faces_off, boundary_off = mesh.faces / faces - 1, mesh.boundary_vertices / boundary - 1
+    return {
+        "row_faces": int(faces),
+        "row_vertices": int(vertices),
+        "row_boundary": int(boundary),
+        "faces_off": faces_off,
+        "boundary_off": boundary_off,
+        "ok": abs(faces_off) <= FACES_OFF
+        and abs(boundary_off) <= BOUNDARY_OFF
+        and not any(notice.startswith("Definition 1") for notice in mesh.notices),
+    }
+
+
+def _place(surface: Surface) -> Path:
+    assert surface.kept is not None
+    return surface.kept(**surface.arguments({})).with_suffix(".json")
+
+
+def _check_writable(folder: Path) -> None:
+    """Raise before minutes are spent on what could not be kept."""
+    reason = "" if os.access(folder, os.W_OK) or not folder.exists() else "no permission"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+    if reason:
+        raise RecordError(
+            f"the cache {folder} cannot be written to: {reason}. Set {CACHE_VARIABLE} to another "
+            "folder."
+        )
+
+
+def _mapper(registry: Registry) -> Algorithm:
+    return registry.algorithm(MAPPED_BY)
+
+
+def _standing(registry: Registry, surface: Surface) -> dict[str, Any]:
+    known = standing_of(registry, [surface.name])
+    return {"standing": known[surface.name]} if known else {}

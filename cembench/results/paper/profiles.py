@@ -1,0 +1,73 @@
+"""Which surfaces does a profile name, and which algorithms?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import StrEnum
+
+from cembench.results import paper
+from cembench.core.errors import RegistryError
+from cembench.registry import Registry
+
+#: How many of the smallest models `quick` takes, and the most triangles in `standard`.
+QUICK_MODELS = 8
+STANDARD_FACES = 210_000
+
+
+class Profile(StrEnum):
+    """Parts of the paper's list of models."""
+
+    quick = "quick"
+    standard = "standard"
+    paper = "paper"
+
+
+def models(profile: Profile) -> list[str]:
+    """The models that the profile takes, smallest first."""
+    ordered = sorted(paper.table(1), key=paper.faces)
+    chosen: dict[Profile, Callable[[], list[str]]] = {
+        Profile.quick: lambda: ordered[:QUICK_MODELS],
+        Profile.standard: lambda: [m for m in ordered if paper.faces(m) <= STANDARD_FACES],
+        Profile.paper: lambda: ordered,
+    }
+    return chosen[profile]()
+
+
+def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
+    """The registered surfaces that stand for the profile's models, smallest model first.
+
+    Raises
+    ------
+    RegistryError
+        No surface stands for one of the models, or two do.
+
+    """
+    standing: dict[str, list[str]] = {}
+    for surface in registry.surfaces.values():
+        if surface.paper_row:
+            standing.setdefault(surface.paper_row, []).append(surface.name)
+    wanted = models(profile)
+    missing = [model for model in wanted if model not in standing]
+    if missing:
+        raise RegistryError(
+            f"profile {profile.value!r}: no surface stands for {', '.join(missing)}; "
+            "name --surfaces or --mesh instead, or declare one with "
+            '@surface(..., paper_row="...").'
+        )
+    for model in wanted:
+        if len(standing[model]) > 1:
+            raise RegistryError(
+                f"two surfaces stand for {model}: {', '.join(standing[model])}; only one can. "
+                "Leave out a --plugin, or name --surfaces."
+            )
+    return [standing[model][0] for model in wanted]
+
+
+def algorithms_of(profile: Profile, registry: Registry) -> list[str]:
+    """The algorithms that a run of the profile takes if none are named.
+
+    `quick` takes those of the paper's tables, so that it stays quick; the others take all.
+    """
+    if profile is Profile.quick:
+        return [name for name in paper.ALGORITHMS if name in registry.algorithms]
+    return list(registry.algorithms)

@@ -1,0 +1,88 @@
+"""Records as flat rows: the one place where a table's columns come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from cembench.results.comparison import (
+    circumstances,
+    compare,
+    is_unstable,
+    references,
+    seconds_interval,
+)
+from cembench.results.records import Record
+
+#: Whose times the others' are compared with, as in the paper's Table 2.
+REFERENCE = "cem"
+
+
+def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str, Any]]:
+    """All records of a run as flat rows, each compared with the reference on its surface."""
+    known = references(records, reference)
+    return [row(r) | _compared(r, known.get(circumstances(r.cell))) for r in records]
+
+
+def _compared(record: Record, reference: Record | None) -> dict[str, Any]:
+    """Speedup of the reference over this record's algorithm (Eq. 33), and the verdict on this."""
+    found = None
+    if reference is not None and reference.cell.algorithm != record.cell.algorithm:
+        found = compare(record, reference)
+    interval = found.speedup_interval if found else None
+    return {
+        "reference": reference.cell.algorithm if found and reference else None,
+        "speedup": found.speedup if found else None,
+        "speedup_low": interval.low if interval else None,
+        "speedup_high": interval.high if interval else None,
+        "verdict": found.verdict if found else None,
+    }
+
+
+def row(record: Record) -> dict[str, Any]:
+    """One record as one flat row; the metrics stand under their own names.
+
+    `seconds_raw` holds the figure of each round, `seconds_calls` every timed call by round.
+    """
+    cell, outcome = record.cell, record.outcome
+    interval = seconds_interval(record)
+    return {
+        "mesh": cell.mesh,
+        "algorithm": cell.algorithm,
+        "title": record.title,
+        "target": record.target,
+        "parameters": cell.parameters,
+        "status": outcome.status,
+        "cause": outcome.cause,
+        **outcome.metrics,
+        "boundaries": [boundary.model_dump() for boundary in outcome.boundaries],
+        "iterations": outcome.iterations,
+        "seconds": outcome.median_seconds,
+        "seconds_raw": list(outcome.seconds),
+        "seconds_low": interval.low if interval else None,
+        "seconds_high": interval.high if interval else None,
+        "seconds_min": min((min(r.calls) for r in outcome.rounds), default=None),
+        "seconds_calls": [list(r.calls) for r in outcome.rounds],
+        "unstable": is_unstable(record),
+        "phases": outcome.phases,
+        "peak_memory_bytes": outcome.peak_memory_bytes,
+        "memory_increase_bytes": outcome.memory_increase_bytes,
+        "notes": list(outcome.notes),
+        "energy_history": list(outcome.energy_history),
+        "extras": outcome.extras,
+        "vertices": record.mesh.vertices,
+        "faces": record.mesh.faces,
+        "boundary_vertices": record.mesh.boundary_vertices,
+        "non_delaunay_share": record.mesh.non_delaunay_share,
+        "notices": list(record.mesh.notices),
+        "origin": record.mesh.origin,
+        "paper_row": record.mesh.paper_row or None,
+        "solves": cell.solves,
+        "backend": cell.backend,
+        "threads": cell.threads,
+        "mesh_hash": cell.mesh_hash,
+        "repeats": cell.repeats,
+        "environment": record.environment,
+        "started_at": record.started_at,
+        "key": cell.key,
+    }

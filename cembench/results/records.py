@@ -1,0 +1,166 @@
+"""The schema of everything that is written down: what was measured, and what came out.
+
+Infinite figures (the dilatation of a collapsed triangle) are null in JSON.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+#: Changes when a record's meaning does; a record of another version is not resumed from.
+SCHEMA_VERSION = 1
+
+#: The fewest rounds whose smallest and largest figure enclose the median in 95 % of all cases: the
+#: chance that all lie on one side of it is 2 / 2^6.
+DEFAULT_ROUNDS = 6
+
+#: Is a surface a model of the paper, a stand-in for one, or neither?
+MeshOrigin = Literal["model", "stand-in", "surface"]
+
+Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
+
+
+class Cell(BaseModel):
+    """One thing to measure; cells with equal content have equal keys and are measured once."""
+
+    model_config = ConfigDict(frozen=True)
+
+    algorithm: str
+    parameters: dict[str, Any] = Field(default_factory=dict)
+    #: SHA-256 of the source file that declares the algorithm: an edited plug-in is a new cell.
+    code_hash: str
+    mesh: str
+    mesh_hash: str
+    solves: str = "reuse"
+    backend: str = "cvxopt"
+    threads: int = 1
+    #: Rounds, each a fresh process; see docs/measuring.md.
+    repeats: int = DEFAULT_ROUNDS
+
+    @property
+    def key(self) -> str:
+        """Hash of the content; the mesh's name is only a label and does not count."""
+        content = self.model_dump(exclude={"mesh"}) | {"schema": SCHEMA_VERSION}
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    @property
+    def label(self) -> str:
+        """A file name that a person can read and that no other cell has."""
+        return f"{self.mesh}--{self.algorithm}--{self.key[:12]}"
+
+
+class MeshFacts(BaseModel):
+    """What a table says of a surface beside its name."""
+
+    vertices: int
+    faces: int
+    boundary_vertices: int
+    non_delaunay_share: float
+    notices: tuple[str, ...] = ()
+    #: The model of the paper's Table 1 that it is ("model") or stands for ("stand-in"), if any.
+    paper_row: str = ""
+    origin: MeshOrigin = "surface"
+
+
+class Round(BaseModel):
+    """The timed calls of one process: a round has one such process for every cell."""
+
+    #: Which invocation measured it; only rounds of one sitting were measured side by side.
+    sitting: str = ""
+    started_at: str = ""
+    #: Wall-clock seconds of each timed call after the warm-up, in order.
+    calls: tuple[float, ...]
+    #: Seconds by phase of the call that is the round's figure; they add up to it.
+    phases: dict[str, float] = Field(default_factory=dict)
+    #: SHA-256 of the map's bytes.
+    uv_hash: str | None = None
+
+    @property
+    def seconds(self) -> float:
+        """The round's figure: the median of its calls."""
+        return lower_median(self.calls)
+
+
+class Boundary(BaseModel):
+    """The circle fitted to a boundary's image; null where the image determines none."""
+
+    model_config = ConfigDict(frozen=True, ser_json_inf_nan="null")
+
+    #: The smallest vertex of the loop, and how many it has.
+    vertex: int
+    vertices: int
+    #: Centre, real and imaginary part.
+    centre: tuple[float, float]
+    radius: float | None
+    #: The largest distance from the circle, relative to its radius.
+    circularity: float | None
+
+
+class Outcome(BaseModel):
+    """What one cell's processes have to tell, or what is told of one that cannot."""
+
+    model_config = ConfigDict(ser_json_inf_nan="null")
+
+    status: Status
+    #: Why the status is not "ok"; None otherwise.
+    cause: str | None = None
+    #: The algorithm itself said that it found no map (AlgorithmFailed).
+    gave_up: bool = False
+    traceback: str | None = None
+    #: In order; empty where no call was timed.
+    rounds: tuple[Round, ...] = ()
+    #: Figures computed by the harness (cembench.conformal.metrics); null where infinite.
+    metrics: dict[str, float | int | None] = Field(default_factory=dict)
+    #: Of a surface with holes: the circles of its boundaries, the outer one first.
+    boundaries: tuple[Boundary, ...] = ()
+    iterations: int | None = None
+    energy_history: tuple[float, ...] = ()
+    extras: dict[str, Any] = Field(default_factory=dict)
+    uv_hash: str | None = None
+    #: Largest resident set up to the end of one call, mesh and libraries included.
+    peak_memory_bytes: int | None = None
+    #: The same, less the resident set before the call.
+    memory_increase_bytes: int | None = None
+    #: What the user should know of the measurement.
+    notes: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> tuple[float, ...]:
+        """The figure of each round, in order."""
+        return tuple(r.seconds for r in self.rounds)
+
+    @property
+    def median_seconds(self) -> float | None:
+        """The cell's figure: the median over its rounds."""
+        return lower_median(self.seconds) if self.rounds else None
+
+    @property
+    def phases(self) -> dict[str, float]:
+        """Seconds by phase; they add up to :attr:`median_seconds`."""
+        figure = self.median_seconds
+        return next((r.phases for r in self.rounds if r.seconds == figure), {})
+
+
+def lower_median(values: Sequence[float]) -> float:
+    """The middle value, the lower of two: one that was measured, so that its phases are known."""
+    return sorted(values)[(len(values) - 1) // 2]
+
+
+class Record(BaseModel):
+    """A cell, its surface, its outcome and where it was measured: one JSON file."""
+
+    model_config = ConfigDict(ser_json_inf_nan="null")
+
+    schema_version: int = SCHEMA_VERSION
+    cell: Cell
+    title: str
+    target: str
+    mesh: MeshFacts
+    outcome: Outcome
+    environment: str
+    started_at: str

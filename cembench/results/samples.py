@@ -1,0 +1,95 @@
+"""What was measured so far of a cell that is not finished: a journal, a line for each process.
+
+A line is handed to the system when a process has ended: no kill takes it back. (A power cut can:
+flushing the disk would cost more than all other book-keeping.) One that a kill cut short is not
+there for a reader, and is cut off before the next is written. Journals are kept by environment:
+rounds of two machines, or of two commits, never come together in one record.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
+
+from cembench.core.atomic import unwritable, write
+from cembench.core.errors import RecordError
+from cembench.results.records import Outcome, Round
+
+
+class Entry(BaseModel):
+    """A line of a journal: the outcome of the check, or a round with its number from 0."""
+
+    check: Outcome | None = None
+    number: int | None = None
+    round: Round | None = None
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The journal of one cell in one environment, a ``.jsonl``; the map is an ``.npz`` beside."""
+
+    journal: Path
+
+    def save_check(self, outcome: Outcome, uv: NDArray[np.complex128] | None) -> None:
+        """Keep what the checked call came to: the map first, so that it is there with it."""
+        if uv is not None:
+            write(self._map, lambda file: np.savez(file, uv=uv))
+        self._append(Entry(check=outcome))
+
+    def check(self) -> Outcome | None:
+        """What the checked call came to; None where there was none yet."""
+        return next((entry.check for entry in self._entries() if entry.check), None)
+
+    def uv(self) -> NDArray[np.complex128] | None:
+        """The map of the checked call (n,)."""
+        return read_map(self._map)
+
+    def save_round(self, number: int, measured: Round) -> None:
+        """Keep one round; rounds are numbered from 0."""
+        self._append(Entry(number=number, round=measured))
+
+    def rounds(self) -> dict[int, Round]:
+        """The rounds that are there, by number, in order."""
+        found = {e.number: e.round for e in self._entries() if e.number is not None and e.round}
+        return {number: found[number] for number in sorted(found)}
+
+    @property
+    def _map(self) -> Path:
+        return self.journal.with_suffix(".npz")
+
+    def _entries(self) -> list[Entry]:
+        if not self.journal.exists():
+            return []
+        lines = _whole_lines(self.journal.read_bytes()).splitlines()
+        try:
+            return [Entry.model_validate_json(line) for line in lines]
+        except ValidationError as error:
+            raise RecordError(
+                f"{self.journal} is damaged: {error.errors()[0]['msg']}. Delete it and run again."
+            ) from error
+
+    def _append(self, entry: Entry) -> None:
+        try:
+            self.journal.parent.mkdir(parents=True, exist_ok=True)
+            with self.journal.open("ab+") as file:
+                file.seek(0)
+                file.truncate(len(_whole_lines(file.read())))
+                file.write(entry.model_dump_json(exclude_none=True).encode() + b"\n")
+        except OSError as error:
+            raise unwritable(self.journal, error) from error
+
+
+def _whole_lines(text: bytes) -> bytes:
+    return text[: text.rfind(b"\n") + 1]
+
+
+def read_map(path: Path) -> NDArray[np.complex128] | None:
+    """A map (n,) that was kept as ``uv`` in an archive; None where there is none."""
+    if not path.exists():
+        return None
+    with np.load(path) as archive:
+        return np.asarray(archive["uv"])

@@ -1,0 +1,252 @@
+"""A run on disk: one JSON record a cell, its map beside it, and the machine it was measured on.
+
+::
+
+    RUN/records/<mesh>--<algorithm>--<key>.json
+    RUN/maps/<mesh>--<algorithm>--<key>.npz       uv, complex128 (n,)
+    RUN/meshes/<hash>.npz                         V, F and name: what the maps are maps of
+    RUN/environments/<id>.json
+    RUN/plan.json                                 the cells that were last asked for
+    RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
+        <id>.jsonl  <id>.npz                      a line for each process that has ended, the map
+    RUN/lock                                      held by the run that measures
+
+Every other file is written to a draft, flushed to disk and renamed: it is whole or not there.
+A cell's samples become its record when the last is there; the record is written before they are
+deleted, so that whatever moment a run is killed at, each finished process is known exactly once.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+from numpy.typing import NDArray
+from pydantic import TypeAdapter
+
+from cembench.core.atomic import DRAFT, flush_folder, read_model, unwritable, write, write_model
+from cembench.core.errors import RecordError
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.results.records import SCHEMA_VERSION, Cell, Record
+from cembench.results.samples import Samples, read_map
+
+
+class Store:
+    """The records under one folder, which is made when the first is saved."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def find(self, cell: Cell) -> Record | None:
+        """What was recorded of this cell, if anything, under whatever name its mesh had?"""
+        path = self._record_path(cell)
+        if path.exists():
+            return _read_record(path)
+        others = sorted((self.folder / "records").glob(f"*--{cell.key[:12]}.json"))
+        return _read_record(others[0]) if others else None
+
+    def rename(self, record: Record, cell: Cell, *, keep: bool) -> Record:
+        """Record the same under the name that the cell's mesh has now; with `keep` also as it was.
+
+        `cell` has the record's key: nothing but the name differs.
+        """
+        renamed = record.model_copy(update={"cell": cell})
+        environment = self.environments().get(record.environment, {"id": record.environment})
+        self.save(renamed, self.uv(record.cell), environment)
+        if not keep:
+            self._record_path(record.cell).unlink(missing_ok=True)
+            self._map_path(record.cell).unlink(missing_ok=True)
+        return renamed
+
+    def records(self) -> list[Record]:
+        """All records, by name of their files.
+
+        Raises
+        ------
+        RecordError
+            The folder holds no run, or a record is damaged or of another schema.
+
+        """
+        if not (self.folder / "records").is_dir():
+            raise RecordError(
+                f"{self.folder} holds no run: there is no folder {self.folder / 'records'}. "
+                "Make one with `cembench run`."
+            )
+        return self.finished()
+
+    def finished(self) -> list[Record]:
+        """As :meth:`records`, but none where no cell is finished yet."""
+        return [_read_record(path) for path in sorted((self.folder / "records").glob("*.json"))]
+
+    def save(
+        self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
+    ) -> None:
+        """Write the environment, the map and last the record, so that a record finds its map."""
+        about = self.folder / "environments" / f"{record.environment}.json"
+        if not about.exists():
+            write(about, lambda file: file.write(json.dumps(environment, indent=2).encode()))
+        if uv is not None:
+            write(self._map_path(record.cell), lambda file: np.savez_compressed(file, uv=uv))
+        else:
+            self._map_path(record.cell).unlink(missing_ok=True)
+        path = self._record_path(record.cell)
+        write_model(path, record)
+        for folder in (self._map_path(record.cell).parent, path.parent):
+            if folder.exists():
+                flush_folder(folder)
+        self.forget_samples(record.cell)
+
+    def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
+        """The recorded map (n,), or None where there is none."""
+        return read_map(self._map_path(cell))
+
+    def save_mesh(self, mesh: TriangleMesh) -> None:
+        """Keep a surface, once: with its map, every metric can be computed again."""
+        path = self._mesh_path(mesh.hash)
+        if not path.exists():
+            name = np.array(mesh.name)
+            write(path, lambda file: np.savez(file, V=mesh.V, F=mesh.F, name=name))
+
+    def mesh(self, cell: Cell) -> TriangleMesh | None:
+        """The surface that a cell was measured on, or None where it was not kept.
+
+        Raises
+        ------
+        RecordError
+            The file is damaged, or holds another surface.
+
+        """
+        path = self._mesh_path(cell.mesh_hash)
+        if not path.exists():
+            return None
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                mesh = TriangleMesh(data["V"], data["F"].astype(np.int64), str(data["name"]))
+        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+            raise RecordError(
+                f"{path} cannot be read ({error}). Delete it and run again."
+            ) from error
+        if mesh.hash != cell.mesh_hash:
+            raise RecordError(f"{path} holds another surface than its name says; delete it.")
+        return mesh
+
+    def samples(self, cell: Cell, environment: str) -> Samples:
+        """What was measured so far of a cell in this environment, and goes on to be."""
+        return Samples(self.folder / "samples" / cell.label / f"{environment}.jsonl")
+
+    def rounds_done(self, cell: Cell) -> int | None:
+        """How many rounds of an unfinished cell are kept? None where it was not begun."""
+        journals = (self.folder / "samples" / cell.label).glob("*.jsonl")
+        return max((len(Samples(journal).rounds()) for journal in journals), default=None)
+
+    def forget_samples(self, cell: Cell) -> None:
+        """Delete what is kept of an unfinished cell."""
+        shutil.rmtree(self.folder / "samples" / cell.label, ignore_errors=True)
+
+    def save_plan(self, cells: Sequence[Cell]) -> None:
+        """Keep which cells were asked for, in order."""
+        text = _CELLS.dump_json(list(cells), indent=1)
+        write(self.folder / "plan.json", lambda file: file.write(text))
+
+    def plan(self) -> list[Cell]:
+        """The cells that were last asked for; none where no plan was kept."""
+        path = self.folder / "plan.json"
+        return _CELLS.validate_json(path.read_bytes()) if path.exists() else []
+
+    def environments(self) -> dict[str, dict[str, Any]]:
+        """What is known of the machines, by id."""
+        paths = sorted((self.folder / "environments").glob("*.json"))
+        return {path.stem: json.loads(path.read_bytes()) for path in paths}
+
+    @contextmanager
+    def locked(self, waiting: Callable[[], None] = lambda: None) -> Iterator[Path]:
+        """Be the only one who measures into this folder; gives a folder for temporary files.
+
+        Two runs at a time would slow each other and be wrong about both. So the second waits, after
+        calling `waiting`, and then finds done what the first did. The system frees the lock of a
+        run that is killed; what that left half-written is cleared away here.
+        """
+        lock = self._lock()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            try:
+                lock.acquire(timeout=0)
+            except Timeout:
+                waiting()
+                lock.acquire()
+        except OSError as error:
+            raise unwritable(self.folder / "lock", error) from error
+        scratch = self.folder / "scratch"
+        try:
+            shutil.rmtree(scratch, ignore_errors=True)
+            for draft in self.folder.rglob(f"{DRAFT}*"):
+                draft.unlink(missing_ok=True)
+            scratch.mkdir()
+            yield scratch
+        finally:
+            shutil.rmtree(scratch, ignore_errors=True)
+            lock.release()
+
+    def is_locked(self) -> bool:
+        """Is somebody measuring into this folder now?"""
+        if not (self.folder / "lock").exists():
+            return False
+        try:
+            with self._lock().acquire(timeout=0):
+                return False
+        except Timeout:
+            return True
+
+    def _lock(self) -> FileLock:
+        return FileLock(self.folder / "lock")
+
+    def _record_path(self, cell: Cell) -> Path:
+        return self.folder / "records" / f"{cell.label}.json"
+
+    def _map_path(self, cell: Cell) -> Path:
+        return self.folder / "maps" / f"{cell.label}.npz"
+
+    def _mesh_path(self, mesh_hash: str) -> Path:
+        return self.folder / "meshes" / f"{mesh_hash[:32]}.npz"
+
+
+def merge(runs: Iterable[Store], into: Store) -> int:
+    """Bring the records of several runs together; how many are there then?
+
+    Of a cell that several runs hold, one that ended ok counts before one that did not, and then
+    the later one.
+    """
+    best: dict[str, tuple[tuple[bool, str], Store, Record]] = {}
+    for run in [*runs, *([into] if (into.folder / "records").is_dir() else [])]:
+        for record in run.records():
+            rank = (record.outcome.status == "ok", record.started_at)
+            key = record.cell.key
+            if key not in best or best[key][0] < rank:
+                best[key] = (rank, run, record)
+    for _, run, record in best.values():
+        environment = run.environments().get(record.environment, {"id": record.environment})
+        into.save(record, run.uv(record.cell), environment)
+        mesh = run.mesh(record.cell)
+        if mesh is not None:
+            into.save_mesh(mesh)
+    return len(best)
+
+
+_CELLS = TypeAdapter(list[Cell])
+
+
+def _read_record(path: Path) -> Record:
+    record = read_model(path, Record)
+    if record.schema_version != SCHEMA_VERSION:
+        raise RecordError(
+            f"{path} is of schema version {record.schema_version}; this cembench reads "
+            f"{SCHEMA_VERSION}. Run again into another folder."
+        )
+    return record

@@ -1,0 +1,122 @@
+"""How long will a run take, and how much memory? Said before it starts, from what is known.
+
+A call's seconds are taken from an earlier record of the same cell; else from a power law in the
+number of triangles through the algorithm's records; else, roughly, from the power law through the
+paper's Table 1 (its slowest algorithm for one that the paper does not have).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from statistics import mean
+from typing import Literal
+
+from cembench.results import paper
+from cembench.results.records import Cell, Record
+from cembench.running.fork_server import can_fork
+from cembench.running.measure import LONG_CALL
+
+Basis = Literal["recorded", "other sizes", "rough"]
+
+#: Seconds to start a process, load the libraries and read the mesh.
+START_SECONDS = 0.5
+#: The same of a process that is forked from one that has loaded them, and to end it.
+FORK_SECONDS = 0.1
+#: Times as long as a call takes a process that times: the warm-up, and one call or more; a long
+#: call is made once.
+CALLS_A_ROUND = 2.5
+#: Seconds of the check beside its call: metrics, by triangle.
+CHECK_SECONDS_A_FACE = 2e-6
+#: Bytes of an empty process, and by triangle, where nothing is recorded.
+ROUGH_BYTES = 150e6
+ROUGH_BYTES_A_FACE = 2500.0
+#: Growth with the number of triangles where records of one size only are there.
+_USUAL_EXPONENT = 1.2
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """``factor * faces ** exponent``."""
+
+    factor: float
+    exponent: float
+
+    def at(self, faces: float) -> float:
+        """The value for so many triangles."""
+        return self.factor * faces**self.exponent
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Of one cell: seconds of one call and of all its processes, bytes of the largest of them."""
+
+    call_seconds: float
+    seconds: float
+    memory_bytes: float
+    basis: Basis
+
+
+def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
+    """What will this cell cost, judging by these records?"""
+    known = [
+        (float(r.mesh.faces), r.outcome.median_seconds, r.outcome.peak_memory_bytes, r.cell)
+        for r in records
+        if r.cell.algorithm == cell.algorithm
+        and r.cell.solves == cell.solves
+        and r.outcome.median_seconds
+    ]
+    same = [k for k in known if k[3].mesh_hash == cell.mesh_hash]
+    points = [(size, seconds) for size, seconds, _, _ in same or known if seconds]
+    law = fit_power_law(points) if points else _printed_law(cell.algorithm)
+    basis: Basis = "recorded" if same else "other sizes" if known else "rough"
+    call = law.at(faces)
+    peaks = [(size, float(peak)) for size, _, peak, _ in same or known if peak]
+    memory = (
+        max(_bytes_at(faces, size, peak) for size, peak in peaks)
+        if peaks
+        else ROUGH_BYTES + ROUGH_BYTES_A_FACE * faces
+    )
+    check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
+    start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
+    calls = CALLS_A_ROUND if call < LONG_CALL else 1
+    rounds = cell.repeats * (start + calls * call)
+    return Estimate(call, check + rounds, memory, basis)
+
+
+def _bytes_at(faces: float, size: float, peak: float) -> float:
+    """In proportion to the triangles beyond those of an empty process, and never below a record."""
+    return peak + max(0.0, peak - ROUGH_BYTES) * max(0.0, faces / size - 1)
+
+
+def fit_power_law(points: Sequence[tuple[float, float]]) -> PowerLaw:
+    """The least-squares line through the logarithms of (faces, seconds)."""
+    x = [log(size) for size, _ in points]
+    y = [log(seconds) for _, seconds in points]
+    spread = sum((a - mean(x)) ** 2 for a in x)
+    slope = (
+        sum((a - mean(x)) * (b - mean(y)) for a, b in zip(x, y, strict=True)) / spread
+        if spread > 0.01
+        else _USUAL_EXPONENT
+    )
+    return PowerLaw(exp(mean(y) - slope * mean(x)), slope)
+
+
+def _printed_law(algorithm: str) -> PowerLaw:
+    column = algorithm if algorithm in _timed_columns() else "fdm"
+    return fit_power_law(_printed(column))
+
+
+def _timed_columns() -> set[str]:
+    first: Mapping[str, object] = next(iter(paper.table(1).values()))
+    return set(first) - {"faces", "cem_iterations"}
+
+
+def _printed(column: str) -> list[tuple[float, float]]:
+    points = []
+    for row in paper.table(1).values():
+        faces, seconds = row["faces"], row[column]
+        if faces and seconds:
+            points.append((faces, seconds))
+    return points

@@ -1,0 +1,151 @@
+"""Is everything there that cembench needs, and what does an extra bring?
+
+A package that has something of its own to look at offers it through the entry points
+``cembench.checks``: functions without arguments that return a :class:`Finding`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from dataclasses import dataclass
+from importlib.metadata import EntryPoint, entry_points, version
+from importlib.util import find_spec
+
+from cembench.core.errors import CembenchError
+from cembench.linear_algebra.cholesky import available_backends
+from cembench.mesh.datasets import cache_directory, is_fetched
+from cembench.registry import load_registry
+from cembench.running.environment import describe_environment
+
+_REQUIRED = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "cvxopt": "cvxopt",
+    "libigl": "igl",
+    "meshio": "meshio",
+    "trimesh": "trimesh",
+    "matplotlib": "matplotlib",
+}
+
+
+#: Where packages offer checks of their own.
+CHECKS = "cembench.checks"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report; `remedy` says what to do where it is not ok."""
+
+    name: str
+    ok: bool
+    detail: str
+    required: bool = True
+    remedy: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at the interpreter, the libraries, the back ends, the plug-ins and the machine."""
+    return [
+        _python(),
+        *(_library(package, module) for package, module in _REQUIRED.items()),
+        _backends(),
+        _plugins(),
+        _renderer(),
+        *(_offered(entry) for entry in sorted(entry_points(group=CHECKS), key=lambda e: e.name)),
+        *_datasets(),
+        _video(),
+        _machine(),
+    ]
+
+
+def _python() -> Finding:
+    ok = sys.version_info >= (3, 11)
+    return Finding("python", ok, sys.version.split()[0], remedy="Install Python 3.11 or newer.")
+
+
+def _library(package: str, module: str) -> Finding:
+    try:
+        importlib.import_module(module)
+        return Finding(package, True, version(package))
+    except ImportError as error:
+        return Finding(package, False, str(error), remedy=f"Run `pip install {package}`.")
+
+
+def _backends() -> Finding:
+    there = available_backends()
+    return Finding(
+        "cholesky",
+        "cvxopt" in there,
+        f"{', '.join(there)} (default cvxopt; its CHOLMOD is under the GPL at run time)",
+        remedy="Run `pip install cvxopt`; without it use --backend superlu, several times slower.",
+    )
+
+
+def _plugins() -> Finding:
+    try:
+        found = load_registry()
+    except CembenchError as error:
+        return Finding("plug-ins", False, str(error), remedy="See the message.")
+    detail = f"{len(found.algorithms)} algorithms, {len(found.surfaces)} surfaces"
+    return Finding("plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench.")
+
+
+def _renderer() -> Finding:
+    from cembench.drawing.preview import renderer_status
+
+    try:
+        ok, message = renderer_status()
+    except ImportError as error:  # a library that is required; said in its own line
+        ok, message = False, str(error)
+    return Finding(
+        "pictures",
+        ok,
+        message,
+        required=False,
+        remedy="Previews are drawn by matplotlib instead, less finely.",
+    )
+
+
+def _offered(entry: EntryPoint) -> Finding:
+    """What an installed package's own check finds; one that breaks is a finding itself."""
+    try:
+        found = entry.load()()
+    except Exception as error:  # it is not ours and may raise anything
+        detail = f"{entry.value} failed: {type(error).__name__}: {error}"
+        remedy = "Repair or uninstall the package that declares it."
+        return Finding(entry.name, False, detail, required=False, remedy=remedy)
+    assert isinstance(found, Finding)
+    return found
+
+
+def _datasets() -> list[Finding]:
+    try:
+        known = load_registry().datasets
+    except CembenchError:  # said in the plug-ins' own line
+        return []
+    here = [name for name, dataset in known.items() if is_fetched(dataset)]
+    detail = f"{len(here)} of {len(known)} fetched{': ' if here else ''}{', '.join(here)}"
+    detail += f"; kept in {cache_directory()}"
+    remedy = "For the paper's public models run `cembench fetch NAME`; stand-ins do without."
+    return [Finding("datasets", len(here) == len(known), detail, required=False, remedy=remedy)]
+
+
+def _video() -> Finding:
+    there = find_spec("imageio_ffmpeg") is not None
+    return Finding(
+        "video",
+        there,
+        "imageio-ffmpeg writes MP4" if there else "MP4 needs imageio-ffmpeg; GIF needs nothing",
+        required=False,
+        remedy="Run `pip install 'cembench[video]'`.",
+    )
+
+
+def _machine() -> Finding:
+    about = describe_environment()
+    detail = (
+        f"{about['cpu']}, {about['hardware_threads']} hardware threads, "
+        f"{about['memory_bytes'] / 2**30:.0f} GiB; {'; '.join(about['blas']) or 'BLAS unknown'}"
+    )
+    return Finding("machine", True, detail, required=False)

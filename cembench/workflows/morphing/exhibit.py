@@ -1,0 +1,115 @@
+"""A morph as exhibits of a run: its strip (Figure 13) and its registrations (Figure 14)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from cembench.core import atomic
+from cembench.results.exhibits import Exhibit, Picture, Table, exhibit_folder, write_exhibit
+from cembench.results.records import MeshOrigin
+from cembench.workflows.morphing.morph import Morph
+from cembench.workflows.morphing.pages import registration_page, strip_page
+
+#: The rows of the paper's tables whose surfaces Figures 13 and 14 show, in their order.
+IN_THE_FIGURES = ("Liu's Wry Face", "Liu's Neutral Face", "Liu's Smile Face")
+
+
+def lay_down(
+    run: Path,
+    morph: Morph,
+    figures: dict[str, Any],
+    command: str,
+    rows_of_paper: tuple[str, ...],
+    tell: Callable[[str], object] = lambda step: None,
+    sides: tuple[int, int] = (240, 420),
+) -> list[Path]:
+    """Write both exhibits into a run's folder; where are their descriptions?
+
+    `figures` are the morph's metrics, `rows_of_paper` what each surface stands for in the paper,
+    empty for one that stands for nothing, `sides` the pixels of a picture on either page.
+    """
+    in_paper = rows_of_paper == IN_THE_FIGURES
+    origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
+    names = [mesh.name for mesh in morph.meshes]
+    stem = "-".join(names)
+    shared: dict[str, Any] = {"command": command, "origin": origin, "facts": figures}
+    tell("drawing the strip")
+    strip = _picture(
+        run,
+        f"morph-{stem}",
+        "strip.png",
+        strip_page(morph, sides[0]),
+        f"From {names[0]} to {names[-1]}: the path at seven moments, from the front and aside.",
+    )
+    board = _picture(
+        run,
+        f"registration-{stem}",
+        "maps.png",
+        registration_page(morph, sides[1], tell),
+        "Conformal maps, and below them the Moebius map and the registrations: now equal squares "
+        "lie on the same features. Dots are landmarks, rings their targets.",
+    )
+    spline = "a cubic spline" if len(names) > 2 else "a straight line"
+    done = [
+        Exhibit(
+            name=f"morph-{stem}",
+            title="Morph: " + ", ".join(names),
+            text=f"The vertices of {names[0]} are carried onto the other surfaces, and {spline} in "
+            "time leads through their places.",
+            figure="Figure 13" if in_paper else "",
+            pictures=(strip,),
+            tables=(_path_table(figures),),
+            **shared,
+        ),
+        Exhibit(
+            name=f"registration-{stem}",
+            title="Registration: " + ", ".join(names),
+            text="Conformal maps f of the surfaces to the disk; a Moebius map m1 that takes the "
+            "first landmark to the centre; registration maps r that minimise (34).",
+            figure="Figure 14" if in_paper else "",
+            pictures=(board,),
+            tables=(registration_table(figures),),
+            **shared,
+        ),
+    ]
+    return [write_exhibit(run, exhibit) for exhibit in done]
+
+
+def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> Picture:
+    atomic.write(exhibit_folder(run, name) / file, lambda opened: opened.write(content))
+    return Picture(file=file, caption=caption, alternative=caption)
+
+
+def registration_table(figures: dict[str, Any]) -> Table:
+    """The metrics of the registrations, a row a surface."""
+    keys = {
+        "surface": "surface",
+        "landmark_error_share": "landmark error / size",
+        "dirichlet_energy": "E_D",
+        "dilatation_mean": "dilatation, mean",
+        "dilatation_max": "dilatation, max",
+        "flipped_triangles": "folds",
+        "distance_mean_edges": "mean distance / edge",
+        "hausdorff_edges": "Hausdorff / edge",
+    }
+    rows = tuple(tuple(row[key] for key in keys) for row in figures["registrations"])
+    return Table(
+        title="Registrations",
+        columns=tuple(keys.values()),
+        rows=rows,
+        notes=(
+            "Distances between the carried surface and its target, the larger of both ways, over "
+            "all vertices and 50,000 random points each, in mean edges of the target.",
+        ),
+    )
+
+
+def _path_table(figures: dict[str, Any]) -> Table:
+    return Table(
+        title="Smoothness of the path",
+        columns=("largest acceleration of a vertex", "largest step between frames"),
+        rows=((figures["largest_acceleration_share"], figures["largest_step_share"]),),
+        notes=("In sizes of the first surface; the time from the first to the last is 1.",),
+    )

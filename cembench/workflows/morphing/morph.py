@@ -1,0 +1,161 @@
+"""From conformal maps and landmarks to a path: alignment, registration, transport."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.workflows.morphing.align import aligned, best_turn, centred, vertex_areas
+from cembench.workflows.morphing.landmarks import Landmarks, check_order
+from cembench.workflows.morphing.metrics import registration_metrics, size_of
+from cembench.workflows.morphing.path import largest_acceleration, largest_step, pose_of, position
+from cembench.workflows.morphing.registration import LAMBDA, REACH, Registration, register
+from cembench.workflows.morphing.transport import locate
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+#: What is done to the later surfaces before the path is drawn through them.
+Pose = Literal["similarity", "rigid", "keep"]
+
+
+@dataclass(frozen=True)
+class Morph:
+    """Surfaces that were registered, and the first one's vertices on all of them.
+
+    Parameters
+    ----------
+    meshes : tuple of DiskMesh
+        The surfaces, s of them.
+    landmarks : Landmarks
+        Which places correspond.
+    maps : tuple of complex128 arrays
+        Conformal maps f_k of the surfaces, as the algorithm gave them.
+    aligned : tuple of complex128 arrays
+        The same after Moebius maps: m_1 f_1, and the others fitted to it.
+    registrations : tuple of Registration
+        r_2, r_3, ...: maps of the later surfaces to the disk of m_1 f_1.
+    carried : tuple of float64 (n, 3)
+        The first surface's vertices on each surface, so the first entry is the first surface.
+    stops : tuple of float64 (n, 3)
+        The same after being posed: what the path goes through.
+
+    """
+
+    meshes: tuple[DiskMesh, ...]
+    landmarks: Landmarks
+    maps: tuple[Complex, ...]
+    aligned: tuple[Complex, ...]
+    registrations: tuple[Registration, ...]
+    carried: tuple[Real, ...]
+    stops: tuple[Real, ...]
+
+    def at(self, time: float) -> Real:
+        """Where are the first surface's vertices at a time from 0 to 1? Shape (n, 3)."""
+        return position(self.stops, time)
+
+    def metrics(self, frames: int) -> dict[str, Any]:
+        """How good are the registrations, and how smooth is the path in so many frames?
+
+        `largest_acceleration_share` is in sizes of the first surface over the whole time squared;
+        `largest_step_share` how far a vertex goes from one frame to the next, in sizes.
+        """
+        first, places = self.meshes[0], self.landmarks.vertices
+        size = size_of(first.V)
+        times = np.linspace(0, 1, frames)
+        rows = [
+            {"surface": mesh.name}
+            | registration_metrics(mesh, found, carried, first.F, places[:, 0], places[:, k])
+            for k, (mesh, found, carried) in enumerate(
+                zip(self.meshes[1:], self.registrations, self.carried[1:], strict=True), start=1
+            )
+        ]
+        return {
+            "registrations": rows,
+            "largest_acceleration_share": largest_acceleration(self.stops) / size,
+            "largest_step_share": largest_step(self.stops, times) / size,
+        }
+
+
+def morph(
+    meshes: Sequence[DiskMesh],
+    maps: Sequence[Complex],
+    landmarks: Landmarks,
+    *,
+    lam: float = LAMBDA,
+    reach: float = REACH,
+    pose: Pose = "similarity",
+    upright: Complex | None = None,
+    tell: Callable[[str], object] = lambda step: None,
+) -> Morph:
+    """Register surfaces to the first one and carry its vertices onto them.
+
+    Parameters
+    ----------
+    meshes : sequence of DiskMesh
+        Two or more surfaces.
+    maps : sequence of complex128 arrays
+        A conformal map of each to the unit disk, without folds.
+    landmarks : Landmarks
+        Which places correspond; perhaps none.
+    lam, reach : float
+        See :func:`cembench.workflows.morphing.registration.register`.
+    pose : "similarity", "rigid" or "keep"
+        Whether a later surface is turned, moved and scaled to the first before the path is drawn;
+        the maps and the metrics of registrations do not depend on it.
+    upright : complex128 (n,), optional
+        The first surface as the viewer sees it, right + i up: its map is turned the same way up.
+    tell : callable
+        Is told what is being done.
+
+    Raises
+    ------
+    ParameterError
+        Landmarks whose order about the first one contradicts itself.
+    AlgorithmFailed
+        A registration that cannot be found without folds.
+
+    """
+    places = landmarks.vertices
+    first = meshes[0]
+    z = centred(first, maps[0], places[:, 0])
+    if upright is not None:
+        z = z * np.exp(1j * best_turn(z, upright - upright.mean()))
+    moved, registrations, carried = [z], [], [np.array(first.V)]
+    stops = [carried[0]]
+    for k in range(1, len(meshes)):
+        mesh, there = meshes[k], places[:, k]
+        tell(f"registering {mesh.name}")
+        fitted = aligned(mesh, maps[k], there, first, z, places[:, 0])
+        check_order(landmarks.names, z[places[:, 0]], fitted[there], (first.name, mesh.name))
+        found = register(mesh, fitted, there, z[places[:, 0]], lam=lam, reach=reach)
+        tell(f"carrying {first.name} onto {mesh.name}")
+        at = locate(found.uv, mesh.F, mesh.boundary, z)
+        on = at.carry(mesh.F, mesh.V)
+        moved.append(fitted)
+        registrations.append(found)
+        carried.append(on)
+        stops.append(on if pose == "keep" else _posed(on, first, places[:, 0], pose))
+    return Morph(
+        tuple(meshes),
+        landmarks,
+        tuple(maps),
+        tuple(moved),
+        tuple(registrations),
+        tuple(carried),
+        tuple(stops),
+    )
+
+
+def _posed(on: Real, first: DiskMesh, landmarks: NDArray[np.int64], pose: Pose) -> Real:
+    """Brought to where the first surface is: by the landmarks if they are three, else by all."""
+    scale = pose == "similarity"
+    if len(landmarks) >= 3:
+        even = np.ones(len(landmarks))
+        return pose_of(on[landmarks], first.V[landmarks], even, scale=scale)(on)
+    return pose_of(on, first.V, vertex_areas(first), scale=scale)(on)

@@ -1,0 +1,279 @@
+"""Which map of a surface to the disk keeps its Dirichlet energy small and meets landmarks (34)?
+
+E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, the boundary held on the circle. The
+minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
+
+A single point has no capacity in the plane: pulled alone, a vertex comes out of its surroundings as
+a spike, and triangles fold. So a landmark here is a small disk round its vertex that is carried
+along: a few more pairs in (34), whose weights sum to 1; with radius 0 it is (34) to the letter.
+Where the minimiser folds all the same, a radial stretch first brings the landmarks to about the
+right distances from the centre; then a smaller lambda moves them part of the way without folds, and
+the next step starts from that image, whose own E_D it lessens, until they meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.conformal.laplacian import by_rows, cotangent_laplacian, laplacian
+from cembench.conformal.planar import signed_areas
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh
+
+Complex = NDArray[np.complex128]
+Ints = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+#: The weight of the landmarks in (34) unless the user says otherwise; E_D of a disk is about pi.
+LAMBDA = 100.0
+#: Radius of a landmark's disk: this share of the way to the next landmark or the boundary, ...
+REACH = 0.4
+#: ... but at most this, in units of the disk's radius.
+LARGEST_REACH = 0.15
+#: Steps are taken until the landmarks are so near to their targets, in units of the disk's radius.
+NEAR = 2e-3
+#: How many steps are taken, and how often lambda is made smaller within one.
+MOST_STEPS, MOST_TRIES = 40, 8
+#: What share of the way to the first fold a step goes.
+CAUTION = 0.7
+#: About the capacity of a landmark's disk in the unit disk; only the lambdas tried depend on it.
+CAPACITY = 2.0
+#: Where no landmark moves so far, in its distance to the next, there is no getting on.
+LEAST_STEP = 0.02
+
+
+@dataclass(frozen=True)
+class Registration:
+    """A registration map and how it was found.
+
+    Parameters
+    ----------
+    uv : complex128 (n,)
+        The map; no triangle is folded.
+    lambdas : tuple of float
+        The lambda of each step; a single one, as asked for, where nothing folded.
+    landmark_error : float
+        Largest distance of a landmark from its target, in units of the disk's radius.
+    exponent : float
+        Of the radial stretch before the first of several steps, 1 for none.
+
+    """
+
+    uv: Complex
+    lambdas: tuple[float, ...]
+    landmark_error: float
+    exponent: float = 1.0
+
+
+def register(
+    mesh: DiskMesh,
+    start: Complex,
+    landmarks: Ints,
+    targets: Complex,
+    *,
+    lam: float = LAMBDA,
+    reach: float = REACH,
+) -> Registration:
+    """Bring the landmarks of a map to the disk to their targets, by minimising (34).
+
+    Parameters
+    ----------
+    mesh : DiskMesh
+        The surface.
+    start : complex128 (n,)
+        Its conformal map, already aligned; its boundary values are kept.
+    landmarks : int64 (k,)
+        Vertices inside the surface; with none the start is the answer.
+    targets : complex128 (k,)
+        Where they should come to lie, inside the disk.
+    lam : float
+        The weight of the landmarks.
+    reach : float
+        Radius of a landmark's disk, as a share of the way to the next landmark; 0 for a vertex.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The landmarks cannot be met without folds, however small lambda is.
+
+    """
+    if not len(landmarks):
+        return Registration(start, (), 0.0)
+    found = _minimisers(mesh, laplacian(mesh), start, landmarks, targets, reach)(lam)
+    if first_fold(start, found, mesh.F) > 1:
+        return Registration(found, (lam,), _error(found, landmarks, targets))
+    z, exponent = radially_stretched(mesh, start, landmarks, targets)
+    lambdas = []
+    for _ in range(MOST_STEPS):
+        at = z[landmarks]
+        with phase("laplacian"):
+            L = cotangent_laplacian(np.stack([z.real, z.imag], axis=1), mesh.F)
+        z, used = _step(z, mesh.F, _minimisers(mesh, L, z, landmarks, targets, reach), lam)
+        lambdas.append(used)
+        error = _error(z, landmarks, targets)
+        if used == lam or error <= NEAR:
+            return Registration(z, tuple(lambdas), error, exponent)
+        if (np.abs(z[landmarks] - at) < LEAST_STEP * _room(at)).all():
+            break
+    raise AlgorithmFailed(
+        f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a "
+        f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and going on "
+        "would fold triangles. Use fewer landmarks, look for one that is misplaced, name the "
+        "surface first on which they spread wider in the disk (a face before a whole head), or "
+        "take a smaller --lambda so that they need not meet."
+    )
+
+
+def _error(z: Complex, landmarks: Ints, targets: Complex) -> float:
+    return float(np.abs(z[landmarks] - targets).max())
+
+
+@dataclass(frozen=True)
+class _Pairs:
+    """The terms of (34): vertices, where they should go, and weights that sum to 1 a landmark."""
+
+    vertices: Ints
+    targets: Complex
+    weights: Real
+
+
+def _pairs(F: Ints, z: Complex, landmarks: Ints, targets: Complex, reach: float) -> _Pairs:
+    """The landmarks with the disks round them, each carried by its landmark's displacement."""
+    at = z[landmarks]
+    radius = np.minimum(reach * _room(at), LARGEST_REACH)
+    area = np.bincount(F.ravel(), weights=np.repeat(signed_areas(z, F), 3), minlength=len(z))
+    pairs = []
+    for j, vertex in enumerate(landmarks):
+        away = np.abs(z - at[j])
+        v = np.union1d(np.flatnonzero(away < radius[j]), vertex)
+        fall = 1 - (away[v] / radius[j]) ** 2 if radius[j] > 0 else np.ones(len(v))
+        w = fall * area[v]  # by area: vertices that crowd somewhere pull no harder there
+        pairs.append((v, z[v] + (targets[j] - at[j]), w / w.sum()))
+    vertices, places, weights = zip(*pairs, strict=True)
+    return _Pairs(np.concatenate(vertices), np.concatenate(places), np.concatenate(weights))
+
+
+def _room(at: Complex) -> Real:
+    """How far is each landmark from the next one, or from the boundary? Shape (k,)."""
+    apart = np.abs(at[:, None] - at[None, :])
+    np.fill_diagonal(apart, np.inf)
+    return np.minimum(apart.min(axis=1), 1 - np.abs(at))
+
+
+def _minimisers(
+    mesh: DiskMesh,
+    L: sparse.csc_array,
+    z: Complex,
+    landmarks: Ints,
+    targets: Complex,
+    reach: float,
+) -> Callable[[float], Complex]:
+    """The function that gives the minimiser of (34) for a lambda, from one analysis of the matrix.
+
+    L is the Laplacian of E_D, z the map whose boundary is kept and in which landmarks have disks.
+    """
+    i, b = mesh.interior, mesh.boundary
+    with phase("assembly"):
+        pairs = _pairs(mesh.F, z, landmarks, targets, reach)
+        rows = by_rows(L)[i]
+        L_ii, right = sparse.csc_array(rows[:, i]), -(rows[:, b] @ z[b])
+        pull = np.zeros(mesh.n)
+        pulled = np.zeros(mesh.n, dtype=np.complex128)
+        np.add.at(pull, pairs.vertices, 2 * pairs.weights)
+        np.add.at(pulled, pairs.vertices, 2 * pairs.weights * pairs.targets)
+    factor: Cholesky | None = None
+
+    def minimiser(lam: float) -> Complex:
+        nonlocal factor
+        A = sparse.csc_array(L_ii + sparse.diags_array(lam * pull[i]))
+        if factor is None:
+            factor = Cholesky(A)
+        else:
+            factor.update(A)
+        found = z.copy()
+        found[i] = factor.solve(right + lam * pulled[i])
+        return found
+
+    return minimiser
+
+
+def _step(
+    z: Complex, F: Ints, minimiser: Callable[[float], Complex], lam: float
+) -> tuple[Complex, float]:
+    """The minimiser for the largest lambda found, up to `lam`, that folds nothing; and that lambda.
+
+    The way that the landmarks go is about g = 2 lambda / (C + 2 lambda) of the whole, C being the
+    capacity of their disks: about 2, for disks that are small but not very small. From the share
+    of the way up to the first fold follows the next lambda to be tried.
+    """
+    tried = lam
+    for _ in range(MOST_TRIES):
+        new = minimiser(tried)
+        share = first_fold(z, new, F)
+        if share > 1:
+            return new, tried
+        less = CAUTION * max(share, 1e-3) * 2 * tried / (CAPACITY + 2 * tried)
+        tried = min(0.75 * tried, CAPACITY * less / (2 * (1 - less)))
+    return z, tried
+
+
+def radially_stretched(
+    mesh: DiskMesh, z: Complex, landmarks: Ints, targets: Complex
+) -> tuple[Complex, float]:
+    """Which map z |z|^(k-1) brings the landmarks nearest to the right distances from the centre?
+
+    It has the same dilatation everywhere, max(k, 1/k): the least that any map between rings has
+    (Groetzsch 1928). k is the least squares fit of log |target| = k log |landmark|; if that folds
+    triangles, which stay straight, k comes nearer to 1.
+
+    Returns
+    -------
+    z : complex128 (n,)
+        The stretched map; no triangle is folded.
+    k : float
+        The exponent.
+
+    """
+    far = np.minimum(np.abs(z[landmarks]), np.abs(targets)) > 1e-9
+    there, here = np.log(np.abs(targets[far])), np.log(np.abs(z[landmarks][far]))
+    if not len(here):
+        return z, 1.0
+    k = float(there @ here / (here @ here))
+    modulus = np.maximum(np.abs(z), 1e-300)
+    for _ in range(MOST_TRIES):
+        new = z * modulus ** (k - 1)
+        if (signed_areas(new, mesh.F) > 0).all():
+            return new, k
+        k = np.sqrt(k)
+    return z, 1.0
+
+
+def first_fold(z: Complex, new: Complex, F: Ints) -> float:
+    """How far along the straight way from z to `new` does a triangle first lose its area?
+
+    A share of the way, in (0, 1]; infinite where `new` has no fold. No triangle of z is folded.
+    """
+    if (signed_areas(new, F) > 0).all():
+        return np.inf
+    a, b, c = (z[F[:, k]] for k in range(3))
+    p, q = b - a, c - a
+    da, db, dc = ((new - z)[F[:, k]] for k in range(3))
+    u, v = db - da, dc - da
+    # Twice the area at share s: (p + s u) x (q + s v).
+    const = np.imag(np.conj(p) * q)
+    linear = np.imag(np.conj(p) * v + np.conj(u) * q)
+    square = np.imag(np.conj(u) * v)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        root = np.sqrt(linear**2 - 4 * square * const)
+        # The stable pair of roots of a quadratic.
+        half = -0.5 * (linear + np.where(linear >= 0, root, -root))
+        roots = np.stack([half / square, const / half])
+    roots = np.where(np.isfinite(roots) & (roots > 0), roots, np.inf)
+    return float(min(roots.min(), 1.0))

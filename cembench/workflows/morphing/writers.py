@@ -1,0 +1,150 @@
+"""A path on disk: a film (GIF, MP4), numbered meshes (OBJ, PLY), or arrays (NPZ), by the name."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core import atomic
+from cembench.core.errors import ParameterError, RecordError
+from cembench.mesh.files import write_mesh
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+Real = NDArray[np.float64]
+Pictures = NDArray[np.uint8]
+
+#: Frames in a second.
+RATE = 24
+FILMS, MESHES, ARRAYS = (".gif", ".mp4"), (".obj", ".ply"), (".npz",)
+
+
+def check_output(path: Path) -> None:
+    """Raise :class:`ParameterError` where a path cannot be written to this place, before work."""
+    if path.is_dir():
+        return
+    suffix = path.suffix.lower()
+    if suffix not in (*FILMS, *MESHES, *ARRAYS, ""):
+        raise ParameterError(
+            f"-o {path}: {suffix!r} is unknown; allowed: .gif or .mp4 for a film, .obj or .ply for "
+            "numbered meshes, a folder for PLY meshes, .npz for arrays."
+        )
+    if suffix == ".mp4" and not find_spec("imageio_ffmpeg"):
+        raise ParameterError(
+            f"-o {path}: MP4 needs imageio-ffmpeg; pip install 'cembench[video]', or write a .gif."
+        )
+    if suffix and not path.parent.is_dir():
+        raise ParameterError(f"-o {path}: there is no folder {path.parent}. Make it first.")
+    if not suffix and path.is_file():
+        raise ParameterError(f"-o {path} is a file, not a folder; name another place.")
+
+
+def write_film(path: Path, pictures: Pictures) -> None:
+    """Write pictures (frames, rows, columns, 3) as GIF or MP4, 24 frames a second.
+
+    Raises
+    ------
+    RecordError
+        The place cannot be written to, or the encoder gave up.
+
+    """
+    if path.suffix.lower() == ".gif":
+        atomic.write(path, lambda file: _save_gif(file, pictures))
+        return
+    try:
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=atomic.DRAFT) as folder:
+            draft = Path(folder) / "film.mp4"
+            _encode_mp4(draft, pictures)
+            draft.replace(path)
+    except OSError as error:  # the encoder's complaints too
+        raise RecordError(f"{path} cannot be written: {error}") from error
+
+
+def _save_gif(file: BinaryIO, pictures: Pictures) -> None:
+    from PIL import Image
+
+    # One palette for all, so that colours do not flicker.
+    some = pictures[:: max(len(pictures) // 6, 1)]
+    palette = Image.fromarray(np.concatenate(some)).quantize(256, method=Image.Quantize.MEDIANCUT)
+    images = [
+        Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
+        for picture in pictures
+    ]
+    # GIF counts hundredths of a second: 4, 4, 4, 5, ... come to 24 a second in the mean.
+    ends = np.round(np.arange(len(images) + 1) * 100 / RATE).astype(int)
+    durations = [int(10 * d) for d in np.diff(ends)]
+    images[0].save(
+        file, format="GIF", save_all=True, append_images=images[1:], duration=durations, loop=0
+    )
+
+
+def _encode_mp4(path: Path, pictures: Pictures) -> None:
+    import imageio_ffmpeg
+
+    rows, columns = (side - side % 2 for side in pictures.shape[1:3])  # the codec wants even sides
+    encoder = imageio_ffmpeg.write_frames(
+        str(path),
+        (columns, rows),
+        fps=RATE,
+        quality=8,
+        macro_block_size=2,
+        ffmpeg_log_level="error",
+    )
+    encoder.send(None)
+    for picture in pictures:
+        encoder.send(np.ascontiguousarray(picture[:rows, :columns]))
+    encoder.close()
+
+
+def mesh_files(path: Path, frames: int) -> list[Path]:
+    """What are numbered meshes called? ``a.obj`` gives a_000.obj; a folder f, f/frame_000.ply."""
+    digits = max(3, len(str(frames - 1)))
+    if path.suffix and not path.is_dir():
+        return [path.with_stem(f"{path.stem}_{k:0{digits}d}") for k in range(frames)]
+    return [path / f"frame_{k:0{digits}d}.ply" for k in range(frames)]
+
+
+def write_meshes(
+    path: Path,
+    mesh: TriangleMesh,
+    times: Sequence[float] | Real,
+    at: Callable[[float], Real],
+    tell: Callable[[int], object] = lambda frame: None,
+) -> list[Path]:
+    """Write a mesh for each time, with the triangles of `mesh` and the vertices `at` that time.
+
+    All files get their names at the end, so that no half of a sequence is left.
+
+    Raises
+    ------
+    RecordError
+        The place cannot be written to.
+
+    """
+    files = mesh_files(path, len(times))
+    place = files[0].parent
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=place, prefix=atomic.DRAFT) as folder:
+            for k, (file, time) in enumerate(zip(files, times, strict=True)):
+                write_mesh(Path(folder) / file.name, replace(mesh, V=at(time)))
+                tell(k)
+            for file in files:
+                (Path(folder) / file.name).replace(file)
+    except OSError as error:
+        raise atomic.unwritable(files[0], error) from error
+    return files
+
+
+def write_arrays(path: Path, mesh: TriangleMesh, times: Real, at: Callable[[float], Real]) -> None:
+    """Write `frames` (frames, n, 3), `times` (frames,) and `F` (m, 3) as NPZ."""
+    frames = np.empty((len(times), mesh.n, 3))
+    for k, time in enumerate(times):
+        frames[k] = at(time)
+    atomic.write(path, lambda file: np.savez(file, frames=frames, times=times, F=mesh.F))

@@ -1,0 +1,48 @@
+import json
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+from tests.results.test_comparison import record_of
+
+SCRIPT = Path(__file__).parents[2] / "benchmarks/repeatability.py"
+
+
+def test_the_table_tells_the_spread_and_the_false_alarms():
+    script = runpy.run_path(str(SCRIPT))
+
+    def told(runs):
+        return script["tell"](script["summarise"](runs, "fdm"))
+
+    def run(other, twin):
+        return [
+            record_of([seconds] * 6, algorithm=name, mesh="hat")
+            for name, seconds in (
+                ("cem", 1.0),
+                ("cem-twin", twin),
+                ("fdm", other),
+                ("fdm-twin", other),
+            )
+        ]
+
+    text = told([run(3.0, 1.0), run(3.5, 1.0), run(4.0, 1.1)])
+    assert "| hat | 1 | 2.50 | 2.00 | 3.00 | 28.6% |" in text
+    assert "A/A: 1 of 6 comparisons of an algorithm with its twin (16.7%)" in text
+    assert "a probability of 0.26" in text  # 1 - 0.95^6
+    assert "No A/A comparison" in told([[record_of([1.0], algorithm="cem")]])
+
+
+def test_it_measures_twins_once_and_goes_on_when_called_again(tmp_path):
+    command = [sys.executable, SCRIPT, "--runs", "1", "--surfaces", "flat-disk", "--faces", "100"]
+    command += ["--against", "harmonic-circle", "--repeats", "1", "-o", tmp_path]
+    first, again = (
+        subprocess.run(command, capture_output=True, text=True, check=True) for _ in range(2)
+    )
+    assert "| flat-disk | 96 |" in first.stdout
+    assert again.stdout == first.stdout == (tmp_path / "repeatability.md").read_text() + "\n"
+    assert "4/4] flat-disk / " in first.stderr
+    assert again.stderr.count("kept") == 4
+    assert "run 1 of 1 done" in first.stderr
+    summary = json.loads((tmp_path / "repeatability.json").read_text())
+    assert len(summary["surfaces"]["flat-disk"]["speedups"]) == 1

@@ -1,0 +1,44 @@
+import io
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from cembench.commands.progress import LiveProgress, Remaining, duration
+from tests.results.test_comparison import record_of
+
+
+def test_what_remains_is_judged_by_each_cell_s_last_process():
+    remaining = Remaining()
+    remaining.expect(9)
+    assert remaining.seconds is None
+    remaining.ended("slow", left=2, seconds=10)
+    remaining.ended("quick", left=2, seconds=1)
+    assert remaining.seconds == pytest.approx(2 * 10 + 2 * 1 + 3 * 5.5)
+    remaining.finished("slow")
+    assert remaining.seconds == pytest.approx(2 * 1 + 3 * 5.5)
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(40, "40 s"), (600, "10 min"), (7200, "2.0 h")])
+def test_durations_are_said_as_a_person_would(seconds, said):
+    assert duration(seconds) == said
+
+
+def test_the_live_table_shows_cells_and_what_remains():
+    record = record_of([0.25])
+    task = SimpleNamespace(cell=record.cell)
+    console = Console(file=io.StringIO(), width=80, force_terminal=True)
+    with LiveProgress(console, 3) as progress:
+        progress.begins(14)
+        progress.starts(task, "check")
+        progress.ends(task, "check", 2.0)
+        progress.starts(task, "round 1 of 6")
+        progress.waits()
+        shown = Console(file=io.StringIO(), width=80)
+        shown.print(progress._picture())
+        progress.finished(task, record, kept=False)
+        shown.print(progress._picture())
+    said = shown.file.getvalue()
+    for words in ("round 1 of 6", "0/3 cells", "about 26 s left", "waiting", "ok  0.250 s"):
+        assert words in said
+    assert max(map(len, said.splitlines())) <= 80

@@ -1,0 +1,186 @@
+import json
+
+import pytest
+
+from cembench.results.store import Store
+from tests.results.test_comparison import record_of
+from tests.running.test_local import FAULTY
+
+ROUNDS = [1.0, 1.1, 0.9, 1.0, 1.0, 1.2]
+
+
+@pytest.fixture
+def runs(cli):
+    """Two runs with a machine each: in the second "cem" takes half the time, and one cell fails."""
+    for name, factor in (("one", 1.0), ("two", 0.5)):
+        store = Store(cli.folder / name)
+        records = [
+            record_of([factor * s for s in ROUNDS], algorithm="cem", mesh="hat"),
+            record_of([3 * s for s in ROUNDS], algorithm="lscm", mesh="hat"),
+        ]
+        if name == "two":
+            failed = record_of([], algorithm="ldm", mesh="hat")
+            cause = failed.outcome.model_copy(update={"cause": "it gave up"})
+            records.append(failed.model_copy(update={"outcome": cause}))
+        for record in records:
+            store.save(
+                record.model_copy(update={"environment": name}), None, {"id": name, "cpu": name}
+            )
+    return cli
+
+
+def test_status_counts_and_names_what_is_not_ok(runs):
+    code, out, _ = runs("status", "two")
+    assert code == 0
+    assert "     2  ok" in out
+    assert "hat / ldm (reuse): failed: it gave up" in out
+    asked = [record_of([], algorithm=name, mesh="hat").cell for name in ("cem", "fdm", "qiem")]
+    store = Store(runs.folder / "two")
+    store.save_plan(asked)
+    store.samples(asked[1], "e").save_round(0, record_of([1.0]).outcome.rounds[0])
+    found = json.loads(runs("status", "two", "--json")[1])
+    assert found["states"] == {"ok": 1, "in work": 1, "waiting": 1}
+    assert (found["asked"], found["recorded_besides"], found["measuring"]) == (3, 2, False)
+    assert "in work: 1 of 6 rounds done" in runs("status", "two")[1]
+
+
+def test_show_finds_a_cell_by_name_or_key(runs):
+    code, out, _ = runs("show", "hat/cem", "--run", "two")
+    assert code == 0
+    assert "0.4500 to 0.6000 s over 6 rounds, unstable" in out
+    assert "round 6" in out
+    (found,) = json.loads(runs("show", "hat/ldm", "--run", "two", "--json")[1])
+    assert (found["status"], found["cause"]) == ("failed", "it gave up")
+    again = json.loads(runs("show", found["key"][:8], "--run", "two", "--json")[1])
+    assert again == [found]
+
+
+def test_compare_tells_what_changed_and_that_the_machines_differ(runs):
+    code, out, err = runs("compare", "one", "two")
+    assert code == 0
+    assert [line.split()[-1] for line in out.splitlines()[1:]] == ["faster", "undecided"]
+    assert max(map(len, out.splitlines())) <= 80
+    assert "not measured under the same conditions" in err
+    assert "cpu: one / two" in err
+    found = json.loads(runs("compare", "one", "two", "--json")[1])
+    assert found["cells"][0]["ratio"] == pytest.approx(0.5)
+    assert "warning" not in runs("compare", "one", "one")[2]
+
+
+def test_merge_brings_runs_together(runs):
+    code, out, err = runs("merge", "one", "two", "-o", "all")
+    assert code == 0
+    assert "3 cells in all" in out
+    assert "2 environments" in err
+    assert len(Store(runs.folder / "all").records()) == 3
+    assert json.loads(runs("merge", "one", "-o", "again", "--json")[1])["cells"] == 2
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "json"])
+def test_export_writes_a_row_a_cell(runs, form):
+    code, out, _ = runs("export", "two", "--format", form)
+    assert code == 0
+    assert f"3 rows in two/rows.{form}" in out
+    assert (runs.folder / f"two/rows.{form}").stat().st_size > 500
+    said = json.loads(runs("export", "two", "--format", form, "-o", "x", "--json")[1])
+    assert said == {"output": "x", "rows": 3}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("status", "nowhere"), "nowhere holds no run: there is no such folder"),
+        (("show", "hat/none", "--run", "one"), "no cell 'hat/none' in this run; it holds: hat/cem"),
+        (("show", "", "--run", "one"), "no cell ''"),
+        (("compare", "one", "empty"), "have no timed cell in common"),
+        (("export", "nowhere"), "nowhere holds no run"),
+        (("merge", "nowhere", "-o", "all"), "nowhere holds no run"),
+        (("run", "--surfaces", "flat-disk", "--memory", "much"), "--memory 'much' is no size"),
+        (("run", "--surfaces", "flat-disk", "--solves", "twice"), "--solves 'twice' is unknown"),
+        (("run", "--mesh-dir", "nowhere"), "--mesh-dir nowhere is no folder"),
+        (("run", "--mesh-dir", "one"), "holds no OBJ, OFF, PLY, STL or MAT file"),
+        (("run",), "nothing to run on: name a --profile"),
+    ],
+)
+def test_bad_usage_is_said(runs, arguments, message):
+    (runs.folder / "empty/records").mkdir(parents=True)
+    code, _, err = runs(*arguments)
+    assert code == 2
+    assert message in err
+
+
+def test_a_dry_run_tells_the_cells_and_their_cost(cli):
+    arguments = ["run", "--surfaces", "flat-disk", "--faces", 600, "-a", "good,harmonic-circle"]
+    arguments += ["--plugin", FAULTY, "--repeats", 1, "-o", "here"]
+    code, out, _ = cli(*arguments, "--solves", "reuse,backslash", "--dry-run")
+    assert code == 0
+    assert "4 of 4 cells to measure: about" in out
+    assert "rough" in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert not list(cli.folder.iterdir())
+    assert cli(*arguments)[0] == 0
+    found = json.loads(cli(*arguments, "--solves", "reuse,backslash", "--dry-run", "--json")[1])
+    assert [cell["held"] for cell in found["cells"]] == ["ok", "ok", None, None]
+    assert found["seconds"] == sum(c["estimate"]["seconds"] for c in found["cells"][2:])
+
+
+def test_both_policies_stand_in_tables_of_their_own(cli):
+    code, out, _ = cli(
+        *("run", "--surfaces", "flat-disk", "--faces", 600, "-a", "cem,lscm", "--repeats", 1),
+        *("--solves", "reuse,backslash", "--memory", "4GiB", "-o", "here"),
+    )
+    assert code == 0
+    assert out.index("solves: reuse") < out.index("solves: backslash") < out.index("Speedup of cem")
+    assert "flat-disk (backslash)" in out
+    assert max(map(len, out[: out.index("Records and maps")].splitlines())) <= 80
+
+
+def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
+    from cembench.surfaces.flat_disk import flat_disk
+
+    from cembench.mesh.files import write_mesh
+    from cembench.registry import Registry, load_registry
+
+    # Stand-ins that take no time to make, instead of the real ones.
+    bare = Registry(load_registry().algorithms, {})
+    monkeypatch.setattr("cembench.registry._installed", lambda: bare)
+    (cli.folder / "meshes").mkdir()
+    for name in ("b.obj", "a.ply"):
+        write_mesh(cli.folder / "meshes" / name, flat_disk(100))
+    (cli.folder / "meshes/notes.txt").touch()
+    plugin = cli.folder / "stand_ins.py"
+    plugin.write_text(
+        "from cembench import DiskMesh, paper, surface\n"
+        "from meshes_gen.flat_disk import flat_disk\n"
+        "from dataclasses import replace\n"
+        "def declare(k, row):\n"
+        "    @surface(f's{k}', title=row, paper_row=row)\n"
+        "    def plate(faces: int = 100 + 10 * k) -> DiskMesh:\n"
+        "        return replace(flat_disk(100 + 60 * k), name=f's{k}')\n"
+        "    plate.__module__ = __name__\n"
+        "    return plate\n"
+        "for k, row in enumerate(paper.table(1)):\n"
+        "    globals()[f's{k}'] = declare(k, row)\n"
+    )
+    arguments = ("run", "-a", "cem", "--plugin", plugin, "--dry-run", "--json")
+    found = json.loads(cli(*arguments, "--mesh-dir", "meshes", "--profile", "quick")[1])
+    assert [cell["mesh"] for cell in found["cells"]] == ["a", "b", *(f"s{k}" for k in range(8))]
+
+
+def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
+    from cembench.registry import load_registry
+    from cembench.running.plan import Standing, standing_of
+
+    found = standing_of(load_registry(), ["foot", "flat-disk"])
+    assert found == {"foot": Standing("Foot", "stand-in")}
+
+
+def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):
+    from cembench.surfaces.flat_disk import flat_disk
+
+    from cembench.mesh.files import write_mesh
+
+    for name in ("a.obj", "a.ply"):
+        write_mesh(cli.folder / name, flat_disk(100))
+    found = json.loads(cli("run", "-a", "cem", "--mesh-dir", ".", "--dry-run", "--json")[1])
+    assert [cell["mesh"] for cell in found["cells"]] == ["a"]

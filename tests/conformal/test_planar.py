@@ -1,0 +1,91 @@
+import numpy as np
+import pytest
+
+from cembench.conformal.planar import (
+    backward_arcs,
+    crossing_segments,
+    fitted_circle,
+    polygon_area,
+    signed_areas,
+)
+
+
+def ring(k=12):
+    return np.exp(2j * np.pi * np.arange(k) / k)
+
+
+def test_area_of_a_polygon_has_a_sign_and_no_origin():
+    exact = 6 * np.sin(2 * np.pi / 12)
+    assert polygon_area(ring()) == pytest.approx(exact)
+    assert polygon_area(ring()[::-1]) == pytest.approx(-exact)
+    assert polygon_area(ring() + 1e6) == pytest.approx(exact, rel=1e-9)
+
+
+def test_signed_areas():
+    z = np.array([0, 1, 1j, 1 + 1j])
+    np.testing.assert_allclose(signed_areas(z, np.array([[0, 1, 2], [1, 2, 3]])), [0.5, -0.5])
+
+
+@pytest.mark.parametrize(("centre", "radius"), [(0, 1), (3 - 4j, 1e-6), (1e3, 50.0)])
+def test_the_circle_through_points_of_a_circle(centre, radius):
+    c, r = fitted_circle(centre + radius * ring(7)[:5])
+    assert abs(c - centre) < 1e-9 * max(abs(centre), radius)
+    assert r == pytest.approx(radius, rel=1e-6)
+
+
+def test_points_that_determine_no_circle():
+    assert np.isnan(fitted_circle(np.zeros(4, complex))[1])
+    assert np.isnan(fitted_circle(np.arange(4) + 0j)[1])
+
+
+def test_arcs_that_run_backwards():
+    z = ring()
+    assert backward_arcs(z) == 0
+    assert backward_arcs(z[::-1]) == 12
+    z[[3, 4]] = z[[4, 3]]
+    assert backward_arcs(z) == 1
+
+
+def square(corner, side=1.0):
+    return corner + side * np.array([0, 1, 1 + 1j, 1j])
+
+
+@pytest.mark.parametrize(
+    ("curves", "answer"),
+    [
+        ([square(0), square(3)], None),
+        ([square(0), square(0.25 + 0.25j, 0.5)], None),  # one inside the other
+        ([square(0), square(5), square(0.5 + 0.5j)], (0, 2)),
+        ([square(0), square(1)], (0, 1)),  # side by side, sharing two corners and a side
+        ([np.array([0, 1 + 1j, 1, 1j])], (0, 0)),
+    ],
+)
+def test_polygons_that_cross_are_found(curves, answer):
+    assert crossing_segments(curves) == answer
+
+
+def test_crossings_agree_with_trying_every_pair():
+    rng = np.random.default_rng(5)
+    found = set()
+    for _ in range(60):
+        curves = [
+            complex(*rng.uniform(-2, 2, 2)) + rng.uniform(0.1, 1) * ring(9) * np.exp(1j * turn)
+            for turn in rng.uniform(0, 6, 3)
+        ]
+        expected = any(_polygons_cross(a, b) for k, a in enumerate(curves) for b in curves[:k])
+        found.add(expected)
+        assert (crossing_segments(curves) is not None) == expected
+    assert found == {True, False}
+
+
+def _polygons_cross(a, b):
+    """By solving for the crossing of every pair of sides."""
+    for p, q in zip(a, np.roll(a, -1), strict=True):
+        for r, s in zip(b, np.roll(b, -1), strict=True):
+            u, v = q - p, s - r
+            cross = (np.conj(u) * v).imag
+            t = (np.conj(r - p) * v).imag / cross
+            w = (np.conj(r - p) * u).imag / cross
+            if 0 <= t <= 1 and 0 <= w <= 1:
+                return True
+    return False

@@ -1,0 +1,177 @@
+import re
+
+import numpy as np
+import pytest
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from scipy.io import savemat
+
+from cembench import MeshError, TriangleMesh
+from cembench.mesh.files import read_mesh, write_mesh
+from tests import gallery
+
+
+@pytest.fixture
+def surface():
+    mesh = hemi_ellipsoid(600)
+    return TriangleMesh.from_arrays(mesh.V / 3, mesh.F)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".ply"])
+def test_every_bit_survives_a_round_trip(surface, suffix, tmp_path):
+    write_mesh(tmp_path / f"a{suffix}", surface)
+    again = read_mesh(tmp_path / f"a{suffix}", TriangleMesh)
+    np.testing.assert_array_equal(again.V, surface.V)
+    np.testing.assert_array_equal(again.F, surface.F)
+    assert again.name == "a"
+    assert not again.notices
+
+
+def test_stl_merges_its_corners_again_in_single_precision(surface, tmp_path):
+    write_mesh(tmp_path / "a.stl", surface)
+    again = read_mesh(tmp_path / "a.stl")
+    assert (again.n, again.m, len(again.boundary)) == (surface.n, surface.m, 60)
+    assert abs(np.sort(again.V[:, 2]) - np.sort(surface.V[:, 2])).max() < 1e-7
+
+
+def test_uvs_have_17_digits_in_obj_and_are_float64_in_ply(surface, tmp_path):
+    uv = np.exp(1j * np.arange(surface.n)) / 3
+    write_mesh(tmp_path / "a.obj", surface, uv)
+    text = (tmp_path / "a.obj").read_text()
+    written = [complex(*map(float, line.split()[1:3])) for line in re.findall("vt .*", text)]
+    np.testing.assert_array_equal(written, uv)
+    corners = re.findall(r"^f (\d+)/(\d+)", text, re.MULTILINE)
+    assert len(corners) == surface.m
+    assert all(vertex == texture for vertex, texture in corners)
+
+    write_mesh(tmp_path / "a.ply", surface, uv)
+    header, _, body = (tmp_path / "a.ply").read_bytes().partition(b"end_header\n")
+    assert b"property double u\nproperty double v" in header
+    values = np.frombuffer(body[: surface.n * 40], "<f8").reshape(-1, 5)
+    np.testing.assert_array_equal(values[:, 3] + 1j * values[:, 4], uv)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "a.ply", TriangleMesh).V, surface.V)
+
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "faces", "notice"),
+    [
+        ("quad.obj", SQUARE + "f 1 2 3 4\n", 2, "1 polygons"),
+        ("mixed.obj", SQUARE + "v 2 0 0\nf 1 2 3 4\nf 2 5 3\n", 3, "1 polygons"),
+        ("pentagon.obj", SQUARE + "v -1 0.5 0\nf 1 2 3 4 5\n", 3, "1 polygons"),
+        ("seams.obj", SQUARE + "vt 0 0\n" * 6 + "f 1/1/1 2/2/1 3/3/1\nf 1/4 3//5 4\n", 2, None),
+        (
+            "colours.obj",
+            "".join(f"v {k} {k * k} 0 1 0 0\n" for k in range(3)) + "f 1 2 3\n",
+            1,
+            None,
+        ),
+        ("relative.obj", SQUARE + "f -4 -3 -2\nf -4 -2 -1\n", 2, None),
+        ("continued.obj", SQUARE + "f 1 2 \\\n 3\nf 1 3 4\n", 2, None),
+        ("quad.off", "OFF\n4 1 0\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n", 2, "polygons"),
+        ("comment.off", "OFF\n# c\n3 1 0\n0 0 0\n1 0 0 # x\n1 1 0\n3 0 1 2\n", 1, None),
+    ],
+)
+def test_what_artists_and_scanners_write_is_read(name, text, faces, notice, tmp_path):
+    (tmp_path / name).write_text(text)
+    mesh = read_mesh(tmp_path / name)
+    assert mesh.m == faces
+    assert len(mesh.loops) == 1
+    assert (notice in mesh.notices[0]) if notice else all("Def" in n for n in mesh.notices)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
+def test_ply_keeps_float64_in_every_form(form, tmp_path):
+    V, F = gallery.flat_rectangle()
+    V = V + 1 / 3
+    order = ">" if "big" in form else "<"
+    header = (
+        f"ply\nformat {form} 1.0\nelement vertex {len(V)}\nproperty double x\nproperty double y\n"
+        f"property double z\nelement face {len(F)}\nproperty list uchar int vertex_indices\n"
+        "end_header\n"
+    )
+    if form == "ascii":
+        rows = [" ".join(map(repr, row)) for row in V.tolist()]
+        rows += ["3 " + " ".join(map(str, row)) for row in F.tolist()]
+        body = ("\n".join(rows) + "\n").encode()
+    else:
+        faces = np.zeros(len(F), np.dtype([("k", "u1"), ("i", f"{order}i4", 3)]))
+        faces["k"], faces["i"] = 3, F
+        body = V.astype(f"{order}f8").tobytes() + faces.tobytes()
+    (tmp_path / "a.ply").write_bytes(header.encode() + body)
+    mesh = read_mesh(tmp_path / "a.ply")
+    np.testing.assert_array_equal(mesh.V, V)
+    np.testing.assert_array_equal(mesh.F, F)
+
+
+def test_relative_indices_between_vertices_are_refused(tmp_path):
+    (tmp_path / "a.obj").write_text(SQUARE + "f -4 -3 -2\nv 5 5 5\nf -5 -3 -2\n")
+    with pytest.raises(MeshError, match=r"relative .* indices"):
+        read_mesh(tmp_path / "a.obj")
+
+
+@pytest.mark.parametrize("name", ["a.off", "a.stl", "a.xyz"])
+def test_uvs_only_go_where_they_fit(name, surface, tmp_path):
+    with pytest.raises(MeshError, match=r"allowed here: \.obj, \.ply"):
+        write_mesh(tmp_path / name, surface, np.zeros(surface.n, complex))
+    assert not list(tmp_path.iterdir())
+
+
+def test_nothing_is_half_written(surface, tmp_path, monkeypatch):
+    def fail(path, *rest):
+        path.write_text("half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(__import__("cembench.mesh.files").geometry.files._WRITERS, ".obj", fail)
+    with pytest.raises(MeshError, match="cannot be written: No space left"):
+        write_mesh(tmp_path / "a.obj", surface)
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(MeshError, match="there is no folder"):
+        write_mesh(tmp_path / "missing" / "a.obj", surface)
+
+
+def mat(path, **variables):
+    savemat(path, variables)
+    return path
+
+
+def test_matlab_files_count_triangles_from_1(surface, tmp_path):
+    path = mat(tmp_path / "a.mat", v=surface.V, f=(surface.F + 1).astype(float))
+    again = read_mesh(path, TriangleMesh)
+    assert again.hash == surface.hash
+    assert again.name == "a"
+
+
+@pytest.mark.parametrize(
+    ("variables", "words"),
+    [
+        ({"v": np.zeros((3, 3)), "x": 1}, "a.mat: no variable 'f'; it has: v, x"),
+        ({"v": np.eye(3), "f": [[0, 1, 2]]}, "'f' must hold whole numbers from 1 on"),
+        ({"v": np.eye(3), "f": [[1, 2, 2.5]]}, "'f' must hold whole numbers from 1 on"),
+        ({"v": np.eye(3), "f": "text"}, "'f' must hold whole numbers from 1 on"),
+        ({"v": np.eye(3), "f": [[1, 2, 4]]}, "index"),
+        ({"v": "text", "f": [[1, 2, 3]]}, "cannot be read as MAT"),
+    ],
+)
+def test_matlab_file_without_a_mesh(variables, words, tmp_path):
+    with pytest.raises(MeshError, match=re.escape(words)):
+        read_mesh(mat(tmp_path / "a.mat", **variables))
+
+
+def test_damaged_matlab_file(tmp_path):
+    (tmp_path / "a.mat").write_text("hello")
+    with pytest.raises(MeshError, match="cannot be read as MAT"):
+        read_mesh(tmp_path / "a.mat")
+
+
+def test_matlab_file_of_version_7_3_is_refused_with_the_remedy(tmp_path):
+    header = b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM"
+    (tmp_path / "a.mat").write_bytes(header + bytes(512))
+    with pytest.raises(MeshError, match=r"version 7\.3 are not supported.*'-v7'"):
+        read_mesh(tmp_path / "a.mat")
+
+
+def test_matlab_files_are_not_written(surface, tmp_path):
+    with pytest.raises(MeshError, match=r"'\.mat' can be read but not written"):
+        write_mesh(tmp_path / "a.mat", surface)

@@ -1,0 +1,134 @@
+import numpy as np
+import pytest
+from cembench.surfaces.flat_disk import flat_disk
+
+from cembench import DiskMesh, HoledMesh, MeshError, TriangleMesh
+from cembench.core.errors import ParameterError
+from tests import gallery
+
+
+def test_a_checked_mesh_is_frozen_and_owns_its_arrays():
+    V, F = gallery.flat_rectangle()
+    mesh = DiskMesh.from_arrays(V, F)
+    V[0] = 7
+    assert mesh.V[0, 0] == 0
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.V[0] = 1
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.F[0] = 1
+    with pytest.raises(AttributeError):
+        mesh.V = V
+
+
+def test_types_are_the_contract_s_whatever_comes_in():
+    V, F = gallery.flat_rectangle()
+    mesh = DiskMesh.from_arrays(V.astype(np.float32), F.astype(np.uint16))
+    assert mesh.V.dtype == np.float64
+    assert mesh.F.dtype == np.int64
+
+
+def test_boundary_runs_with_the_surface_on_its_left():
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(3, 4))
+    x, y = mesh.V[mesh.boundary, :2].T
+    facing = np.cross(*(mesh.V[mesh.F[0, k]] - mesh.V[mesh.F[0, 0]] for k in (1, 2)))[2]
+    area = 0.5 * (x * np.roll(y, -1) - y * np.roll(x, -1)).sum()
+    assert area * np.sign(facing) == pytest.approx(12)
+    assert len(mesh.boundary) == 14
+    assert sorted([*mesh.boundary, *mesh.interior]) == list(range(mesh.n))
+
+
+def test_orientation_is_repaired_towards_the_majority_with_a_notice():
+    V, F = gallery.flat_rectangle()
+    wrong = F.copy()
+    wrong[[0, 5, 9]] = wrong[[0, 5, 9]][:, ::-1]
+    mesh = DiskMesh.from_arrays(V, wrong)
+    assert any("3 of 40 triangles" in notice for notice in mesh.notices)
+    before, after = (
+        np.cross(V[T[:, 1]] - V[T[:, 0]], V[T[:, 2]] - V[T[:, 0]])[:, 2] for T in (F, mesh.F)
+    )
+    np.testing.assert_array_equal(np.sign(before), np.sign(after))
+
+
+def test_hash_depends_on_content_and_not_on_name():
+    V, F = gallery.flat_rectangle()
+    one, other = (DiskMesh.from_arrays(V, F, name=name) for name in ("a", "b"))
+    assert one.hash == other.hash
+    assert DiskMesh.from_arrays(V + 1e-12, F).hash != one.hash
+
+
+def test_a_tube_is_holed_and_a_disk_is_not():
+    assert len(HoledMesh.from_arrays(*gallery.tube()).loops) == 2
+    with pytest.raises(MeshError, match="single boundary loop"):
+        HoledMesh.from_arrays(*gallery.flat_rectangle())
+
+
+def test_definition_1_is_reported_where_it_fails():
+    V, F = gallery.flat_rectangle(1, 5)  # a strip: no interior vertex at all
+    assert any("no interior vertex" in notice for notice in DiskMesh.from_arrays(V, F).notices)
+    V, F = gallery.flat_rectangle(4, 4)  # two corners lie in a single triangle
+    notices = DiskMesh.from_arrays(V, F).notices
+    assert any("(iv) broken" in notice for notice in notices)
+    assert flat_disk(600).notices == ()
+
+
+V, F = gallery.flat_rectangle()
+
+
+@pytest.mark.parametrize(
+    ("V", "F", "message"),
+    [
+        (V[:, :2], F, r"vertices have shape \(30, 2\); allowed is \(n, 3\)"),
+        (V, F[:, :2], r"faces have shape \(40, 2\); allowed is \(m, 3\)"),
+        (V, F[:0], "no faces"),
+        (V, F.astype(float), "face indices are of type float64; allowed are integers"),
+        (np.where(V == 3, np.nan, V), F, "NaN or infinite at vertex 3, 9"),
+        (V, np.where(F == 5, 77, F), r"vertex index out of range.*allowed is 0 to 29"),
+        (V, np.where(F == 5, -1, F), "out of range"),
+        (np.vstack([V, [[9, 9, 9]]]), F, "isolated vertices, in no triangle: 30"),
+        (np.where(V == [[0, 0, 0]], V[1], V), F, "degenerate triangles"),
+        (V, np.vstack([F, [[0, 0, 1]]]), "degenerate triangles"),
+        (*gallery.three_triangles_on_an_edge(), "non-manifold edge: .* 0-1 with 3"),
+        (*gallery.bow_tie(), "non-manifold vertex 0"),
+        (*gallery.moebius_strip(), "cannot be repaired: the surface is one-sided"),
+    ],
+)
+def test_what_is_no_surface_is_refused(V, F, message):
+    with pytest.raises(MeshError, match=message):
+        TriangleMesh.from_arrays(V, F)
+
+
+@pytest.mark.parametrize(
+    ("surface", "message"),
+    [
+        (gallery.two_pieces, "2 connected components"),
+        (gallery.tetrahedron, "the surface is closed"),
+        (gallery.torus, "the surface is closed"),
+        (gallery.tube, r"2 boundary loops \(of 8, 8 vertices\)"),
+        (gallery.punctured_torus, "genus 1"),
+    ],
+)
+def test_what_is_no_disk_is_refused(surface, message):
+    mesh = TriangleMesh.from_arrays(*surface())
+    with pytest.raises(MeshError, match=message):
+        DiskMesh.from_arrays(mesh.V, mesh.F)
+
+
+def test_the_longest_loop_is_the_outer_one_unless_a_vertex_names_another():
+    mesh = gallery.three_holes()
+    outer, holes = mesh.outer_and_holes()
+    assert abs(mesh.V[outer]).max() == pytest.approx(1)
+    assert len(outer) > len(holes[0]) > len(holes[1]) > 0
+    named, others = mesh.outer_and_holes(int(holes[1][3]))
+    assert (named == holes[1]).all()
+    assert (others[0] == outer).all()
+    assert len(others) == 3
+
+
+@pytest.mark.parametrize(
+    ("vertex", "message"), [(10_000, "is no vertex"), (-1, "is no vertex"), (320, "lies on no")]
+)
+def test_an_outer_boundary_that_is_not_there(vertex, message):
+    mesh = gallery.three_holes(600)
+    assert 320 in mesh.interior
+    with pytest.raises(ParameterError, match=rf"outer={vertex}: .*{message}.*longest loops"):
+        mesh.outer_and_holes(vertex)

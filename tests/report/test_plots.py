@@ -1,0 +1,120 @@
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from cembench.report.content.evidence import Evidence
+from cembench.report.content.figures.cost_by_faces import cost_by_faces, fit, printed_points
+from cembench.report.content.figures.energy_by_iteration import energy_by_iteration
+from cembench.report.content.figures.performance_profile import performance_profile, ratios
+from cembench.report.content.figures.time_by_phase import time_by_phase
+from cembench.report.palette import looks
+from cembench.report.plots import Axis, Panel, Plot, Point, Series, plotly_of, write_plot
+from tests.report.small_run import meshes, ok, record, write_run
+
+
+@pytest.fixture
+def plot():
+    kinds = ("line", "points", "both", "steps", "bars", "stack")
+    panels = tuple(
+        Panel(
+            Axis("x"),
+            Axis("y", log=kind == "line"),
+            (
+                Series(
+                    kind,
+                    ["a", "b_$", "c"] if kind in ("bars", "stack") else [0, 1, 2],
+                    [1.0, None, 3.0],
+                    kind,
+                ),
+            ),
+            f"$ {kind}",
+        )
+        for kind in kinds
+    )
+    return Plot("kinds", "All kinds", panels, columns=3)
+
+
+def test_a_plot_is_files_and_data_and_the_same_bytes_again(plot, tmp_path):
+    figure = write_plot(plot, tmp_path / "one")
+    write_plot(plot, tmp_path / "two")
+    assert [path.suffix for path in figure.files] == [".png", ".svg", ".pdf"]
+    for path in [*figure.files, figure.data]:
+        assert (tmp_path / "one" / path).read_bytes() == (tmp_path / "two" / path).read_bytes()
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "one" / figure.data).read_text())))
+    assert [(r["x"], r["y"]) for r in rows if r["series"] == "bars"] == [
+        ("a", "1.0"),
+        ("b_$", ""),
+        ("c", "3.0"),
+    ]
+
+
+def test_plotly_is_told_the_same_values(plot):
+    described = plotly_of(plot)
+    json.dumps(described, allow_nan=False)
+    assert [trace["y"] for trace in described["data"]] == [[1.0, None, 3.0]] * 6
+    assert described["layout"]["yaxis"]["type"] == "log"
+    steps = next(t for t in described["data"] if t["name"] == "steps")
+    assert (steps["line"]["shape"], steps["mode"]) == ("hv", "lines")
+
+
+def test_algorithms_look_different_from_one_another_and_the_same_everywhere():
+    names = ["cem", "qiem", "fdm", "ldm", "harmonic-circle", "lscm", "mine", "yours"]
+    found = looks(names)
+    assert len({found[name].colour for name in names}) == len(names)
+    assert looks(["zebra", "cem"])["cem"] == found["cem"]
+
+
+def test_a_fitted_exponent_is_that_of_a_power_law():
+    points = [Point(n, 1e-6 * n**1.25) for n in (100, 1_000, 50_000, 10**6)]
+    law = fit(points)
+    assert law.exponent == pytest.approx(1.25)
+    assert law.error == pytest.approx(0, abs=1e-6)
+    assert fit(points[:2]) is None
+    assert fit([points[0]] * 5) is None
+
+
+def test_the_printed_seconds_have_their_exponents():
+    x, y = np.log([p[:2] for p in printed_points("cem")]).T
+    assert fit(printed_points("cem")).exponent == pytest.approx(np.polyfit(x, y, 1)[0])
+    assert len(printed_points("fdm")) == 18
+
+
+def test_a_failure_counts_as_infinitely_slow_in_a_profile(evidence):
+    found, used = ratios(evidence, "reuse")
+    assert used == ["Chinese Vase", "Liu's Neutral Face"]  # LDM was not tried on the third
+    assert found["QIEM"][0] == np.inf
+    panel = performance_profile(evidence).panels[0]
+    curves = {series.name: series.y for series in panel.series}
+    assert max(curves["QIEM"]) == 50
+    assert max(curves["CEM"]) == 100
+    assert "LSCM" not in curves
+
+
+def test_the_phases_of_every_algorithm_add_up_to_all_of_its_time(evidence):
+    panel = time_by_phase(evidence).panels[0]
+    total = np.sum([series.y for series in panel.series], axis=0)
+    np.testing.assert_allclose(total, 100)
+
+
+def test_cost_is_shown_by_policy_beside_the_printed(evidence):
+    titles = [panel.title for panel in cost_by_faces(evidence).panels]
+    assert titles == [
+        "measured here, solves: reuse",
+        "measured here, solves: backslash",
+        "printed in the paper (Table 1)",
+    ]
+
+
+def test_energies_of_algorithms_not_in_the_paper_stand_beside_those_of_cem(tmp_path):
+    store = write_run(tmp_path, ("reuse",))
+    vase = meshes()["Chinese Vase"]
+    outcome, uv = ok("direct-cem", vase, 1.0)
+    rival = record("direct-cem", vase, "Chinese Vase", "reuse", outcome)
+    store.save(rival, uv, {"id": "machine", "cpu": "x"})
+    plot, _ = energy_by_iteration(Evidence.of(tmp_path))
+    (panel,) = plot.panels
+    assert [series.name for series in panel.series] == ["CEM", "Direct CEM"]
+    assert panel.series[1].y[-1] < panel.series[0].y[0]

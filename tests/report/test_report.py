@@ -1,0 +1,248 @@
+import io
+import json
+import re
+
+import pytest
+from rich.console import Console
+
+from cembench.core.errors import RecordError
+from cembench.report.content.evidence import Evidence
+from cembench.report.document import (
+    Claim,
+    Gap,
+    figures_of,
+    sections_of,
+    tables_of,
+)
+from cembench.report.render.terminal_report import paper_tables
+from cembench.report.write_report import write_report
+from cembench.results.store import Store, merge
+from tests.report.small_run import write_run
+
+
+def items_of(report, kind):
+    return [i for _, section in sections_of(report) for i in section.items if isinstance(i, kind)]
+
+
+def test_everything_that_the_report_names_is_there(written):
+    report, folder = written
+    for figure in figures_of(report):
+        for path in [*figure.files, *([figure.data] if figure.data else [])]:
+            assert (folder / path).stat().st_size > 0, path
+    for table in tables_of(report):
+        assert all(len(row) == len(table.columns) for row in table.rows)
+        assert (folder / "tables" / f"{table.name}.csv").is_file()
+        assert (folder / "tables" / f"{table.name}.tex").is_file()
+        for row in table.rows:
+            assert all(not value.record or value.record in report.records for value in row)
+    names = [t.name for t in tables_of(report)]
+    assert len(set(names)) == len(names)
+    assert {path.name for path in folder.iterdir()} >= {"index.html", "report.md", "report.tex"}
+
+
+def test_the_papers_figures_are_there_or_a_gap_names_the_command(written):
+    report, _ = written
+    there = {figure.paper for figure in figures_of(report)}
+    gaps = {gap.title.partition(":")[0]: gap for gap in items_of(report, Gap)}
+    for k in range(1, 15):
+        assert f"Figure {k}" in there or f"Figure {k}" in gaps
+    assert {"Figure 1", "Figure 3", "Figure 8", "Figure 9", "Figure 12"} <= there
+    assert "cembench run --surfaces left-hand -a cem" in gaps["Figure 2"].command
+    assert gaps["Figure 13"].command.startswith("cembench morph --run ")
+
+
+def test_a_surface_has_a_page_with_every_map_that_ended_ok(written):
+    report, folder = written
+    pages = {s.title: s for _, s in sections_of(report) if s.page}
+    assert set(pages) == {"Chinese Vase", "Liu's Neutral Face", "flat-disk"}
+    gallery = pages["Chinese Vase"].items[1]
+    assert [f.title for f in gallery.figures] == ["FDM", "LDM", "CEM", "Harmonic", "LSCM"]
+    assert (folder / "pages" / "surface-hemi-ellipsoid.md").is_file()
+
+
+def test_exhibits_are_sections_with_their_pictures_and_tables(written):
+    report, folder = written
+    section = next(s for _, s in sections_of(report) if s.name == "exhibit-koebe")
+    (figure,) = (i for i in section.items if getattr(i, "files", None))
+    assert (folder / figure.files[0]).is_file()
+    (table,) = (i for i in section.items if hasattr(i, "rows"))
+    assert [v.number for row in table.rows for v in row] == [1, 0.1, 2, None]
+
+
+def test_what_did_not_end_ok_and_what_is_missing_are_listed(written):
+    table = next(t for t in tables_of(written[0]) if t.name == "not-ok")
+    statuses = [row[3].text for row in table.rows]
+    assert statuses.count("failed") == 2
+    assert statuses.count("timeout") == 2
+    assert statuses.count("missing") == 1
+
+
+def test_there_are_at_least_ten_claims_and_none_is_without_figures(written):
+    claims = items_of(written[0], Claim)
+    assert len(claims) >= 10
+    assert len({claim.name for claim in claims}) == len(claims)
+    assert all(claim.figures and claim.place and claim.test for claim in claims)
+    assert len({claim.verdict for claim in claims}) == 4
+
+
+def test_links_of_the_markdown_lead_somewhere(written):
+    _, folder = written
+    records = (folder / "records.md").read_text()
+    for page in [folder / "report.md", *(folder / "pages").iterdir()]:
+        for target in re.findall(r"\]\(([^)]+)\)", page.read_text()):
+            path, _, anchor = target.partition("#")
+            assert (page.parent / path).is_file(), (page, target)
+            assert not anchor or f'<a id="{anchor}">' in records
+
+
+def test_the_terminal_shows_four_tables_in_80_columns(written):
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(paper_tables(written[0]))
+    text = console.export_text()
+    assert all(f"Table {k}: " in text for k in (1, 2, 3, 4))
+    assert max(map(len, text.splitlines())) <= 80
+    assert "1.00ˢ" in text
+    assert "failed" in text
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_the_same_run_gives_the_same_bytes(small_run, tmp_path):
+    one, two = (tmp_path / name for name in ("one", "two"))
+    for folder in (one, two):
+        write_report(small_run, folder, "cembench report run")
+    files = json.loads((one / "contents.json").read_text())
+    assert json.loads((two / "contents.json").read_text()) == files
+    for name in files:
+        assert (one / name).read_bytes() == (two / name).read_bytes(), name
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_an_older_report_is_replaced_and_other_files_are_left(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / "mine.txt").write_text("mine")
+    (folder / "old.png").write_text("old")
+    (folder / "contents.json").write_text('["old.png", "../run/plan.json"]')
+    # A surface that an older run did not keep, and no plan.
+    next((tmp_path / "run" / "meshes").iterdir()).unlink()
+    report = write_report(store.folder, folder, "c")
+    assert (folder / "mine.txt").read_text() == "mine"
+    assert not (folder / "old.png").exists()
+    assert (tmp_path / "run" / "plan.json").exists()
+    gaps = items_of(report, Gap)
+    assert any("does not hold the surface" in gap.why for gap in gaps)
+    assert any("--solves reuse,backslash" in gap.command for gap in gaps)
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_a_run_of_other_surfaces_alone_has_a_report(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    for record in store.records():
+        if record.mesh.paper_row:
+            next((tmp_path / "run" / "records").glob(f"{record.cell.label}.json")).unlink()
+    report = write_report(store.folder, tmp_path / "out", "c")
+    assert any(gap.title.startswith("Tables 1 to 4") for gap in items_of(report, Gap))
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(paper_tables(report))
+    assert "flat-disk" in console.export_text()
+
+
+def test_no_run_and_no_record_are_errors_and_nothing_is_written(cli):
+    code, _, err = cli("report", "nowhere")
+    assert code == 2
+    assert "nowhere holds no run: there is no such folder. Make one with `cembench run`" in err
+    (cli.folder / "empty" / "records").mkdir(parents=True)
+    code, _, err = cli("report", "empty", "-o", "out")
+    assert code == 2
+    assert "empty holds no record: no cell of it is finished" in err
+    assert not (cli.folder / "out").exists()
+
+
+def test_a_file_is_no_folder_for_a_report(small_run, tmp_path):
+    (tmp_path / "out").write_text("")
+    with pytest.raises(RecordError, match="is a file; name a folder with -o"):
+        write_report(small_run, tmp_path / "out", "c")
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_nothing_is_left_of_a_report_that_fails(small_run, tmp_path, monkeypatch):
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("cembench.report.write_report.write_latex", full)
+    with pytest.raises(RecordError, match="No space left on device"):
+        write_report(small_run, tmp_path / "out", "c")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_the_verb_says_where_the_report_is(cli, small_run):
+    code, out, err = cli("report", small_run, "-o", "out", "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert (cli.folder / found["html"]).is_file()
+    assert found["claims"]["delaunay"] == "holds"
+    assert "table-4" in found["tables"]
+    assert "[1/5] surface Chinese Vase" in err
+
+
+def test_of_a_cell_measured_twice_the_later_record_counts(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    old = next(r for r in store.records() if r.cell.algorithm == "cem")
+    new = old.model_copy(
+        update={
+            "cell": old.cell.model_copy(update={"code_hash": "edited"}),
+            "started_at": "2026-02-01T00:00:00+00:00",
+        }
+    )
+    store.save(new, None, {"id": "machine"})
+    evidence = Evidence.of(store.folder)
+    surface = next(s for s in evidence.surfaces if s.mesh_hash == old.cell.mesh_hash)
+    assert evidence.find(surface, evidence.series_of("cem")).cell.key == new.cell.key
+    assert evidence.superseded == 1
+
+
+def test_other_parameters_are_a_series_of_their_own(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    old = next(r for r in store.records() if r.cell.algorithm == "cem")
+    other = old.cell.model_copy(update={"parameters": {"inversion": False}})
+    store.save(old.model_copy(update={"cell": other}), None, {"id": "machine"})
+    evidence = Evidence.of(store.folder)
+    labels = [s.label for s in evidence.series if s.algorithm == "cem"]
+    assert labels == ["CEM", "CEM (inversion=False)"]
+    assert evidence.series_of("cem").label == "CEM"
+
+
+def test_a_store_keeps_surfaces_and_knows_a_wrong_one(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    record = store.records()[0]
+    assert store.mesh(record.cell).hash == record.cell.mesh_hash
+    assert Store(tmp_path / "none").mesh(record.cell) is None
+    one, two = sorted((tmp_path / "run" / "meshes").iterdir())[:2]
+    one.write_bytes(two.read_bytes())
+    wrong = next(r for r in store.records() if r.cell.mesh_hash.startswith(one.stem))
+    with pytest.raises(RecordError, match="holds another surface"):
+        store.mesh(wrong.cell)
+    one.write_bytes(b"cut")
+    with pytest.raises(RecordError, match="cannot be read"):
+        store.mesh(wrong.cell)
+
+
+def test_runs_that_are_merged_bring_their_surfaces(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    merge([store], Store(tmp_path / "both"))
+    names = [path.name for path in (tmp_path / "run" / "meshes").iterdir()]
+    assert sorted(p.name for p in (tmp_path / "both" / "meshes").iterdir()) == sorted(names)
+
+
+@pytest.mark.usefixtures("quick_drawing")
+def test_reproduce_is_a_run_and_its_report(cli, monkeypatch):
+    monkeypatch.setattr("cembench.results.paper.profiles.surfaces_of", lambda *_: ["nefertiti"])
+    code, out, _ = cli("reproduce", "-o", "here")
+    assert code == 0
+    assert all(f"Table {k}: " in out for k in (1, 2, 3, 4))
+    assert max(map(len, out.splitlines()[:-1])) <= 80
+    assert out.splitlines()[-1] == f"Report: {cli.folder / 'here/report/index.html'}"
+    assert (cli.folder / "here/report/report.tex").is_file()

@@ -1,0 +1,125 @@
+import numpy as np
+import pytest
+
+from cembench.results.comparison import (
+    compare,
+    compare_ratios,
+    compare_runs,
+    is_unstable,
+    machine_differences,
+)
+from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, Outcome, Record, Round
+
+
+def record_of(seconds, sittings=None, **cell):
+    sittings = sittings or ["s"] * len(seconds)
+    rounds = tuple(Round(calls=(s,), sitting=w) for s, w in zip(seconds, sittings, strict=True))
+    return Record(
+        cell=Cell(**{"algorithm": "a", "code_hash": "c", "mesh": "m", "mesh_hash": "h"} | cell),
+        title="A",
+        target="disk",
+        mesh=MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0),
+        outcome=Outcome(status="ok" if rounds else "failed", rounds=rounds),
+        environment="e",
+        started_at="",
+    )
+
+
+def test_the_speedup_is_eq_33_with_its_interval():
+    found = compare(record_of([3.0, 3.3, 2.7, 3.0, 3.0, 3.0]), record_of([1.0] * 6))
+    assert found.speedup == pytest.approx(2)
+    assert found.speedup_interval.low == pytest.approx(1.7)
+    assert found.speedup_interval.high == pytest.approx(2.3)
+    assert found.verdict == "slower"
+    assert compare(record_of([1.0] * 6), record_of([2.0] * 6)).verdict == "faster"
+
+
+def test_what_slows_both_cancels():
+    drift = np.array([1, 2, 4, 8, 16, 32.0])
+    found = compare(record_of(1.1 * drift), record_of(drift))
+    assert found.verdict == "slower"
+    assert found.interval.high == pytest.approx(1.1)
+
+
+@pytest.mark.parametrize(
+    ("ours", "theirs", "verdict", "rounds"),
+    [
+        (record_of([1.0] * 5), record_of([2.0] * 5), "too few rounds", 5),
+        (record_of([1, 1, 1, 1, 1, 3.0]), record_of([2.0] * 6), "undecided", 6),
+        (record_of([1.0] * 6, ["x"] * 6), record_of([2.0] * 6), "not side by side", 0),
+        (record_of([1.0] * 7, [*"sssssss"]), record_of([2.0] * 7, [*"xssssss"]), "faster", 6),
+    ],
+)
+def test_nothing_is_said_that_is_not_shown(ours, theirs, verdict, rounds):
+    found = compare(ours, theirs)
+    assert (found.verdict, found.rounds) == (verdict, rounds)
+
+
+def test_there_is_no_comparison_without_times():
+    assert compare(record_of([]), record_of([1.0])) is None
+    assert compare_runs([record_of([])], [record_of([1.0])]) == []
+
+
+def test_swapping_both_inverts_the_ratio():
+    ratios = np.array([0.5, 0.9, 1.3, 2.0, 4.0, 5.0])
+    assert compare_ratios(ratios).ratio == pytest.approx(1 / compare_ratios(1 / ratios).ratio)
+
+
+def noisy_seconds(rng, runs, rounds):
+    """Two algorithms of one cost: lognormal noise, spikes, a steady drift and a step within the
+    run; which of both is measured first in a round is random."""
+    time = np.arange(2 * rounds) + rng.uniform(-0.5, 0.5, (runs, 1))
+    drift = np.exp(rng.normal(0, 0.05, (runs, 1)) * time)
+    step = np.where(time > rng.uniform(0, 2 * rounds, (runs, 1)), rng.uniform(1, 1.5, (runs, 1)), 1)
+    spikes = np.where(rng.random((runs, 2 * rounds)) < 0.05, 3.0, 1.0)
+    noise = rng.lognormal(0, 0.1, (runs, 2 * rounds))
+    pairs = (drift * step * spikes * noise).reshape(runs, rounds, 2)
+    return rng.permuted(pairs, axis=2)
+
+
+@pytest.mark.parametrize("rounds", [DEFAULT_ROUNDS, 9, 15])
+def test_equal_algorithms_are_told_apart_in_at_most_5_percent(rounds):
+    rng = np.random.default_rng(7)
+    pairs = noisy_seconds(rng, 4000, rounds)
+    verdicts = [compare_ratios(ours / theirs).verdict for ours, theirs in pairs.transpose(0, 2, 1)]
+    wrong = np.mean([verdict != "undecided" for verdict in verdicts])
+    assert wrong < 0.05, f"{wrong:.1%} of {len(verdicts)}"
+
+
+def test_a_bootstrap_of_six_rounds_would_be_wrong_more_often_than_it_says():
+    """Why the interval is not one: resampled means of six ratios lie too close together."""
+    rng = np.random.default_rng(7)
+    pairs = np.log(noisy_seconds(rng, 1000, DEFAULT_ROUNDS))
+    differences = pairs[:, :, 0] - pairs[:, :, 1]
+    drawn = rng.integers(0, DEFAULT_ROUNDS, (1000, 400, DEFAULT_ROUNDS))
+    means = np.take_along_axis(differences[:, None, :], drawn, axis=2).mean(axis=2)
+    low, high = np.percentile(means, [2.5, 97.5], axis=1)
+    assert np.mean((low > 0) | (high < 0)) > 0.05
+
+
+def test_a_true_difference_is_found():
+    rng = np.random.default_rng(7)
+    found = [compare_ratios(1.5 * rng.lognormal(0, 0.1, 6)).verdict for _ in range(200)]
+    assert found.count("slower") > 190
+
+
+def test_a_figure_is_unstable_where_its_interval_is_wide():
+    assert is_unstable(record_of([1, 1, 1, 1, 1, 1.3]))
+    assert not is_unstable(record_of([1, 1, 1, 1, 1, 1.1]))
+    assert not is_unstable(record_of([1, 2]))
+
+
+def test_two_runs_compare_cell_by_cell():
+    before = [record_of([2.0, 2.1, 2.2, 2.0, 2.1, 2.0]), record_of([1.0] * 6, solves="backslash")]
+    after = [record_of([1.0] * 6, code_hash="other"), record_of([1.0] * 6, threads=2)]
+    (change,) = compare_runs(before, after)
+    assert change.comparison.verdict == "faster"
+    assert (change.comparison.interval.low, change.comparison.interval.high) == (1 / 2.2, 0.5)
+    (few,) = compare_runs([record_of([1.0])], [record_of([2.0])])
+    assert few.comparison.verdict == "too few rounds"
+
+
+def test_machines_differ_in_what_changes_seconds():
+    one = {"cpu": "x", "cores": 2, "git": "a"}
+    assert machine_differences(one, one | {"git": "b"}) == []
+    assert machine_differences(one, one | {"cpu": "y"}) == ["cpu: x / y"]

@@ -1,0 +1,38 @@
+import pytest
+
+from cembench.core.errors import RecordError
+from cembench.results.exhibits import Exhibit, Picture, exhibit_folder, read_exhibits, write_exhibit
+
+
+def exhibit(name="koebe"):
+    return Exhibit(
+        name=name,
+        title="Steps of Koebe's method",
+        text="What happens.",
+        command="cembench holes",
+        origin="surface",
+        pictures=(Picture(file="steps.png", caption="Steps"),),
+        facts={"sweeps": 1},
+    )
+
+
+def test_an_exhibit_comes_back_as_it_was_written(tmp_path):
+    (exhibit_folder(tmp_path, "koebe") / "steps.png").write_bytes(b"png")
+    write_exhibit(tmp_path, exhibit())
+    assert read_exhibits(tmp_path) == [exhibit()]
+
+
+def test_a_run_without_exhibits_has_none(tmp_path):
+    assert read_exhibits(tmp_path) == []
+
+
+def test_a_picture_that_is_not_there_is_an_error_and_nothing_is_described(tmp_path):
+    with pytest.raises(RecordError, match=r"steps\.png"):
+        write_exhibit(tmp_path, exhibit())
+    assert read_exhibits(tmp_path) == []
+
+
+def test_a_damaged_description_is_named(tmp_path):
+    (exhibit_folder(tmp_path, "koebe") / "exhibit.json").write_text("{")
+    with pytest.raises(RecordError, match=r"exhibit\.json"):
+        read_exhibits(tmp_path)

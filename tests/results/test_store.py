@@ -1,0 +1,168 @@
+import json
+
+import numpy as np
+import pytest
+
+from cembench.core.errors import RecordError
+from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.store import Store, merge
+
+
+@pytest.fixture
+def record():
+    cell = Cell(algorithm="cem", code_hash="c0de", mesh="lion", mesh_hash="abc")
+    facts = MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0)
+    metrics = {"dilatation_max": float("inf"), "flipped_triangles": 0}
+    rounds = tuple(Round(calls=(s,)) for s in (0.1, 0.3, 0.2))
+    outcome = Outcome(status="ok", rounds=rounds, metrics=metrics)
+    return Record(
+        cell=cell,
+        title="CEM",
+        target="disk",
+        mesh=facts,
+        outcome=outcome,
+        environment="e",
+        started_at="2026-01-01T00:00:00",
+    )
+
+
+def test_what_is_saved_is_found_again(record, tmp_path):
+    store = Store(tmp_path / "run")
+    assert store.find(record.cell) is None
+    uv = np.exp(1j * np.arange(3))
+    store.save(record, uv, {"id": "e", "cpu": "x"})
+    again = store.find(record.cell)
+    assert again.cell == record.cell
+    assert again.outcome.median_seconds == 0.2
+    assert again.outcome.metrics == {"dilatation_max": None, "flipped_triangles": 0}
+    np.testing.assert_array_equal(store.uv(record.cell), uv)
+    assert store.records() == [again]
+    text = next((tmp_path / "run/records").iterdir()).read_text()
+    assert json.loads(text, parse_constant=pytest.fail)["outcome"]["status"] == "ok"
+    assert json.loads((tmp_path / "run/environments/e.json").read_text())["cpu"] == "x"
+
+
+def test_the_key_is_the_content_and_not_the_label(record):
+    cell = record.cell
+    assert cell.model_copy(update={"mesh": "renamed"}).key == cell.key
+    for change in (
+        {"threads": 2},
+        {"solves": "backslash"},
+        {"parameters": {"a": 1}},
+        {"mesh_hash": "x"},
+        {"code_hash": "x"},
+        {"repeats": 9},
+    ):
+        assert cell.model_copy(update=change).key != cell.key
+
+
+def test_damage_is_said(record, tmp_path):
+    store = Store(tmp_path / "run")
+    with pytest.raises(RecordError, match="holds no run"):
+        store.records()
+    store.save(record, None, {})
+    assert store.uv(record.cell) is None
+    path = next((tmp_path / "run/records").iterdir())
+    path.write_text(path.read_text().replace('"schema_version": 1', '"schema_version": 99'))
+    with pytest.raises(RecordError, match="schema version 99; this cembench reads 1"):
+        store.records()
+    path.write_text("{")
+    with pytest.raises(RecordError, match="is not a record"):
+        store.find(record.cell)
+
+
+def test_nothing_is_half_written(record, tmp_path, monkeypatch):
+    store = Store(tmp_path / "run")
+
+    def fail(descriptor):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.fsync", fail)
+    with pytest.raises(RecordError, match="cannot be written: No space left"):
+        store.save(record, np.zeros(3, complex), {"id": "e"})
+    assert not [path for path in (tmp_path / "run").rglob("*") if path.is_file()]
+
+
+def test_samples_are_kept_by_environment_until_the_record_is_there(record, tmp_path):
+    store = Store(tmp_path)
+    samples = store.samples(record.cell, "e")
+    assert (samples.check(), samples.uv(), samples.rounds()) == (None, None, {})
+    assert store.rounds_done(record.cell) is None
+    checked = record.outcome.model_copy(update={"metrics": {"flipped_triangles": 0}})
+    samples.save_check(checked, np.ones(3, complex))
+    for number in (1, 0):
+        samples.save_round(number, record.outcome.rounds[number])
+    assert samples.check() == checked
+    assert samples.rounds() == {0: record.outcome.rounds[0], 1: record.outcome.rounds[1]}
+    assert not store.samples(record.cell, "another machine").rounds()
+    assert store.rounds_done(record.cell) == 2
+    store.save(record, samples.uv(), {"id": "e"})
+    assert store.rounds_done(record.cell) is None
+
+
+def test_a_line_that_a_kill_cut_short_is_not_there_and_is_cut_off(record, tmp_path):
+    samples = Store(tmp_path).samples(record.cell, "e")
+    samples.save_round(0, record.outcome.rounds[0])
+    with samples.journal.open("ab") as file:
+        file.write(b'{"number":1,"rou')
+    assert samples.rounds() == {0: record.outcome.rounds[0]}
+    samples.save_round(2, record.outcome.rounds[2])
+    assert list(samples.rounds()) == [0, 2]
+
+
+def test_a_damaged_sample_is_said(record, tmp_path):
+    samples = Store(tmp_path).samples(record.cell, "e")
+    samples.save_round(0, record.outcome.rounds[0])
+    samples.journal.write_text('{"number": "none"}\n')
+    with pytest.raises(RecordError, match=r"e\.jsonl is damaged: Input should be a valid integer"):
+        samples.rounds()
+
+
+def test_samples_that_cannot_be_written_are_said(record, tmp_path):
+    (tmp_path / "samples").touch()
+    with pytest.raises(RecordError, match="cannot be written"):
+        Store(tmp_path).samples(record.cell, "e").save_round(0, record.outcome.rounds[0])
+
+
+def test_a_lock_is_held_by_one_and_what_a_killed_run_left_is_cleared(tmp_path):
+    store = Store(tmp_path / "run")
+    assert not store.is_locked()
+    (tmp_path / "run/scratch").mkdir(parents=True)
+    (tmp_path / "run/scratch/V.npy").touch()
+    (tmp_path / "run/.draft-x").touch()
+    with store.locked() as scratch:
+        assert not list(scratch.iterdir())
+        assert store.is_locked()
+    assert not store.is_locked()
+    assert [path.name for path in (tmp_path / "run").iterdir()] in ([], ["lock"])
+
+
+def test_a_folder_that_cannot_be_locked_is_said(tmp_path):
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordError, match="cannot be written"), Store(tmp_path / "file").locked():
+        pass
+
+
+def test_merging_takes_the_ok_and_then_the_later_one(record, tmp_path):
+    def saved(name, **changes):
+        changed = {"started_at": name, **changes}
+        store = Store(tmp_path / name)
+        store.save(record.model_copy(update=changed), np.ones(3, complex), {"id": "e", "cpu": name})
+        return store
+
+    failed = Outcome(status="failed", cause="it did")
+    runs = [saved("2001"), saved("2003"), saved("2002"), saved("2004", outcome=failed)]
+    runs.append(saved("2000", cell=record.cell.model_copy(update={"threads": 2})))
+    into = Store(tmp_path / "all")
+    assert merge(runs, into) == 2
+    assert sorted(r.started_at for r in into.records()) == ["2000", "2003"]
+    assert into.uv(record.cell) is not None
+    assert merge([runs[0]], into) == 2
+    assert sorted(r.started_at for r in into.records()) == ["2000", "2003"]
+
+
+def test_the_plan_is_kept(record, tmp_path):
+    store = Store(tmp_path)
+    assert store.plan() == []
+    store.save_plan([record.cell])
+    assert store.plan() == [record.cell]

@@ -1,0 +1,45 @@
+import pytest
+
+from cembench.running.estimate import estimate, fit_power_law
+from tests.results.test_comparison import record_of
+
+
+def known(faces, seconds, **cell):
+    record = record_of([seconds] * 6, **cell)
+    mesh = record.mesh.model_copy(update={"faces": faces})
+    outcome = record.outcome.model_copy(update={"peak_memory_bytes": 1000 * faces})
+    return record.model_copy(update={"mesh": mesh, "outcome": outcome})
+
+
+def test_a_power_law_is_found_again():
+    law = fit_power_law([(n, 3 * n**1.5) for n in (10.0, 100.0, 700.0)])
+    assert (law.factor, law.exponent) == (pytest.approx(3), pytest.approx(1.5))
+    assert fit_power_law([(100.0, 2.0)]).at(100) == pytest.approx(2)
+
+
+def test_the_same_cell_counts_before_other_sizes_and_those_before_the_paper():
+    cell = record_of([1.0], mesh_hash="big").cell
+    others = [known(100, 1e-3), known(1000, 1e-2), known(1000, 9.0, solves="backslash")]
+    same = estimate(cell, 10_000, [*others, known(10_000, 0.5, mesh_hash="big")])
+    assert (same.basis, same.call_seconds) == ("recorded", pytest.approx(0.5))
+    assert same.memory_bytes == pytest.approx(1e7)
+    scaled = estimate(cell, 10_000, others)
+    assert (scaled.basis, scaled.call_seconds) == ("other sizes", pytest.approx(0.1))
+    rough = estimate(cell, 1_287_579, [])
+    assert rough.basis == "rough"
+    assert 100 < rough.call_seconds < 1000  # the paper's slowest took 386 s
+    cem = estimate(record_of([1.0], algorithm="cem").cell, 1_287_579, [])
+    assert 3 < cem.call_seconds < 30  # 13 s
+    assert rough.seconds > 6 * rough.call_seconds
+
+
+def test_repeats_cost():
+    few, many = (record_of([1.0], repeats=n).cell for n in (1, 10))
+    assert estimate(many, 1000, []).seconds > 4 * estimate(few, 1000, []).seconds
+
+
+def test_an_empty_process_does_not_grow_with_the_triangles():
+    cell = record_of([1.0], mesh_hash="big").cell
+    tiny, middle = known(150_000, 1e-3), known(300_000, 1e-2)  # 150 MB, 300 MB
+    assert estimate(cell, 60_000_000, [tiny]).memory_bytes == pytest.approx(150e6)
+    assert estimate(cell, 600_000, [tiny, middle]).memory_bytes == pytest.approx(450e6)
