@@ -14,7 +14,7 @@ import importlib.util
 import inspect
 import sys
 import typing
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.metadata import entry_points
@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from cembench.core.errors import ParameterError, RegistryError
+from cembench.core.parameterization import MapStep
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
@@ -37,6 +38,9 @@ Target = Literal["disk", "free boundary", "circular holes"]
 Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
 #: From a surface's vertices (n, 3) to the image (n,) of each under its conformal map.
 ExactMap = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
+
+#: The steps that an algorithm passes through on a mesh, each as it is done.
+Steps = Callable[..., Iterator[MapStep]]
 
 _MARK = "__cembench__"
 C = TypeVar("C", bound=Callable[..., Any])
@@ -107,6 +111,7 @@ class Algorithm(_Registered):
     target: Target = "disk"
     mesh_type: type[TriangleMesh] = DiskMesh
     source: str = ""
+    steps: Steps | None = None
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,13 @@ class Surface(_Registered):
 
 
 def algorithm(
-    name: str, *, title: str, target: Target, source: str = "", notes: str = ""
+    name: str,
+    *,
+    title: str,
+    target: Target,
+    source: str = "",
+    notes: str = "",
+    steps: Steps | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
 
@@ -137,6 +148,8 @@ def algorithm(
         Where it was published.
     notes : str
         What it is faithful to, and what it had to decide; default: the docstring's second part.
+    steps : callable, optional
+        Takes a mesh, `sweeps` and `outer`, and yields every :class:`MapStep` on the way to the map.
 
     The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
     Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
@@ -173,6 +186,7 @@ def algorithm(
             target=target,
             mesh_type=mesh_type,
             source=source,
+            steps=steps,
         )
         setattr(function, _MARK, spec)
         return function

@@ -11,7 +11,7 @@ from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import algorithm
 
-from .steps import Patches, Weights, finished, koebe_steps
+from .steps import Patches, Weights, finished, koebe_steps, shown_steps
 
 
 @algorithm(
@@ -19,6 +19,7 @@ from .steps import Patches, Weights, finished, koebe_steps
     title="Koebe-CEM",
     target="circular holes",
     source="The CEM paper, Algorithm 2; Zeng et al. 2009",
+    steps=shown_steps,
 )
 def koebe_cem(
     mesh: HoledMesh,

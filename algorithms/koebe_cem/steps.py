@@ -25,6 +25,7 @@ from cembench.conformal.patches import disk_patch, fan_patch
 from cembench.conformal.planar import backward_arcs, fitted_circle, polygon_area, signed_areas
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import MapStep
 from cembench.linear_algebra.dense_cholesky import DenseCholesky
 from cembench.mesh.triangle_mesh import HoledMesh
 
@@ -84,7 +85,7 @@ def koebe_steps(
 ) -> Iterator[Step]:
     """Which images does Koebe's method pass through? Each step as it is done.
 
-    Parameters as in ``algorithms/koebe_cem.py``.
+    Parameters as in ``koebe_cem.py``.
 
     Raises
     ------
@@ -116,6 +117,13 @@ def koebe_steps(
                 start, tolerance=tolerance, max_iterations=max_iterations, inversion=inversion
             )
             yield Step(sweep, k, before, uv, energies, order_kept, own)
+
+
+def shown_steps(mesh: HoledMesh, *, sweeps: int = 1, outer: int | None = None) -> Iterator[MapStep]:
+    """Yield the steps of Koebe's method with the map that each sweep would end in."""
+    for step in koebe_steps(mesh, sweeps=sweeps, outer=outer):
+        result = None if step.boundary else finished(mesh, step, outer=outer)[0]
+        yield MapStep(step.sweep, step.boundary, step.before, step.uv, step.energies, result)
 
 
 def finished(

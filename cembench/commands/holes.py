@@ -11,13 +11,13 @@ from cembench.commands.console import Json, complain, err, out, print_json
 from cembench.commands.run import DEFAULT_RUN
 
 if TYPE_CHECKING:
-    from cembench.algorithms.koebe_cem.steps import Step
+    from cembench.core.parameterization import MapStep
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import Algorithm
     from cembench.results.records import MeshOrigin, Record
 
-#: The surface of the paper's Figures 1 and 7, and the algorithm whose sweeps are counted.
-STAND_IN, KOEBE = "ho-face-with-holes", "koebe-cem"
+#: The surface of the paper's Figures 1 and 7.
+STAND_IN = "ho-face-with-holes"
 #: Steps that a picture shows; surfaces with more boundaries are drawn without the rest.
 MOST_STEPS = 4
 
@@ -84,36 +84,33 @@ def _examine(
     command: str,
 ) -> list[dict[str, Any]]:
     """Everything about one surface: a row for each way of mapping it, and two exhibits."""
-    from cembench.algorithms.koebe_cem.steps import koebe_steps
     from cembench.core.errors import AlgorithmFailed
 
-    try:
-        steps = list(koebe_steps(mesh, sweeps=sweeps, outer=outer))
-        best = _best_sweep(mesh, steps, outer)
-    except AlgorithmFailed as error:
-        complain(f"{mesh.name}: {error}")
-        steps, best = [], 1
     rows = []
     for algorithm in algorithms:
-        counts = sorted({1, best}) if algorithm.name == KOEBE else [None]
+        steps: list[MapStep] = []
+        counts: list[int | None] = [None]
+        if algorithm.steps:
+            try:
+                steps = list(algorithm.steps(mesh, sweeps=sweeps, outer=outer))
+                counts = [*sorted({1, _best_sweep(mesh, steps)})]
+            except AlgorithmFailed as error:
+                complain(f"{mesh.name}: {error}")
+                counts = [1]
         for count in counts:
             row, record, uv = _measured(mesh, algorithm, outer, count)
             rows.append(row)
-            if algorithm.name == KOEBE and uv is not None and count == 1:
+            if uv is not None and count == 1:
                 _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
     return rows
 
 
-def _best_sweep(mesh: HoledMesh, steps: list[Step], outer: int | None) -> int:
-    """After which sweep is E_C of the finished map lowest? The first within 1 % of that."""
-    from cembench.algorithms.koebe_cem.steps import finished
+def _best_sweep(mesh: HoledMesh, steps: list[MapStep]) -> int:
+    """Return the first sweep whose finished map has an E_C within 1 % of the lowest."""
     from cembench.conformal.metrics import dirichlet_energy, image_area
 
-    energies = []
-    for step in steps:
-        if step.boundary == 0:
-            uv, _ = finished(mesh, step, outer=outer)
-            energies.append(dirichlet_energy(mesh, uv) - image_area(mesh, uv))
+    results = [step.result for step in steps if step.result is not None]
+    energies = [dirichlet_energy(mesh, uv) - image_area(mesh, uv) for uv in results]
     enough = min(energies) * (1.01 if min(energies) > 0 else 0.99)
     return 1 + next(k for k, energy in enumerate(energies) if energy <= enough)
 
@@ -151,7 +148,7 @@ def _measured(
 
 def _lay_down_pictures(
     mesh: HoledMesh,
-    steps: list[Step],
+    steps: list[MapStep],
     uv: Any,
     record: Record,
     outer: int | None,
@@ -223,7 +220,7 @@ def _lay_down_pictures(
     )
 
 
-def _panels(mesh: HoledMesh, steps: list[Step], outer: int | None) -> Any:
+def _panels(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
     from cembench.drawing.koebe_steps import Panel
 
     first, others = mesh.outer_and_holes(outer)
@@ -237,7 +234,7 @@ def _panels(mesh: HoledMesh, steps: list[Step], outer: int | None) -> Any:
     return panels
 
 
-def _steps_table(mesh: HoledMesh, steps: list[Step], outer: int | None) -> Any:
+def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
     """Circularity of each boundary after each step of the sweep."""
     from cembench.conformal.metrics import circle_of
     from cembench.results.exhibits import Table

@@ -32,3 +32,32 @@ class Parameterization:
     iterations: int = 0
     energy_history: tuple[float, ...] = ()
     extras: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class MapStep:
+    """One step of a method that opens one boundary at a time, as pictures and tables show it.
+
+    Parameters
+    ----------
+    sweep : int
+        Counted from 1.
+    boundary : int
+        The boundary that became a circle: 0 the outer one, then the holes, longest first.
+    before : complex128 (n,) or None
+        The image that the step started from; None where that was the surface itself.
+    uv : complex128 (n,)
+        The image after the step.
+    energies : tuple of float
+        E_C before and after each iteration within the step.
+    result : complex128 (n,) or None
+        The finished map if the method ended here; only after the last step of a sweep.
+
+    """
+
+    sweep: int
+    boundary: int
+    before: NDArray[np.complex128] | None
+    uv: NDArray[np.complex128]
+    energies: tuple[float, ...]
+    result: NDArray[np.complex128] | None = None

@@ -49,8 +49,8 @@ def check_cell(
 ) -> tuple[Outcome, NDArray[np.complex128] | None]:
     """What comes out of one call, is that a valid map, and how much memory does it take?
 
-    Never raises for what the algorithm does: :class:`~cembench.core.errors.AlgorithmFailed` or any other
-    exception is a status with its cause. The one round of the outcome is this call, without
+    Never raises for what the algorithm does: :class:`~cembench.core.errors.AlgorithmFailed` or any
+    other exception is a status with its cause. The one round of the outcome is this call, without
     warm-up. The second value is the map, also that of an invalid one if it has the right shape and
     is finite.
     """

@@ -2,7 +2,8 @@
 
 python -m cembench.workflows.morphing.draw_frames JOB.npz FRAMES.npy
 
-The job holds what :class:`cembench.workflows.morphing.drawing.Film` holds. A line is printed for each frame.
+The job holds what :class:`cembench.workflows.morphing.drawing.Film` holds. A line is printed for
+each frame.
 """
 
 from __future__ import annotations

@@ -1,0 +1,85 @@
+"""The structure of the tree: layers import downwards, and every package is installed."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "cembench"
+#: Where the packages that are installed below ``cembench`` lie in the tree.
+ELSEWHERE = {"cembench.algorithms": "algorithms", "cembench.surfaces": "meshes_gen"}
+
+
+def layers():
+    """The rooms of ``cembench/`` in the order that docs/architecture.md gives them."""
+    text = (ROOT / "docs/architecture.md").read_text()
+    tree = text.partition("```\n")[2].partition("```")[0].partition("cembench/")[2]
+    inside = tree.partition("\nalgorithms/")[0]
+    return re.findall(r"(?m)^  (\w+)(?:/|\.py)? ", inside)
+
+
+def imported(file):
+    """Every cembench module or name that a file imports, also inside functions."""
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and not node.level:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def room_of(dotted):
+    parts = dotted.split(".")
+    return parts[1] if parts[0] == "cembench" and len(parts) > 1 else None
+
+
+def violations(rooms, package=PACKAGE):
+    for file in sorted(package.rglob("*.py")):
+        here = file.relative_to(package).parts[0].removesuffix(".py")
+        if here not in rooms:
+            continue  # the package's own __init__ offers names of all layers
+        for name in imported(file):
+            there = room_of(name)
+            if there in ("algorithms", "surfaces"):
+                yield f"{file.name} imports the plug-in {name} by name"
+            elif there in rooms and rooms.index(there) > rooms.index(here):
+                yield f"{file.relative_to(package)} imports {name}"
+
+
+def test_the_document_names_every_room_and_they_are_at_most_twelve():
+    there = {p.name for p in PACKAGE.iterdir() if p.is_dir() and p.name != "__pycache__"}
+    there |= {p.stem for p in PACKAGE.glob("*.py") if not p.stem.startswith("__")}
+    assert set(layers()) == there
+    assert len(there) <= 12
+
+
+def test_a_layer_imports_only_from_those_above_it_in_the_document():
+    assert list(violations(layers())) == []
+
+
+def test_an_upward_import_would_be_found(tmp_path):
+    (tmp_path / "mesh").mkdir()
+    (tmp_path / "mesh/files.py").write_text("def f():\n    from cembench.report import html\n")
+    assert len(list(violations(layers(), tmp_path))) == 1
+
+
+def test_every_package_of_the_tree_is_installed():
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    assert declared["package-dir"] == ELSEWHERE
+    there = set()
+    for name, folder in {"cembench": "cembench", **ELSEWHERE}.items():
+        for init in (ROOT / folder).rglob("__init__.py"):
+            inside = init.parent.relative_to(ROOT / folder).parts
+            there.add(".".join([name, *inside]))
+    assert set(declared["packages"]) == there
+
+
+@pytest.mark.parametrize("folder", ["algorithms", "meshes_gen"])
+def test_plug_ins_import_each_other_relatively(folder):
+    """They have one name in the tree and another once installed."""
+    for file in (ROOT / folder).rglob("*.py"):
+        for name in imported(file):
+            assert room_of(name) not in ("algorithms", "surfaces"), file
+            assert name.split(".")[0] not in ("algorithms", "meshes_gen"), file
