@@ -29,7 +29,7 @@ from cembench.results.records import MeshFacts
 from cembench.running.plan import mesh_facts, standing_of_file
 
 PAGE = Path(__file__).parents[1] / "docs/surfaces.md"
-SHEET = Path(__file__).parents[1] / "reports/surfaces/contact_sheet.png"
+SHEET = Path(__file__).parents[1] / "reports/surfaces/contact_sheet.jpg"
 BEGIN, END = "<!-- tables: made by benchmarks/surfaces_page.py -->", "<!-- end of tables -->"
 
 
