@@ -6,8 +6,10 @@ are comparable between surfaces, for a free boundary only after scaling the imag
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -136,19 +138,153 @@ def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
     return max((circle.circularity for circle in boundary_circles(mesh, uv)), default=0.0)
 
 
+class MapFigures:
+    """What the metrics of one map are computed from, each part once."""
+
+    def __init__(self, mesh: TriangleMesh, uv: Complex) -> None:
+        self.mesh, self.uv = mesh, uv
+
+    @cached_property
+    def energy(self) -> float:
+        """E_D (Eq. 5)."""
+        return dirichlet_energy(self.mesh, self.uv)
+
+    @cached_property
+    def area(self) -> float:
+        """A (Eq. 8)."""
+        return image_area(self.mesh, self.uv)
+
+    @cached_property
+    def angle_errors(self) -> Real:
+        """Change of every corner's angle in degrees, absolute, (m, 3)."""
+        return angle_errors(self.mesh, self.uv)
+
+    @cached_property
+    def dilatations(self) -> Real:
+        """Largest over smallest stretch of every triangle, (m,)."""
+        return dilatations(self.mesh, self.uv)
+
+
+@dataclass(frozen=True)
+class Metric:
+    """One figure of a map, and how it is shown wherever it is shown.
+
+    Parameters
+    ----------
+    name : str
+        The key in records, CSV and JSON.
+    title : str
+        What it is called where there is room.
+    heading : str
+        What a table's column calls it.
+    unit : str
+        What follows the number where it is shown alone.
+    form : str
+        Format of the number in a table.
+    precise : str
+        Format of the number where it is shown alone.
+    meaning : str
+        One line for documents.
+    compute : callable
+        From :class:`MapFigures` to the number; infinite where it does not exist.
+    better : "lower" or None
+        Which of two values is better; None where neither is by itself.
+    gauge_invariant : bool
+        Whether a Moebius map of the image leaves it as it is, up to the discretisation.
+    shown : "overview", "page" or "record"
+        The shortest kind of table that has a column for it: a run's overview, a surface's page, or
+        only the listing of a single record.
+
+    """
+
+    name: str
+    title: str
+    heading: str
+    unit: str
+    form: str
+    precise: str
+    meaning: str
+    compute: Callable[[MapFigures], float | int]
+    better: Literal["lower"] | None = "lower"
+    gauge_invariant: bool = True
+    shown: Literal["overview", "page", "record"] = "record"
+
+    def text(self, value: float | None, *, precise: bool = False) -> str:
+        """Return a recorded value as text; records hold None for what is infinite."""
+        form = self.precise if precise else self.form
+        return "inf" if value is None else format(value, form)
+
+
+#: Every figure of a map, in the order of tables: a new one is added here and nowhere else.
+METRICS: tuple[Metric, ...] = (
+    Metric(
+        "conformal_energy", "conformal energy", "E_C", "", ".4f", ".6f",
+        "E_C = E_D - A (Eq. 7); zero for a conformal map",
+        lambda f: f.energy - f.area, gauge_invariant=False, shown="overview",
+    ),
+    Metric(
+        "angle_error_mean_deg", "angle error, mean", "mean°", "degrees", ".2f", ".4f",
+        "change of every corner's angle, absolute: the mean",
+        lambda f: float(f.angle_errors.mean()), shown="overview",
+    ),
+    Metric(
+        "angle_error_sd_deg", "angle error, SD", "SD°", "degrees", ".2f", ".4f",
+        "the same: the standard deviation",
+        lambda f: float(f.angle_errors.std()), shown="overview",
+    ),
+    Metric(
+        "flipped_triangles", "folded triangles", "folds", "", "d", "d",
+        "triangles whose image has no positive area",
+        lambda f: flipped_triangles(f.mesh, f.uv), shown="overview",
+    ),
+    Metric(
+        "dilatation_mean", "dilatation, mean", "dilatation", "", ".3f", ".4f",
+        "largest over smallest stretch of a triangle: the mean",
+        lambda f: float(f.dilatations.mean()), shown="page",
+    ),
+    Metric(
+        "dilatation_max", "dilatation, largest", "largest", "", ".2f", ".4f",
+        "the same: the largest",
+        lambda f: float(f.dilatations.max()), shown="page",
+    ),
+    Metric(
+        "dirichlet_energy", "Dirichlet energy", "E_D", "", ".4f", ".6f",
+        "E_D (Eq. 5), cotangent weights of the surface",
+        lambda f: f.energy, gauge_invariant=False,
+    ),
+    Metric(
+        "image_area", "image area", "A", "", ".4f", ".6f",
+        "A (Eq. 8), what the image of the boundary encloses",
+        lambda f: f.area, better=None, gauge_invariant=False,
+    ),
+    Metric(
+        "boundary_circularity", "circularity", "circularity", "of the radius", ".0e", ".1e",
+        "distance of a boundary image from its fitted circle, relative to the radius",
+        lambda f: boundary_circularity(f.mesh, f.uv),
+    ),
+)  # fmt: skip
+
+
+def metrics_shown(*places: str) -> tuple[Metric, ...]:
+    """Return the metrics that tables of these kinds have columns for."""
+    return tuple(metric for metric in METRICS if metric.shown in places)
+
+
+def caption(metrics: Mapping[str, float | int | None]) -> str:
+    """Return the figures of an overview in one line, for below a picture."""
+    shown = (m for m in metrics_shown("overview") if m.name in metrics)
+    return "   ".join(
+        f"{m.title} {m.text(metrics[m.name])}{f' {m.unit}' if m.unit else ''}" for m in shown
+    )
+
+
+def metrics_markdown() -> str:
+    """Return the table of all metrics for a document."""
+    rows = "\n".join(f"| `{m.name}` | {m.meaning} | {m.unit or '-'} |" for m in METRICS)
+    return f"| name | meaning | unit |\n|---|---|---|\n{rows}\n"
+
+
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
-    """Every figure that a record holds, under the record's keys."""
-    energy, area = dirichlet_energy(mesh, uv), image_area(mesh, uv)
-    errors = angle_errors(mesh, uv)
-    stretch = dilatations(mesh, uv)
-    return {
-        "dirichlet_energy": energy,
-        "image_area": area,
-        "conformal_energy": energy - area,
-        "angle_error_mean_deg": float(errors.mean()),
-        "angle_error_sd_deg": float(errors.std()),
-        "flipped_triangles": flipped_triangles(mesh, uv),
-        "dilatation_mean": float(stretch.mean()),
-        "dilatation_max": float(stretch.max()),
-        "boundary_circularity": boundary_circularity(mesh, uv),
-    }
+    """Return every figure that a record holds, under the record's keys."""
+    figures = MapFigures(mesh, uv)
+    return {metric.name: metric.compute(figures) for metric in METRICS}

@@ -150,8 +150,9 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
     (cli.folder / "meshes/notes.txt").touch()
     plugin = cli.folder / "stand_ins.py"
     plugin.write_text(
-        "from cembench import DiskMesh, paper, surface\n"
-        "from meshes_gen.flat_disk import flat_disk\n"
+        "from cembench import DiskMesh, surface\n"
+        "from cembench.results import paper\n"
+        "from cembench.surfaces.flat_disk import flat_disk\n"
         "from dataclasses import replace\n"
         "def declare(k, row):\n"
         "    @surface(f's{k}', title=row, paper_row=row)\n"

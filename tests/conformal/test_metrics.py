@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
@@ -10,12 +12,14 @@ from scipy.spatial.transform import Rotation
 from cembench import DiskMesh, HoledMesh
 from cembench.conformal import metrics
 from cembench.conformal.metrics import (
+    METRICS,
     SampledAngleError,
     all_metrics,
     angle_errors,
     boundary_circles,
     corner_angles,
     dilatations,
+    metrics_markdown,
 )
 from tests import gallery
 
@@ -154,3 +158,23 @@ def test_a_sample_of_the_angle_errors_is_the_mean_of_small_meshes_and_near_it_on
     monkeypatch.setattr(metrics, "SAMPLE", 500)
     assert SampledAngleError(mesh)(uv) != mean
     assert SampledAngleError(mesh)(uv) == pytest.approx(mean, rel=0.1)
+
+
+def test_every_metric_says_how_it_is_shown():
+    for metric in METRICS:
+        assert metric.title
+        assert metric.meaning
+        assert format(1, metric.form)
+        assert format(1, metric.precise)
+        assert metric.text(None) == "inf"
+
+
+def test_a_record_holds_every_metric_of_the_table_in_its_order():
+    mesh = flat_disk(60)
+    found = all_metrics(mesh, mesh.V[:, 0] + 1j * mesh.V[:, 1])
+    assert list(found) == [metric.name for metric in METRICS]
+
+
+def test_the_readme_has_the_table_of_metrics():
+    readme = Path(__file__).parents[2] / "README.md"
+    assert metrics_markdown() in readme.read_text()

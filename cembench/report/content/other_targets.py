@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from cembench.conformal.metrics import metrics_shown
 from cembench.report.content.evidence import DISK, Evidence
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.document import Column, Table, Value, words
+
+#: What means the same for every target.
+_COMPARABLE = tuple(metric for metric in metrics_shown("overview") if metric.gauge_invariant)
 
 
 def other_targets(evidence: Evidence) -> Table | None:
@@ -39,9 +43,7 @@ def other_targets(evidence: Evidence) -> Table | None:
                     Value(outcome.status, None, "", key, why),
                     timed,
                     value(scaled, ".4f"),
-                    value(m.get("angle_error_mean_deg"), ".2f"),
-                    value(m.get("angle_error_sd_deg"), ".2f"),
-                    value(m.get("flipped_triangles"), ".0f"),
+                    *(value(m.get(metric.name), metric.form) for metric in _COMPARABLE),
                 )
             )
     if not rows:
@@ -56,9 +58,7 @@ def other_targets(evidence: Evidence) -> Table | None:
             Column("status", numeric=False),
             Column("seconds", unit="s"),
             Column("E_C / A"),
-            Column("mean°"),
-            Column("SD°"),
-            Column("folds"),
+            *(Column(metric.heading) for metric in _COMPARABLE),
         ),
         tuple(rows),
         f"E_C is divided by the area of the image, whose size is free here; angles compare with "

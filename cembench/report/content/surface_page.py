@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from cembench.conformal.metrics import metrics_shown
 from cembench.report.content.evidence import DISK, Evidence, SurfaceFacts
 from cembench.report.content.figures.angle_histograms import histogram
 from cembench.report.content.figures.energy_by_iteration import history_panel
@@ -27,15 +28,7 @@ from cembench.results.records import Record
 
 #: Degrees up to which the histograms of a page go.
 SHOWN = 5.0
-#: Heading, figure of the record, and how it is written.
-_METRICS = (
-    ("E_C", "conformal_energy", ".4f"),
-    ("mean°", "angle_error_mean_deg", ".2f"),
-    ("SD°", "angle_error_sd_deg", ".2f"),
-    ("folds", "flipped_triangles", "d"),
-    ("dilatation", "dilatation_mean", ".3f"),
-    ("largest", "dilatation_max", ".2f"),
-)
+_METRICS = metrics_shown("overview", "page")
 
 
 def surface_page(
@@ -93,7 +86,7 @@ def figures_table(evidence: Evidence, surface: SurfaceFacts, name: str) -> Table
         Column("seconds", unit="s"),
         Column("±%"),
         Column("iterations"),
-        *(Column(heading) for heading, _, _ in _METRICS),
+        *(Column(metric.heading) for metric in _METRICS),
         Column("memory", unit="MiB"),
     ]
     rows, causes = [], []
@@ -149,10 +142,10 @@ def _line(
         value(half, f"{half or 0:.0f}", "fewer than six rounds"),
         value(outcome.iterations, str(outcome.iterations)),
     ]
-    for _, metric, form in _METRICS:
-        number = outcome.metrics.get(metric)
-        lacking = "infinite" if metric in outcome.metrics else "not measured"
-        cells.append(value(number, "" if number is None else format(number, form), lacking))
+    for metric in _METRICS:
+        number = outcome.metrics.get(metric.name)
+        lacking = "infinite" if metric.name in outcome.metrics else "not measured"
+        cells.append(value(number, metric.text(number), lacking))
     memory = outcome.memory_increase_bytes
     mib = None if memory is None else memory / 2**20
     cells.append(value(mib, f"{mib or 0:,.0f}"))

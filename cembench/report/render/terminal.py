@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cembench.conformal.metrics import METRICS, Metric, metrics_shown
 from cembench.mesh.datasets import Dataset
 from cembench.registry import Algorithm, Surface
 from cembench.report.surface_facts import SurfaceFacts, row_check
@@ -60,7 +61,8 @@ def _cells_table(records: Sequence[Record]) -> Table:
     room = max(8, min(16, 80 - 53 - longest))
     table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=room)
     table.add_column("algorithm", no_wrap=True)
-    for heading in ("E_C", "mean", "SD", "folds", "iter", "seconds", "±%"):
+    headings = (metric.heading for metric in metrics_shown("overview"))
+    for heading in (*headings, "iter", "seconds", "±%"):
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("status", no_wrap=True)
     for mesh, group in groupby(records, key=lambda record: record.cell.mesh):
@@ -69,10 +71,7 @@ def _cells_table(records: Sequence[Record]) -> Table:
             table.add_row(
                 mesh if k == 0 else "",
                 record.cell.algorithm + ("" if record.target == "disk" else " *"),
-                _figure(record, "conformal_energy", ".4f"),
-                _figure(record, "angle_error_mean_deg", ".2f"),
-                _figure(record, "angle_error_sd_deg", ".2f"),
-                _figure(record, "flipped_triangles", "d"),
+                *(_figure(record, metric) for metric in metrics_shown("overview")),
                 "-" if outcome.iterations is None else str(outcome.iterations),
                 "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
                 _spread(record),
@@ -219,11 +218,9 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Rende
     return table
 
 
-def _figure(record: Record, name: str, form: str) -> str:
-    if name not in record.outcome.metrics:
-        return "-"
-    value = record.outcome.metrics[name]
-    return "inf" if value is None else format(value, form)
+def _figure(record: Record, metric: Metric) -> str:
+    found = record.outcome.metrics
+    return metric.text(found[metric.name]) if metric.name in found else "-"
 
 
 def figures_table(record: Record) -> Table:
@@ -241,18 +238,10 @@ def figures_table(record: Record) -> Table:
     if facts.paper_row:
         table.add_row("in the paper", _printed(record))
     table.add_row("algorithm", f"{record.title} ({record.target})" + _given(record))
-    for label, name, form, unit in (
-        ("conformal energy", "conformal_energy", ".6f", ""),
-        ("angle error", "angle_error_mean_deg", ".4f", " degrees in the mean"),
-        ("", "angle_error_sd_deg", ".4f", " degrees standard deviation"),
-        ("folded triangles", "flipped_triangles", "d", ""),
-        ("dilatation", "dilatation_mean", ".4f", " in the mean"),
-        ("", "dilatation_max", ".4f", " at most"),
-        ("image area", "image_area", ".6f", ""),
-        ("circularity", "boundary_circularity", ".1e", " off the circle at most"),
-    ):
-        if name in outcome.metrics:
-            table.add_row(label, _figure(record, name, form) + unit)
+    for metric in METRICS:
+        if metric.name in outcome.metrics:
+            text = metric.text(outcome.metrics[metric.name], precise=True)
+            table.add_row(metric.title, f"{text} {metric.unit}".rstrip())
     if outcome.iterations:
         table.add_row("iterations", str(outcome.iterations))
     if outcome.seconds:
