@@ -80,7 +80,7 @@ def test_an_unknown_name_lists_the_known_ones():
         ("import cembench_is_not_here", "cannot be imported: ModuleNotFoundError"),
         ("1 +", "cannot be imported: SyntaxError"),
         ("from cembench import algorithm", "declares nothing; decorate a function"),
-        ("from algorithms.cem import cem", "declares nothing"),
+        ("from cembench.algorithms.cem import cem", "declares nothing"),
         (GOOD.replace('"disk"', '"plane"'), "target 'plane' is unknown; allowed: 'disk'"),
         (GOOD.replace("mesh: DiskMesh, ", "mesh, "), "must be annotated as DiskMesh"),
         (GOOD.replace("] = 3", "]"), "parameter 'steps' needs a type annotation and a default"),
