@@ -1,0 +1,173 @@
+"""Measure algorithms on surfaces with the harness: processes of their own, rounds, records."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cembench.core.errors import ParameterError
+from cembench.registry import Registry, load_registry
+from cembench.results.records import DEFAULT_ROUNDS, Record
+from cembench.results.store import Store
+from cembench.running.local import DEFAULT_TIMEOUT, Options, Watcher, run_tasks
+from cembench.running.plan import MeasurementSettings, PaperRole, paper_roles, plan_cells
+from cembench.workflows.surface_input import SurfaceInput, checked_surface
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from cembench.report.document import Report
+
+
+@dataclass(frozen=True)
+class Run:
+    """A folder of records: what `cembench run` writes and `cembench report` reads.
+
+    Attributes
+    ----------
+    folder : Path
+        Where the records and maps are.
+
+    """
+
+    folder: Path
+
+    def records(self) -> list[Record]:
+        """Return every record.
+
+        Raises
+        ------
+        RecordError
+            The folder is not a run, or a record is damaged.
+
+        """
+        return Store(self.folder).records()
+
+    def table(self, reference: str = "cem") -> pd.DataFrame:
+        """Return one row a cell: its figures, seconds with a 95 % interval, and status.
+
+        `reference` is the algorithm whose speedup over the others (Eq. 33) has columns too.
+        """
+        import pandas as pd
+
+        from cembench.results.record_rows import rows
+
+        return pd.DataFrame(rows(self.records(), reference))
+
+    def speedups(self, reference: str = "cem") -> pd.DataFrame:
+        """Return how much faster the reference is than each other algorithm, t / t_ref - 1.
+
+        One row a surface, algorithm and policy, with the interval from paired rounds; empty where
+        the reference was not measured.
+        """
+        columns = ["mesh", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
+        table = self.table(reference)
+        compared = table[table["reference"].notna()]
+        return compared[[*columns, "verdict"]].reset_index(drop=True)
+
+    def report(self, folder: str | os.PathLike[str] | None = None) -> Report:
+        """Write the report, as `cembench report` does; `folder` defaults to RUN/report."""
+        from cembench.report.write_report import write_report
+
+        target = Path(folder) if folder is not None else self.folder / "report"
+        command = f"cembench report {self.folder} -o {target}"
+        return write_report(self.folder, target, command)
+
+    def _repr_html_(self) -> str:
+        columns = ["mesh", "algorithm", "status", "seconds", "conformal_energy"]
+        columns += ["angle_error_mean_deg", "flipped_triangles"]
+        table = self.table()
+        html: str = table[[c for c in columns if c in table]].to_html(index=False)
+        return html
+
+
+def benchmark(
+    surfaces: Iterable[SurfaceInput],
+    algorithms: Sequence[str] | None = None,
+    *,
+    rounds: int = DEFAULT_ROUNDS,
+    out: str | os.PathLike[str] | None = None,
+    parameters: Mapping[str, Any] | None = None,
+    solves: Sequence[str] = ("reuse",),
+    backend: str = "cvxopt",
+    threads: int = 1,
+    timeout: float = DEFAULT_TIMEOUT,
+    memory_bytes: int | None = None,
+    seed: int = 0,
+    plugins: Sequence[str] = (),
+    watcher: Watcher | None = None,
+) -> Run:
+    """Measure algorithms on surfaces, each pair in processes of its own.
+
+    Parameters
+    ----------
+    surfaces : iterable of meshes, paths, names or pairs of arrays (V, F)
+        Surfaces that came as arrays are called ``surface-1``, ``surface-2``, ...
+    algorithms : sequence of str, optional
+        Default: every algorithm that takes at least one of the surfaces.
+    rounds : int
+        Fresh processes for every cell; fewer than six give no interval.
+    out : path, optional
+        The run's folder; what it already holds is not measured again. Default: a new temporary
+        folder, see :attr:`Run.folder`.
+    parameters : mapping, optional
+        ``name`` goes to every algorithm that has it, ``algorithm.name`` to one.
+    solves : sequence of "reuse" and "backslash"
+        Whether a factorisation is reused as long as its matrix does not change.
+    backend : str
+        The library that factors: cvxopt, superlu or pardiso.
+    threads : int
+        Threads of the numerical libraries.
+    timeout : float
+        Seconds that a call may take.
+    memory_bytes : int, optional
+        Memory limit of a process with all that it starts.
+    seed : int
+        Seed of the random order within a round.
+    plugins : sequence of str
+        Python files or ``module:name`` with more algorithms.
+    watcher : Watcher, optional
+        Receives progress events.
+
+    Raises
+    ------
+    MeshError, RegistryError, ParameterError, RecordError
+        As for the command line; nothing is measured then.
+
+    """
+    registry = load_registry(plugins)
+    given = list(surfaces)
+    if not given:
+        raise ParameterError("no surface to measure on; give at least one.")
+    if rounds < 1:
+        raise ParameterError(f"rounds={rounds!r} is not allowed; it takes at least 1.")
+    chosen = [registry.algorithm(name) for name in algorithms or registry.algorithms]
+    kinds = list(dict.fromkeys(a.mesh_type for a in chosen))
+    meshes, roles = [], {}
+    for number, one in enumerate(given, start=1):
+        mesh = checked_surface(one, kinds, registry)
+        if isinstance(one, tuple | list):
+            mesh = mesh.renamed(f"surface-{number}")
+        meshes.append(mesh)
+        roles |= _roles(registry, one)
+    if algorithms is None:
+        chosen = [a for a in chosen if any(isinstance(mesh, a.mesh_type) for mesh in meshes)]
+    tasks = []
+    for policy in solves:
+        settings = MeasurementSettings(policy, backend, threads, rounds)
+        tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
+    folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
+    options = Options(timeout=timeout, memory_bytes=memory_bytes, seed=seed)
+    run_tasks(tasks, Store(folder), options, watcher)
+    return Run(folder)
+
+
+def _roles(registry: Registry, given: SurfaceInput) -> dict[str, PaperRole]:
+    """Which row of the paper's tables a named surface stands for, if any."""
+    if isinstance(given, str) and given in registry.surfaces and not Path(given).is_file():
+        return paper_roles(registry, [given])
+    return {}

@@ -1,0 +1,280 @@
+"""Map one surface and check the map, in this process: arrays in, a result out."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import AlgorithmFailed, ParameterError
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.registry import Algorithm, Registry, load_registry
+from cembench.results.records import Outcome
+from cembench.running.measure import check_cell
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.workflows.surface_input import KINDS, SurfaceInput, checked_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: The algorithm that is best for a user, by the kind of surface.
+DEFAULT_ALGORITHMS: Mapping[type[TriangleMesh], str] = {
+    DiskMesh: "direct-cem",
+    HoledMesh: "direct-cem-holes",
+}
+
+
+@dataclass(frozen=True)
+class Result:
+    """A checked map of a surface to the plane.
+
+    Attributes
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    algorithm : Algorithm
+        What mapped it.
+    z : complex128 (n,)
+        Image of each vertex.
+    outcome : Outcome
+        What the check found: figures, notices, seconds.
+
+    """
+
+    mesh: TriangleMesh
+    algorithm: Algorithm
+    z: NDArray[np.complex128]
+    outcome: Outcome
+
+    @property
+    def uv(self) -> NDArray[np.float64]:
+        """Image of each vertex as two columns, float64 (n, 2)."""
+        return np.stack([self.z.real, self.z.imag], axis=1)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the map keeps what its target class promises (see docs/measuring.md)."""
+        return self.outcome.status == "ok"
+
+    @property
+    def cause(self) -> str | None:
+        """Why the map is not valid; None for a valid one."""
+        return self.outcome.cause
+
+    @property
+    def metrics(self) -> Mapping[str, float | int | None]:
+        """Figures by name, computed by the harness; None where one is infinite."""
+        return self.outcome.metrics
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """What a reader should know of the surface and of the map."""
+        return (*map(str, self.mesh.notices), *map(str, self.outcome.notes))
+
+    @property
+    def phases(self) -> Mapping[str, float]:
+        """Seconds by phase; they add up to :attr:`seconds`."""
+        return self.outcome.phases
+
+    @property
+    def seconds(self) -> float | None:
+        """Wall-clock seconds of the call, without warm-up; `benchmark` measures with care."""
+        return self.outcome.median_seconds
+
+    @property
+    def iterations(self) -> int | None:
+        """Iterations that were run; 0 for a direct method."""
+        return self.outcome.iterations
+
+    @property
+    def energy_history(self) -> tuple[float, ...]:
+        """E_C (Eq. 7) of the start and after each iteration."""
+        return self.outcome.energy_history
+
+    @property
+    def extras(self) -> Mapping[str, Any]:
+        """What else the algorithm reports of itself."""
+        return self.outcome.extras
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the surface with the map as its texture coordinates.
+
+        Parameters
+        ----------
+        path : path
+            OBJ or PLY, by its suffix.
+        overwrite : bool
+            Whether a file that is there may be replaced.
+
+        Raises
+        ------
+        MeshError
+            An unknown format, a folder that is not there, or a file that is and may not be
+            replaced. Nothing is half-written.
+
+        """
+        from cembench.mesh.files import write_mesh
+
+        path = Path(path)
+        refuse_existing(path, overwrite=overwrite)
+        write_mesh(path, self.mesh, self.z)
+        return path
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
+        """Draw the surface and its image under one checkerboard.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where to write the picture as well; PNG.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            A notebook shows it.
+
+        """
+        from matplotlib.figure import Figure
+        from matplotlib.image import imread
+
+        png = self._png()
+        if path is not None:
+            from cembench.core.atomic import write
+
+            write(Path(path), lambda file: file.write(png))
+        import io
+
+        pixels = imread(io.BytesIO(png), format="png")
+        figure = Figure(figsize=(pixels.shape[1] / 100, pixels.shape[0] / 100), dpi=100)
+        figure.figimage(pixels)
+        return figure
+
+    def _png(self) -> bytes:
+        from cembench.drawing.preview import preview_png
+
+        return preview_png(self.mesh, self.z, title=self._title, caption=self._caption)
+
+    @property
+    def _title(self) -> str:
+        return f"{self.mesh.name}: {self.algorithm.title}"
+
+    @property
+    def _caption(self) -> str:
+        from cembench.conformal.metrics import caption
+
+        return caption(self.metrics)
+
+    def __repr__(self) -> str:
+        state = "ok" if self.ok else f"{self.outcome.status}: {self.cause}"
+        return (
+            f"<Result of {self.algorithm.name} on {self.mesh.name} "
+            f"({self.mesh.n:,} vertices, {self.mesh.m:,} triangles): {state}; {self._caption}>"
+        )
+
+    def _repr_html_(self) -> str:
+        from cembench.conformal.metrics import METRICS
+
+        picture = base64.b64encode(self._png()).decode()
+        rows = [("status", self.outcome.status + (f": {self.cause}" if self.cause else ""))]
+        rows += [
+            (metric.title, f"{metric.text(self.metrics[metric.name], precise=True)} {metric.unit}")
+            for metric in METRICS
+            if metric.name in self.metrics
+        ]
+        rows += [("iterations", str(self.iterations)), ("seconds", f"{self.seconds:.3f}")]
+        rows += [("note", notice) for notice in self.notices]
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(name)}</th>"
+            f"<td>{html.escape(text)}</td></tr>"
+            for name, text in rows
+        )
+        words = html.escape(self._title)
+        return (
+            f"<figure><img alt='{words}' style='max-width:100%' "
+            f"src='data:image/png;base64,{picture}'/></figure><table>{cells}</table>"
+        )
+
+
+def parameterize(
+    surface: SurfaceInput,
+    algorithm: str | None = None,
+    *,
+    keep_invalid: bool = False,
+    plugins: Iterable[str] = (),
+    **parameters: Any,
+) -> Result:
+    """Map a surface to the plane and check the map.
+
+    Parameters
+    ----------
+    surface : mesh, path, name or pair of arrays (V, F)
+        V is (n, 3), F is (m, 3) and counts from 0. Disks and surfaces with holes.
+    algorithm : str, optional
+        See :func:`cembench.list_algorithms`; default: ``"direct-cem"``, and for surfaces with
+        holes ``"direct-cem-holes"``.
+    keep_invalid : bool
+        Return a map that breaks a promise (a fold, say) instead of raising; look at
+        :attr:`Result.ok`.
+    plugins : iterable of str
+        Python files or ``module:name`` with more algorithms.
+    **parameters
+        The algorithm's own, checked as on the command line.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    MeshError
+        The surface is damaged, or not of a kind that the algorithm takes.
+    RegistryError
+        An unknown algorithm.
+    ParameterError
+        An unknown parameter, or a value out of its range.
+    AlgorithmFailed
+        No map was found, or (unless `keep_invalid`) it is not valid.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> result = cembench.parameterize(cembench.surface("hemi-ellipsoid", 400))
+    >>> result.uv.shape == (result.mesh.n, 2)
+    True
+    >>> result.metrics["flipped_triangles"]
+    0
+
+    """
+    registry = load_registry(plugins)
+    mesh, chosen = _mesh_and_algorithm(surface, algorithm, registry)
+    task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
+    outcome, z = check_cell(chosen, task.mesh, task.cell)
+    if z is None or (outcome.status != "ok" and not keep_invalid):
+        raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
+    return Result(mesh, chosen, z, outcome)
+
+
+def default_algorithm(mesh: TriangleMesh) -> str:
+    """Return the name of the algorithm that suits this kind of surface best."""
+    for kind, name in DEFAULT_ALGORITHMS.items():
+        if isinstance(mesh, kind):
+            return name
+    kinds = ", ".join(kind.__name__ for kind in DEFAULT_ALGORITHMS)
+    raise ParameterError(f"{mesh.name} is a {type(mesh).__name__}; allowed: {kinds}.")
+
+
+def _mesh_and_algorithm(
+    surface: SurfaceInput, name: str | None, registry: Registry
+) -> tuple[TriangleMesh, Algorithm]:
+    if name is None:
+        mesh = checked_surface(surface, KINDS, registry)
+        return mesh, registry.algorithm(default_algorithm(mesh))
+    chosen = registry.algorithm(name)
+    return checked_surface(surface, (chosen.mesh_type,), registry), chosen

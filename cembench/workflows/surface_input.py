@@ -1,0 +1,88 @@
+"""From what a user has in hand to a checked surface: a mesh, a file, a name, or two arrays."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from numpy.typing import ArrayLike
+
+from cembench.core.errors import MeshError
+from cembench.mesh.files import read_mesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.registry import Registry, load_registry
+from cembench.running.plan import generate_surface
+
+#: A checked mesh, the path of a mesh file, the name of a registered surface, or arrays (V, F).
+SurfaceInput: TypeAlias = TriangleMesh | str | os.PathLike[str] | tuple[ArrayLike, ArrayLike]
+
+#: The kinds of surface that algorithms take, the most special first.
+KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh)
+
+
+def checked_surface(
+    given: SurfaceInput,
+    kinds: Sequence[type[TriangleMesh]] = KINDS,
+    registry: Registry | None = None,
+) -> TriangleMesh:
+    """Return a surface of the first of these kinds that it is.
+
+    Parameters
+    ----------
+    given : mesh, path, name or pair of arrays
+        See :data:`SurfaceInput`. A name that is also a file means the file.
+    kinds : sequence of mesh classes
+        Tried in order; the first one's error is raised where none fits.
+    registry : Registry, optional
+        Where names are looked up; default: everything that is installed.
+
+    Raises
+    ------
+    MeshError
+        The surface is damaged, or of none of these kinds.
+
+    """
+    if isinstance(given, TriangleMesh):
+        if isinstance(given, tuple(kinds)):
+            return given
+        return _first(kinds, lambda kind: _converted(given, kind))
+    if isinstance(given, str | os.PathLike):
+        path = Path(given)
+        registry = registry or load_registry()
+        if str(given) in registry.surfaces and not path.is_file():
+            made = generate_surface(registry, str(given))
+            return checked_surface(made, kinds, registry)
+        if not path.suffix and not path.exists():
+            raise MeshError(
+                f"{str(given)!r} is neither a file nor a registered surface; known surfaces: "
+                f"{', '.join(sorted(registry.surfaces)) or 'none'}."
+            )
+        return _first(kinds, lambda kind: read_mesh(path, kind))
+    V, F = _pair(given)
+    return _first(kinds, lambda kind: kind.from_arrays(V, F))
+
+
+def _pair(given: Any) -> tuple[Any, Any]:
+    if isinstance(given, tuple | list) and len(given) == 2:
+        return given[0], given[1]
+    size = f" of {len(given)} items" if isinstance(given, tuple | list) else ""
+    raise MeshError(
+        f"a surface is a mesh, a path, the name of a registered surface or a pair of arrays "
+        f"(V, F); got {type(given).__name__}{size}."
+    )
+
+
+def _converted(mesh: TriangleMesh, kind: type[TriangleMesh]) -> TriangleMesh:
+    return kind.from_arrays(mesh.V, mesh.F, name=mesh.name)
+
+
+def _first(kinds: Sequence[type[TriangleMesh]], make: Any) -> TriangleMesh:
+    """Return what the first kind that fits makes; the first kind's error counts."""
+    for kind in kinds[1:]:
+        try:
+            return make(kind)  # type: ignore[no-any-return]
+        except MeshError:
+            continue
+    return make(kinds[0])  # type: ignore[no-any-return]
