@@ -34,6 +34,7 @@ from cembench.results.records import Outcome, Round
 from cembench.results.store import Store
 from cembench.running.environment import with_threads
 from cembench.running.local import Launcher, Options, run_tasks
+from cembench.running.measure import Checked
 from cembench.running.plan import How, Task, plan_cells
 
 BARE = """
@@ -90,7 +91,7 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
         starting = Launcher(Path(folder), Options(), forks=False)
 
         def by(launcher: Launcher) -> float:
-            found = launcher.time(task)
+            found = launcher.time(task, Checked())
             launcher.close()  # as in a run: another server each round
             if isinstance(found, Outcome):
                 sys.exit(found.cause)

@@ -9,24 +9,26 @@ it is a :class:`cembench.mesh.datasets.Dataset`, an object at module level.
 
 from __future__ import annotations
 
+import functools
 import importlib
 import importlib.util
 import inspect
+import os
 import sys
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field
-from functools import lru_cache
 from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
+from types import FrameType, ModuleType
 from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from cembench.core.errors import ParameterError, RegistryError
+from cembench.core.errors import ParameterError, RegistryError, said_by
 from cembench.core.parameterization import MapStep
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -81,6 +83,9 @@ class _Registered:
     parameters: tuple[Parameter, ...]
     origin: str
     notes: str
+    #: The module that declares it, which is where the decorator stands, and the file of that.
+    module: str
+    file: Path | None
 
     def arguments(self, given: Mapping[str, Any]) -> dict[str, Any]:
         """All keyword arguments of a call: the given ones checked, the others at their defaults.
@@ -167,6 +172,8 @@ def algorithm(
             f"allowed: {', '.join(map(repr, get_args(Target)))}."
         )
 
+    place = _place(sys._getframe(1))
+
     def mark(function: C) -> C:
         hints, parameters = _signature(name, function)
         first = next(iter(inspect.signature(function).parameters), None)
@@ -181,14 +188,14 @@ def algorithm(
             title=title,
             function=function,
             parameters=parameters,
-            origin=_origin(function),
             notes=notes or _notes(function),
             target=target,
             mesh_type=mesh_type,
             source=source,
             steps=steps,
+            **_origin(place, function),
         )
-        setattr(function, _MARK, spec)
+        _set_mark(function, spec)
         return function
 
     return mark
@@ -221,6 +228,7 @@ def surface(
         Missing types or defaults.
 
     """
+    place = _place(sys._getframe(1))
 
     def mark(function: C) -> C:
         _, parameters = _signature(name, function, positional="faces")
@@ -229,15 +237,15 @@ def surface(
             title=title,
             function=function,
             parameters=parameters,
-            origin=_origin(function),
             notes=notes or _notes(function),
             source=source,
             paper_row=paper_row,
             landmarks=landmarks,
             kept=kept,
             exact_map=exact_map,
+            **_origin(place, function),
         )
-        setattr(function, _MARK, spec)
+        _set_mark(function, spec)
         return function
 
     return mark
@@ -246,9 +254,16 @@ def surface(
 def _signature(
     name: str, function: Callable[..., Any], positional: str | None = None
 ) -> tuple[dict[str, Any], tuple[Parameter, ...]]:
-    hints = typing.get_type_hints(function, include_extras=True)
+    try:
+        hints = typing.get_type_hints(_annotated(function), include_extras=True)
+        signature = inspect.signature(function)
+    except (TypeError, ValueError, NameError, AttributeError) as error:
+        raise RegistryError(
+            f"{name!r}: the signature of {function!r} cannot be read ({error}); decorate a "
+            "function whose arguments have type annotations."
+        ) from None
     parameters = []
-    for p in inspect.signature(function).parameters.values():
+    for p in signature.parameters.values():
         if p.kind is not p.KEYWORD_ONLY and p.name != positional:
             continue
         if p.name not in hints or p.default is p.empty:
@@ -259,13 +274,44 @@ def _signature(
     return hints, tuple(parameters)
 
 
-def _origin(function: Callable[..., Any]) -> str:
-    return f"{function.__module__}:{function.__qualname__}"
+def _annotated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what has the annotations of a callable that need not be a function."""
+    if isinstance(function, functools.partial):
+        return _annotated(function.func)
+    if isinstance(function, type) or inspect.isroutine(function):
+        return function
+    call: Callable[..., Any] = type(function).__call__
+    return call
+
+
+def _place(frame: FrameType) -> tuple[str, Path | None]:
+    """Return the module and the file of a frame: of what calls a decorator.
+
+    The decorated function cannot tell: a decorator below may have put one of another file there.
+    """
+    module, file = (frame.f_globals.get(key) for key in ("__name__", "__file__"))
+    return str(module), None if file is None else Path(file).absolute()
+
+
+def _origin(place: tuple[str, Path | None], function: Callable[..., Any]) -> dict[str, Any]:
+    module, file = place
+    called = getattr(function, "__qualname__", type(function).__qualname__)
+    return {"module": module, "file": file, "origin": f"{module}:{called}"}
+
+
+def _set_mark(function: Callable[..., Any], spec: _Registered) -> None:
+    try:
+        setattr(function, _MARK, spec)
+    except (AttributeError, TypeError) as error:
+        raise RegistryError(
+            f"{spec.name!r}: {function!r} cannot be marked ({error}); decorate a function."
+        ) from None
 
 
 def _notes(function: Callable[..., Any]) -> str:
-    """Everything in the docstring after its first line."""
-    return inspect.cleandoc(function.__doc__ or "").partition("\n")[2].strip()
+    """Return everything in the docstring after its first line."""
+    written = inspect.getdoc(_annotated(function)) or ""
+    return written.partition("\n")[2].strip()
 
 
 @dataclass(frozen=True)
@@ -324,12 +370,12 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     algorithms = dict(installed.algorithms)
     surfaces = dict(installed.surfaces)
     for plugin in plugins:
-        for spec in _declared_by(plugin):
+        for spec in declared_by(plugin):
             _add(algorithms if isinstance(spec, Algorithm) else surfaces, spec)
     return Registry(algorithms, surfaces, installed.datasets)
 
 
-@lru_cache(maxsize=1)
+@functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
     return Registry(_all_declared(Algorithm), _all_declared(Surface), _all_declared(Dataset))
 
@@ -349,7 +395,7 @@ def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
     for entry in entry_points(group=_GROUPS[Algorithm], name=name):
         return _declared_at(entry, Algorithm)
     for plugin in plugins:
-        for spec in _declared_by(plugin):
+        for spec in declared_by(plugin):
             if isinstance(spec, Algorithm) and spec.name == name:
                 return spec
     return load_registry(plugins).algorithm(name)
@@ -378,7 +424,7 @@ def _load_entry(entry: Any) -> Any:
     except Exception as error:
         raise RegistryError(
             f"entry point {entry.name} = {entry.value!r} cannot be loaded: "
-            f"{type(error).__name__}: {error}. Repair or uninstall the package that declares it."
+            f"{said_by(error)}. Repair or uninstall the package that declares it."
         ) from error
 
 
@@ -391,8 +437,8 @@ def _add(known: dict[str, Any], spec: _Registered | Dataset) -> None:
     known[spec.name] = spec
 
 
-def _declared_by(plugin: str) -> list[_Registered]:
-    """What a file declares, or a single ``module:name``."""
+def declared_by(plugin: str) -> list[_Registered]:
+    """Return what a file declares, or a single ``module:name``."""
     location, _, name = plugin.partition(":")
     path = Path(plugin)
     if path.suffix == ".py":
@@ -406,8 +452,8 @@ def _declared_by(plugin: str) -> list[_Registered]:
     else:
         raise RegistryError(f"plug-in {plugin!r} is neither a Python file (*.py) nor module:name.")
     # Only what is declared there, not what it imports from elsewhere.
-    found = [getattr(value, _MARK) for value in specs if hasattr(value, _MARK)]
-    found = [spec for spec in found if name or spec.function.__module__ == module.__name__]
+    marks = [_mark_of(value) for value in specs]
+    found = [spec for spec in marks if spec and (name or spec.module == module.__name__)]
     if not found:
         raise RegistryError(
             f"plug-in {plugin!r} declares nothing; decorate a function with @algorithm(...) or "
@@ -426,17 +472,56 @@ def _import_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # so that its functions can look up their own annotations
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[name]
-        raise RegistryError(
-            f"plug-in {str(path)!r} cannot be imported: {type(error).__name__}: {error}"
-        ) from error
+        with _importing(str(path)):
+            spec.loader.exec_module(module)
+    except RegistryError:
+        sys.modules.pop(name, None)
+        raise
     return module
 
 
 def _import_module(module: str, plugin: str) -> ModuleType:
-    try:
+    with _importing(plugin):
         return importlib.import_module(module)
-    except ImportError as error:
-        raise RegistryError(f"plug-in {plugin!r} cannot be imported: {error}") from error
+
+
+@contextmanager
+def _importing(plugin: str) -> Iterator[None]:
+    """Make one error of whatever an import raises; what it prints goes to standard error.
+
+    An interrupt is the user's: that a plug-in raises one is found out where it is loaded first
+    (:mod:`cembench.running.plugins`).
+    """
+    try:
+        with _standard_output_apart():
+            yield
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        raise RegistryError(
+            f"plug-in {plugin!r} cannot be imported: {said_by(error)}. Repair it: importing "
+            "a plug-in must only declare functions."
+        ) from error
+
+
+@contextmanager
+def _standard_output_apart() -> Iterator[None]:
+    """Let standard output go to standard error, also what is not written by Python."""
+    with ExitStack() as back:
+        with suppress(AttributeError, OSError, ValueError):  # there may be none, or a closed one
+            sys.stdout.flush()
+            kept = os.dup(1)
+            back.callback(os.close, kept)
+            back.callback(os.dup2, kept, 1)
+            os.dup2(2, 1)
+        with redirect_stdout(sys.stderr):
+            yield
+
+
+def _mark_of(value: Any) -> _Registered | None:
+    """Return the mark of an object of a plug-in, which may answer anything to being asked."""
+    try:
+        mark = getattr(value, _MARK, None)
+    except Exception:
+        return None
+    return mark if isinstance(mark, _Registered) else None

@@ -79,6 +79,8 @@ def test_an_unknown_name_lists_the_known_ones():
     [
         ("import cembench_is_not_here", "cannot be imported: ModuleNotFoundError"),
         ("1 +", "cannot be imported: SyntaxError"),
+        ("import sys; sys.exit(0)", "cannot be imported: SystemExit: 0"),
+        ("class Mine(BaseException): pass\nraise Mine('x')", "cannot be imported: Mine: x"),
         ("from cembench import algorithm", "declares nothing; decorate a function"),
         ("from cembench.algorithms.cem import cem", "declares nothing"),
         (GOOD.replace('"disk"', '"plane"'), "target 'plane' is unknown; allowed: 'disk'"),

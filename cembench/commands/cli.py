@@ -20,7 +20,16 @@ from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
 from cembench.commands import theory as theory_verbs
 from cembench.commands import validate as validate_verbs
-from cembench.commands.console import Json, assignments, complain, err, out, print_json, split
+from cembench.commands.console import (
+    Json,
+    assignments,
+    complain,
+    err,
+    out,
+    print_json,
+    registry_with,
+    split,
+)
 from cembench.core.errors import CembenchError, ParameterError
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
@@ -108,10 +117,9 @@ def list_(
     whether they meet their rows of its Table 2, how unevenly CEM scales them,
     where thumbnails lie. Of all of them with --measure, else of those measured.
     """
-    from cembench.registry import load_registry
     from cembench.report.render.terminal import algorithms_table, facts_table, surfaces_table
 
-    registry = load_registry(plugin)
+    registry = registry_with(plugin)
     if measure and kind is not Kind.surfaces:
         raise ParameterError("--measure goes with surfaces: cembench list surfaces --measure.")
     facts = _facts(registry, measure=measure) if kind is Kind.surfaces else {}
@@ -169,14 +177,13 @@ def map_(
     The UVs are the map itself (the unit disk for target "disk"), with 17 significant digits.
     """
     from cembench.mesh.files import check_writable_format, write_mesh
-    from cembench.registry import load_registry
     from cembench.report.render.terminal import figures_table
     from cembench.results.record_rows import row
     from cembench.running.local import Options, map_once
     from cembench.running.plan import How, plan_cells, read_mesh_for, standing_of_file
 
     options = Options(timeout=timeout, memory_bytes=_memory_bytes(memory))
-    registry = load_registry(plugin)
+    registry = registry_with(plugin)
     chosen = registry.algorithm(algorithm)
     if output is not None:
         check_writable_format(output, with_uv=True)
@@ -278,7 +285,6 @@ def run(
     -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
     docs/measuring.md tells what is timed, and what an interval means.
     """
-    from cembench.registry import load_registry
     from cembench.results.paper.profiles import algorithms_of, surfaces_of
     from cembench.results.store import Store
     from cembench.running.local import Options
@@ -286,7 +292,7 @@ def run(
 
     policies = _policies(solves)
     options = Options(timeout, _memory_bytes(memory), fresh, rerun_failed, seed)
-    registry = load_registry(plugin)
+    registry = registry_with(plugin)
     usual = algorithms_of(profile, registry) if profile else list(registry.algorithms)
     chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]

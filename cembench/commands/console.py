@@ -5,12 +5,16 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from cembench.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from cembench.registry import Registry
 
 out = Console(highlight=False)
 err = Console(stderr=True, highlight=False)
@@ -31,6 +35,18 @@ def complain(message: str) -> None:
 def warn(message: str) -> None:
     """Say on standard error what the user should know."""
     err.print(f"warning: {message}", style="yellow", markup=False, soft_wrap=True)
+
+
+def registry_with(plugins: Sequence[str]) -> Registry:
+    """Load the registry with the user's plug-ins, and show which while that takes its time."""
+    from cembench.registry import load_registry
+
+    if not plugins:
+        return load_registry()
+    from cembench.running.plugins import load_with_plugins
+
+    with err.status(f"importing {escape(', '.join(plugins))}", spinner="line"):
+        return load_with_plugins(plugins)
 
 
 def split(names: list[str]) -> list[str]:

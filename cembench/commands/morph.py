@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cembench.commands.console import Json, assignments, complain, err, out, print_json, split
+from cembench.commands.console import (
+    Json,
+    assignments,
+    complain,
+    err,
+    out,
+    print_json,
+    registry_with,
+    split,
+)
 from cembench.core.errors import AlgorithmFailed, MeshError, ParameterError
 
 if TYPE_CHECKING:
@@ -88,7 +97,6 @@ def morph(
     the surfaces have by name, as the generated faces do; with none at all, curvature aligns them.
     """
     from cembench.drawing.camera import viewpoints
-    from cembench.registry import load_registry
     from cembench.workflows.morphing.drawing import check_views
     from cembench.workflows.morphing.landmarks import common_landmarks, read_landmarks
     from cembench.workflows.morphing.morph import morph as morphed
@@ -100,7 +108,7 @@ def morph(
         check_output(place)
     if len(surfaces) < 2:
         raise ParameterError("a morph needs two surfaces or more; name at least one other.")
-    registry = load_registry(plugin)
+    registry = registry_with(plugin)
     meshes, known = [], []
     for name in surfaces:
         with err.status(f"reading {name}", spinner="line"):

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from cembench.commands.console import Json, assignments, err, out, print_json, split
 from cembench.results.paper.profiles import Profile
@@ -85,7 +86,8 @@ def validate(
     from cembench.validation.solver import Solver, in_a_process, load_solver
     from cembench.validation.terminal import validation_text
 
-    algorithm, registry, plugins = load_solver(plugin)
+    with err.status(f"importing {escape(plugin)}", spinner="line"):
+        algorithm, registry, plugins = load_solver(plugin)
     arguments = distribute_parameters([algorithm], assignments(parameter))[algorithm.name]
     options = Options(timeout=timeout)
     solver = Solver(algorithm, plugins, arguments, in_a_process(options))

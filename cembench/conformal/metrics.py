@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.beltrami import beltrami_coefficients, dilatations_of
 from cembench.conformal.laplacian import corner_products, half_cotangents
-from cembench.conformal.planar import fitted_circle, polygon_area, signed_areas
+from cembench.conformal.planar import fitted_circle, orientations, polygon_area
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -77,8 +77,8 @@ class SampledAngleError:
 
 
 def flipped_triangles(mesh: TriangleMesh, uv: Complex) -> int:
-    """How many triangles are folded over or collapsed: image area not positive?"""
-    return int(np.count_nonzero(~(signed_areas(uv, mesh.F) > 0)))
+    """Return how many triangles are folded over or collapsed: image area not positive, exactly."""
+    return int(np.count_nonzero(orientations(uv, mesh.F) <= 0))
 
 
 def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:

@@ -9,8 +9,12 @@ from numpy.typing import NDArray
 
 Complex = NDArray[np.complex128]
 
-#: So many pairs of segments are looked at in one go.
-PAIRS_AT_ONCE = 1_000_000
+#: An area computed in doubles has a certain sign where it exceeds this share of its terms
+#: (Shewchuk 1997, the filter of `orient2d`), and these are not so small that they underflow.
+CERTAIN = (3 + 16 * 2.0**-53) * 2.0**-53
+UNDERFLOW = 1e-280
+#: An angle between neighbours on the unit circle is known to within this many radians.
+ANGLE_ROUNDING = 4 * float(np.finfo(float).eps)
 
 
 def polygon_area(z: Complex) -> float:
@@ -23,6 +27,52 @@ def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
     """What area has each triangle's image? Shape (m,); positive when counter-clockwise."""
     a, b, c = (uv[F[:, k]] for k in range(3))
     return 0.5 * np.imag(np.conj(b - a) * (c - a))
+
+
+def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
+    """Return the exact sign of each triangle's image area: 1, 0 or -1, shape (m,).
+
+    Exact for the given doubles: where rounding could hide the sign, whole numbers decide. A corner
+    that is NaN or infinite gives 0.
+    """
+    a, b, c = (uv[F[:, k]] for k in range(3))
+    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
+        p, q = b - a, c - a
+        left, right = p.real * q.imag, p.imag * q.real
+        area, terms = left - right, np.abs(left) + np.abs(right)
+        certain = (np.abs(area) > CERTAIN * terms) & (terms > UNDERFLOW) & np.isfinite(terms)
+    signs = np.sign(np.where(certain, area, 0)).astype(np.int8)
+    # Differences of doubles are zero only where these are equal: such products are exact.
+    flat = ((p.real == 0) | (q.imag == 0)) & ((p.imag == 0) | (q.real == 0))
+    open_ = np.flatnonzero(~certain & ~flat & np.isfinite(uv)[F].all(axis=1))
+    signs[open_] = _exact_orientations(a[open_], b[open_], c[open_])
+    return signs
+
+
+def _exact_orientations(a: Complex, b: Complex, c: Complex) -> NDArray[np.int8]:
+    """Return the signs in whole numbers: each triangle scaled by a power of two."""
+    parts = np.stack([a.real, a.imag, b.real, b.imag, c.real, c.imag])
+    mantissa, exponent = np.frexp(parts)
+    whole = np.ldexp(mantissa, 53).astype(np.int64).astype(object)
+    shift = (exponent - exponent.min(axis=0, initial=0)).astype(object)
+    ax, ay, bx, by, cx, cy = whole << shift
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return np.asarray((area > 0).astype(np.int8) - (area < 0).astype(np.int8))
+
+
+def turns(z: Complex) -> tuple[int, int, int]:
+    """Return how a loop of points goes round the origin.
+
+    The first number is how many turns the arcs make if each is taken counter-clockwise: 1 where the
+    points go round once and in order. The others tell why it is more: how often the polygon winds
+    round the origin, and how many arcs go backward. Neighbours whose angles differ by no more than
+    rounding are in order.
+    """
+    arcs = np.angle(np.roll(z, -1) * np.conj(z))
+    backward = arcs < -ANGLE_ROUNDING
+    forward = np.where(backward, arcs + 2 * np.pi, np.maximum(arcs, 0))
+    around, winding = (round(float(total) / (2 * np.pi)) for total in (forward.sum(), arcs.sum()))
+    return around, winding, int(np.count_nonzero(backward))
 
 
 def backward_arcs(f_b: Complex) -> int:
@@ -49,47 +99,18 @@ def fitted_circle(z: Complex) -> tuple[complex, float]:
     return complex(middle + scale * centre), scale * float(np.sqrt(c + abs(centre) ** 2))
 
 
-def crossing_segments(curves: Sequence[Complex]) -> tuple[int, int] | None:
-    """Which two closed polygons cross each other, or which one crosses itself? None for none.
+def crossing_polygons(curves: Sequence[Complex]) -> tuple[int, int] | None:
+    """Return two closed polygons that cross or touch each other; None where there are none.
 
-    Two equal numbers for a polygon that crosses itself. That neighbours in a polygon share an end
-    is no crossing; a point of one polygon on a segment of another is.
+    Two equal numbers for a polygon that crosses or touches itself; a point that is repeated in a
+    row counts once.
     """
-    a = np.concatenate(curves)
-    b = np.concatenate([np.roll(z, -1) for z in curves])
-    of = np.repeat(np.arange(len(curves)), [len(z) for z in curves])
-    low, high = np.minimum(a.real, b.real), np.maximum(a.real, b.real)
-    order = np.argsort(low, kind="stable")
-    a, b, of, low, high = a[order], b[order], of[order], low[order], high[order]
-    # A segment can only meet those that begin, in x, before it ends.
-    reach = np.searchsorted(low, high, side="right")
-    width = max(1, PAIRS_AT_ONCE // len(a))
-    for shift in range(1, int((reach - np.arange(len(a))).max()), width):
-        i, step = np.nonzero(np.arange(len(a))[:, None] + shift + np.arange(width) < reach[:, None])
-        j = i + shift + step
-        neighbours = (of[i] == of[j]) & ((b[i] == a[j]) | (a[i] == b[j]))
-        hit = _meet(a[i], b[i], a[j], b[j]) & ~neighbours
-        if hit.any():
-            first = int(np.argmax(hit))
-            one, other = sorted((int(of[i[first]]), int(of[j[first]])))
-            return one, other
+    import shapely  # here: every measured process would wait for it
+
+    rings = [shapely.linearrings(np.stack([z.real, z.imag], axis=1)) for z in curves]
+    for k in np.flatnonzero(~shapely.is_simple(rings)):
+        return int(k), int(k)
+    pairs = shapely.STRtree(rings).query(rings, predicate="intersects")
+    for one, other in sorted((int(i), int(j)) for i, j in pairs.T if i < j):
+        return one, other
     return None
-
-
-def _meet(p: Complex, q: Complex, r: Complex, s: Complex) -> NDArray[np.bool_]:
-    """Do the segments pq and rs meet?"""
-    across = _side(p, q, r) * _side(p, q, s) <= 0
-    return across & (_side(r, s, p) * _side(r, s, q) <= 0) & _boxes_meet(p, q, r, s)
-
-
-def _side(p: Complex, q: Complex, r: Complex) -> NDArray[np.float64]:
-    """Positive where r lies left of the line from p to q."""
-    return np.sign(np.imag(np.conj(q - p) * (r - p)))
-
-
-def _boxes_meet(p: Complex, q: Complex, r: Complex, s: Complex) -> NDArray[np.bool_]:
-    meet = np.ones(len(p), dtype=bool)
-    for part in (np.real, np.imag):
-        u, v, w, x = part(p), part(q), part(r), part(s)
-        meet &= (np.maximum(u, v) >= np.minimum(w, x)) & (np.maximum(w, x) >= np.minimum(u, v))
-    return meet

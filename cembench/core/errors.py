@@ -38,3 +38,28 @@ class NotPositiveDefinite(AlgorithmFailed):
 
 class RenderError(CembenchError):
     """A picture cannot be drawn or written."""
+
+
+#: The longest text that is kept of an exception, in characters.
+LONGEST_MESSAGE = 2_000
+
+
+def said_by(error: BaseException) -> str:
+    """Return an exception's type and message, of bounded length."""
+    return shortened(f"{type(error).__name__}: {message_of(error)}")
+
+
+def message_of(error: BaseException) -> str:
+    """Return the message of an exception, even of one that cannot say it."""
+    try:
+        return str(error)
+    except BaseException as another:
+        return f"(its message cannot be read: {type(another).__name__})"
+
+
+def shortened(text: str, length: int = LONGEST_MESSAGE) -> str:
+    """Return a text of at most this length, cut in the middle, without what UTF-8 cannot hold."""
+    if len(text) > length:
+        half = (length - 5) // 2
+        text = f"{text[:half]} ... {text[-half:]}"
+    return text.encode("utf-8", "replace").decode()

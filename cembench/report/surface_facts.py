@@ -24,7 +24,8 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
 from cembench.results import paper
 from cembench.results.records import MeshFacts
-from cembench.running.plan import code_hash, generate_surface, mesh_facts, standing_of
+from cembench.running.plan import generate_surface, mesh_facts, standing_of
+from cembench.running.sources import code_hash
 
 #: Whose map tells how unevenly a surface is scaled when it is flattened.
 MAPPED_BY = "cem"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
+from enum import StrEnum
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -32,7 +33,8 @@ class Cell(BaseModel):
 
     algorithm: str
     parameters: dict[str, Any] = Field(default_factory=dict)
-    #: SHA-256 of the source file that declares the algorithm: an edited plug-in is a new cell.
+    #: Of the source file that declares the algorithm, and of what a plug-in imports from beside it
+    #: (see :mod:`cembench.running.sources`): an edited plug-in is a new cell.
     code_hash: str
     mesh: str
     mesh_hash: str
@@ -52,6 +54,49 @@ class Cell(BaseModel):
     def label(self) -> str:
         """A file name that a person can read and that no other cell has."""
         return f"{self.mesh}--{self.algorithm}--{self.key[:12]}"
+
+
+class FaultKind(StrEnum):
+    """What kept a cell from ending ok."""
+
+    #: The call did not return a :class:`~cembench.core.parameterization.Parameterization`.
+    NOT_A_PARAMETERIZATION = "not_a_parameterization"
+    #: `uv` is not a complex128 array with one value for each vertex.
+    WRONG_SHAPE = "wrong_shape"
+    NOT_FINITE = "not_finite"
+    #: Iterations, energies, extras or phases of the wrong type or size.
+    WRONG_REPORT = "wrong_report"
+    OFF_CIRCLE = "off_circle"
+    #: The boundary goes round the circle another number of times than once.
+    WINDING = "winding"
+    BOUNDARY_ORDER = "boundary_order"
+    BOUNDARIES_CROSS = "boundaries_cross"
+    HOLE_ORIENTATION = "hole_orientation"
+    REVERSED = "reversed"
+    FOLDED = "folded"
+    #: No metrics can be computed from the map.
+    NO_METRICS = "no_metrics"
+    MESH_CHANGED = "mesh_changed"
+    #: A timed call returned a map that is not as good as the one that was checked.
+    OTHER_MAP = "other_map"
+    OTHER_ENERGY = "other_energy"
+    GAVE_UP = "gave_up"
+    RAISED = "raised"
+    OUT_OF_MEMORY = "out_of_memory"
+    TIMEOUT = "timeout"
+    #: The process ended without an answer: a signal, or an exit code.
+    PROCESS_ENDED = "process_ended"
+    #: The process left an answer that cannot be read.
+    UNREADABLE_ANSWER = "unreadable_answer"
+
+
+class Fault(BaseModel):
+    """A fault: its kind for programs, its detail for people."""
+
+    model_config = ConfigDict(frozen=True)
+
+    kind: FaultKind
+    detail: str
 
 
 class MeshFacts(BaseModel):
@@ -77,8 +122,10 @@ class Round(BaseModel):
     calls: tuple[float, ...]
     #: Seconds by phase of the call that is the round's figure; they add up to it.
     phases: dict[str, float] = Field(default_factory=dict)
-    #: SHA-256 of the map's bytes.
+    #: SHA-256 of the last call's map.
     uv_hash: str | None = None
+    #: Of each timed call, whether its map has the same bits as the checked one.
+    same_bits: tuple[bool, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -109,6 +156,8 @@ class Outcome(BaseModel):
     status: Status
     #: Why the status is not "ok"; None otherwise.
     cause: str | None = None
+    #: The same as data; empty where the status is "ok", and in records older than this field.
+    faults: tuple[Fault, ...] = ()
     #: The algorithm itself said that it found no map (AlgorithmFailed).
     gave_up: bool = False
     traceback: str | None = None
@@ -146,6 +195,12 @@ class Outcome(BaseModel):
         return next((r.phases for r in self.rounds if r.seconds == figure), {})
 
 
+def not_ok(status: Status, *faults: Fault, **more: Any) -> Outcome:
+    """Return the outcome of a cell with these faults; the cause is made of their details."""
+    cause = "; ".join(fault.detail for fault in faults)
+    return Outcome(status=status, cause=cause, faults=faults, **more)
+
+
 def lower_median(values: Sequence[float]) -> float:
     """The middle value, the lower of two: one that was measured, so that its phases are known."""
     return sorted(values)[(len(values) - 1) // 2]
@@ -164,3 +219,6 @@ class Record(BaseModel):
     outcome: Outcome
     environment: str
     started_at: str
+    #: SHA-256 of the files that `cell.code_hash` is made of, by their paths relative to the folder
+    #: or package of the file that declares the algorithm; empty in records older than this field.
+    sources: dict[str, str] = Field(default_factory=dict)

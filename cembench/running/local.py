@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import os
 import random
-import signal
+import shutil
 import sys
 import tempfile
 import uuid
 from collections.abc import Callable, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
@@ -27,18 +27,22 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
-from cembench.results.records import Outcome, Record, Round
+from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, not_ok
 from cembench.results.samples import Samples
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
+from cembench.running.measure import Checked
 from cembench.running.plan import Task
 from cembench.running.process import Ending, Limits, run_limited, spawning
 from cembench.running.worker import Answer, Job
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
+#: The largest answer that is read: what a worker keeps takes a few megabytes at most.
+LARGEST_ANSWER_BYTES = 2**24
 
 
 @dataclass(frozen=True)
@@ -187,8 +191,10 @@ class _Run:
     def _time(self, task: Task, number: int) -> None:
         step = f"round {number + 1} of {task.cell.repeats}"
         started = _now()
+        checked = self._samples(task).check()
+        assert checked is not None
         with _Step(self.watcher, task, step):
-            found = self.launcher.time(task)
+            found = self.launcher.time(task, Checked.of(checked))
         if isinstance(found, Outcome):
             cause = f"in {step}: {found.cause}"
             self._save(task, found.model_copy(update={"cause": cause}))
@@ -235,7 +241,9 @@ class _Step:
 
 
 def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[str, ...]:
-    differing = [k + 1 for k, r in enumerate(rounds) if r.uv_hash != checked.uv_hash]
+    differing = [
+        k + 1 for k, r in enumerate(rounds) if r.uv_hash != checked.uv_hash or not all(r.same_bits)
+    ]
     if not differing:
         return ()
     named = ", ".join(map(str, differing))
@@ -251,6 +259,7 @@ def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Rec
         outcome=outcome,
         environment=environment,
         started_at=started,
+        sources=dict(task.sources),
     )
 
 
@@ -266,6 +275,8 @@ class Launcher:
     options: Options
     forks: bool = True
     _server: ForkServer | None = None
+    #: What the system says of the mesh files since they were written.
+    _written: dict[Path, tuple[int, ...]] = field(default_factory=dict)
 
     def close(self) -> None:
         """End the server, if there is one."""
@@ -277,24 +288,30 @@ class Launcher:
         """What one call comes to, and its map if that has the right shape and is finite."""
         answer = self._run(task, "check", self.options.timeout)
         if answer.outcome is None:
-            raise AssertionError("a check answers with an outcome")
-        uv_file = self.scratch / "uv.npy"
-        return answer.outcome, np.load(uv_file) if uv_file.exists() else None
+            return _unreadable("it holds no outcome"), None
+        try:
+            return answer.outcome, _read_uv(self.scratch / "uv.npy", task)
+        except (OSError, ValueError, EOFError) as error:
+            return _unreadable(f"its map: {error}"), None
 
-    def time(self, task: Task) -> Round | Outcome:
+    def time(self, task: Task, checked: Checked) -> Round | Outcome:
         """The timed calls of one process, or how it ended without."""
-        answer = self._run(task, "time", 2 * self.options.timeout)
-        found = answer.round or answer.outcome
-        if found is None:
-            raise AssertionError("an answer holds one or the other")
-        return found
+        answer = self._run(task, "time", 2 * self.options.timeout, checked)
+        return answer.round or answer.outcome or _unreadable("it holds no round")
 
-    def _run(self, task: Task, what: Literal["check", "time"], seconds: float) -> Answer:
+    def _run(
+        self,
+        task: Task,
+        what: Literal["check", "time"],
+        seconds: float,
+        checked: Checked | None = None,
+    ) -> Answer:
+        self._make_scratch()
         answer_file, uv_file, log = (
             self.scratch / name for name in ("answer.json", "uv.npy", "log.txt")
         )
         for stale in (answer_file, uv_file, log):
-            stale.unlink(missing_ok=True)
+            _remove(stale)
         job = Job(
             task=what,
             cell=task.cell,
@@ -304,6 +321,7 @@ class Launcher:
             mesh_files=self._mesh_files(task),
             answer_file=answer_file,
             uv_file=uv_file,
+            checked=checked or Checked(),
             memory_bytes=self.options.memory_bytes,
             parent=os.getpid(),
         )
@@ -311,10 +329,24 @@ class Launcher:
         ending = self._forked(job, limits, log) if what == "time" else None
         ending = ending or self._started(job, limits, log)
         if ending.limit is None and ending.code == 0 and answer_file.exists():
-            answer = Answer.model_validate_json(answer_file.read_bytes())
-            return _with_note(answer, ending.left)
-        uv_file.unlink(missing_ok=True)
-        return Answer(outcome=_outcome_of(ending, seconds, self.options.memory_bytes))
+            return _with_note(_read_answer(answer_file), ending.left)
+        with suppress(OSError):  # there may be none, or no folder any more
+            uv_file.unlink()
+        outcome = _outcome_of(ending, seconds, self.options.memory_bytes)
+        if not self.scratch.is_dir():
+            gone = _fault(
+                FaultKind.PROCESS_ENDED, f"the folder for its answer is gone: {self.scratch}"
+            )
+            outcome = _with_fault(outcome, gone)
+        return Answer(outcome=outcome)
+
+    def _make_scratch(self) -> None:
+        """Have the folder to ourselves again, whatever an algorithm did to it."""
+        self.scratch = self.scratch.absolute()  # a process may be in another folder than this one
+        if not self.scratch.is_dir():
+            self.scratch.unlink(missing_ok=True)
+            self.scratch.mkdir(parents=True)
+        self.scratch.chmod(0o700)
 
     def _started(self, job: Job, limits: Limits, log: Path) -> Ending:
         command = [sys.executable, "-m", "cembench.running.worker", str(self._write(job))]
@@ -340,17 +372,70 @@ class Launcher:
 
     def _write(self, job: Job) -> Path:
         path = self.scratch / "job.json"
+        _remove(path)
         path.write_text(job.model_dump_json())
         return path
 
     def _mesh_files(self, task: Task) -> tuple[Path, Path]:
-        """V and F on disk, written once for all cells of a surface."""
+        """V and F on disk, written once for all cells of a surface unless one changed them."""
         stem = task.cell.mesh_hash[:32]
         files = self.scratch / f"{stem}-V.npy", self.scratch / f"{stem}-F.npy"
         for file, array in zip(files, (task.mesh.V, task.mesh.F), strict=True):
-            if not file.exists():
+            if not file.exists() or _stamp(file) != self._written.get(file):
+                _remove(file)
                 np.save(file, array)
+                self._written[file] = _stamp(file)
         return files
+
+
+def _remove(path: Path) -> None:
+    """Remove what stands where one of our own files is to be written in the scratch folder."""
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def _stamp(file: Path) -> tuple[int, ...]:
+    about = file.stat()
+    return about.st_ino, about.st_size, about.st_mtime_ns
+
+
+def _read_answer(file: Path) -> Answer:
+    """Return a process's answer; a fault where it is none: an algorithm may have written to it."""
+    try:
+        size = file.stat().st_size
+        if size > LARGEST_ANSWER_BYTES:
+            raise ValueError(f"it takes {size:,} bytes; allowed are {LARGEST_ANSWER_BYTES:,}")
+        return Answer.model_validate_json(file.read_bytes())
+    except ValidationError as error:
+        return Answer(outcome=_unreadable(error.errors()[0]["msg"]))
+    except (OSError, ValueError) as error:
+        return Answer(outcome=_unreadable(str(error)))
+
+
+def _read_uv(file: Path, task: Task) -> NDArray[np.complex128] | None:
+    """Return the map that a check left, if it left one; ValueError for anything else."""
+    if not file.exists():
+        return None
+    uv = np.lib.format.open_memmap(file, mode="r")
+    if uv.shape != (task.mesh.n,) or uv.dtype != np.complex128:
+        raise ValueError(f"uv is {uv.dtype} {uv.shape}; required is complex128 ({task.mesh.n},)")
+    return np.array(uv)
+
+
+def _fault(kind: FaultKind, detail: str) -> Fault:
+    return Fault(kind=kind, detail=detail)
+
+
+def _unreadable(why: str) -> Outcome:
+    told = f"the process left an answer that cannot be read: {why}"
+    return not_ok("failed", _fault(FaultKind.UNREADABLE_ANSWER, told))
+
+
+def _with_fault(outcome: Outcome, fault: Fault) -> Outcome:
+    cause = f"{outcome.cause}; {fault.detail}"
+    return outcome.model_copy(update={"cause": cause, "faults": (*outcome.faults, fault)})
 
 
 def _with_note(answer: Answer, left: int) -> Answer:
@@ -363,20 +448,15 @@ def _with_note(answer: Answer, left: int) -> Answer:
 
 def _outcome_of(ending: Ending, seconds: float, memory_bytes: int | None) -> Outcome:
     """As what is a process recorded that left no answer?"""
-    said = ending.said or None
-    seen = ending.seen_bytes or None
+    seen = {"traceback": ending.said or None, "peak_memory_bytes": ending.seen_bytes or None}
     if ending.limit == "time":
-        cause = f"not finished after {seconds:g} s"
-        return Outcome(status="timeout", cause=cause, traceback=said, peak_memory_bytes=seen)
+        told = f"not finished after {seconds:g} s"
+        return not_ok("timeout", _fault(FaultKind.TIMEOUT, told), **seen)
     if ending.limit == "memory":
-        cause = f"{_mib(ending.seen_bytes)} resident, the limit is {_mib(memory_bytes or 0)}"
-        return Outcome(status="out_of_memory", cause=cause, traceback=said, peak_memory_bytes=seen)
-    if ending.code < 0:
-        cause = f"the process was ended by signal {signal.Signals(-ending.code).name}"
-    else:
-        last = f": {ending.said.splitlines()[-1]}" if ending.said else ""
-        cause = f"the process ended with code {ending.code}{last}"
-    return Outcome(status="failed", cause=cause, traceback=said, peak_memory_bytes=seen)
+        told = f"{_mib(ending.seen_bytes)} resident, the limit is {_mib(memory_bytes or 0)}"
+        return not_ok("out_of_memory", _fault(FaultKind.OUT_OF_MEMORY, told), **seen)
+    told = f"the process {ending.how}"
+    return not_ok("failed", _fault(FaultKind.PROCESS_ENDED, told), **seen)
 
 
 def _mib(size: int) -> str:

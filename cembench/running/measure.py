@@ -1,123 +1,215 @@
 """Measure one algorithm on one surface in this process, and check what it returns.
 
 Timed is the call alone, from the arrays V and F in memory to uv: the boundary loops, the Laplacian,
-ordering, factorisation and iterations, and nothing else. An algorithm's word is not trusted:
-:func:`faults` looks at the result, and the metrics are computed here.
+ordering, factorisation and iterations, and nothing else. An algorithm's word is not trusted: every
+map, checked or timed, is judged (:mod:`cembench.running.judge`), and the metrics are computed here.
 """
 
 from __future__ import annotations
 
 import gc
-import hashlib
 import math
-import traceback
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
-from cembench.conformal.metrics import all_metrics, boundary_circles, flipped_triangles, image_area
-from cembench.conformal.planar import crossing_segments, polygon_area
+from cembench.conformal.metrics import all_metrics, boundary_circles, dirichlet_energy, image_area
 from cembench.core.clock import Timing, measure
-from cembench.core.errors import AlgorithmFailed, CembenchError
-from cembench.core.parameterization import Parameterization
+from cembench.core.errors import said_by
 from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm
-from cembench.results.records import Boundary, Cell, Outcome, Round
+from cembench.results.records import Boundary, Cell, Fault, FaultKind, Outcome, Round, not_ok
+from cembench.running.judge import faults, remarks
 from cembench.running.memory import Memory, memory_of_call
+from cembench.running.returned import (
+    hash_of,
+    map_of,
+    outcome_of_error,
+    phases_fault,
+    report_of,
+)
 
-#: How far from the unit circle a boundary vertex of a disk may lie.
-CIRCLE_TOLERANCE = 1e-9
-#: How far from a circle, relative to its radius, a hole's image may be and still be called one.
-CIRCULAR = 1e-3
 #: A process times further calls until they have taken so many seconds together, or are so many.
 ENOUGH_SECONDS = 0.1
 ENOUGH_CALLS = 5
 #: A first call that takes so many seconds is not repeated: a warm-up saves tenths of one.
 LONG_CALL = 5.0
+#: How far E_C of a timed call's map may be from that of the checked one, relative to its area: two
+#: maps of a solver that draws random numbers differ by less, one that stops earlier by more.
+SAME_ENERGY = 1e-6
 
 #: The cause where the arrays V and F are not as they were before the call.
 MESH_CHANGED = "the algorithm changed the mesh it was given"
 
+Complex = NDArray[np.complex128]
 Call = Callable[[], tuple[Any, Timing]]
+
+
+class Checked(BaseModel):
+    """What a timed call's map is compared with: bits and E_C over area of the checked map."""
+
+    uv_hash: str | None = None
+    #: None: only the promises of the target are judged.
+    relative_energy: float | None = None
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> Checked:
+        """Return what there is to compare with a checked call."""
+        energy, area = (outcome.metrics.get(name) for name in ("conformal_energy", "image_area"))
+        relative = None if energy is None or not area else energy / area
+        return cls(uv_hash=outcome.uv_hash, relative_energy=relative)
 
 
 def check_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
-) -> tuple[Outcome, NDArray[np.complex128] | None]:
-    """What comes out of one call, is that a valid map, and how much memory does it take?
+) -> tuple[Outcome, Complex | None]:
+    """Call once: is the result a valid map, and how much memory does the call take?
 
-    Never raises for what the algorithm does: :class:`~cembench.core.errors.AlgorithmFailed` or any
-    other exception is a status with its cause. The one round of the outcome is this call, without
-    warm-up. The second value is the map, also that of an invalid one if it has the right shape and
-    is finite.
+    Never raises for what the algorithm does: an exception, also one that would end the process, is
+    a status with its cause. The one round of the outcome is this call, without warm-up. The second
+    value is the map, also that of an invalid one if it has the right shape and is finite.
     """
-    before = mesh.hash
     call = _call(algorithm, mesh, cell)
     try:
         with linear_algebra(cell.solves, cell.backend):
             (found, timing), memory = memory_of_call(lambda: _without_collector(call))
-    except Exception as error:
+    except BaseException as error:
         return outcome_of_error(error, mesh), None
-    outcome = _with_memory(Outcome(status="invalid", rounds=(_round([timing]),)), memory)
-    unusable = _unusable(found, mesh)
-    if unusable:
-        return outcome.model_copy(update={"cause": unusable}), None
-    problems = faults(algorithm, mesh, found.uv)
-    if TriangleMesh(mesh.V, mesh.F).hash != before:
-        problems.append(MESH_CHANGED)
-    metrics = all_metrics(mesh, found.uv)
-    described = {
-        "status": "invalid" if problems else "ok",
-        "cause": "; ".join(problems) or None,
-        "metrics": {name: _finite(v) for name, v in metrics.items()},
-        "boundaries": _boundaries(mesh, found.uv),
-        "notes": tuple(remarks(algorithm, mesh, found.uv)),
-        "iterations": found.iterations,
-        "energy_history": tuple(found.energy_history),
-        "extras": found.extras,
-        "uv_hash": _hash(found.uv),
-    }
-    return outcome.model_copy(update=described), found.uv
+    uv = map_of(found, mesh)
+    if isinstance(uv, Fault):
+        return _with_memory(not_ok("invalid", uv), memory), None
+    report, problems = report_of(found)
+    seconds = phases_fault(timing)
+    problems += [seconds] if seconds else []
+    try:
+        about, more = _judged(algorithm, mesh, uv)
+    except MemoryError as error:
+        return outcome_of_error(error, mesh), None
+    except Exception as error:
+        about, more = {}, [_no_metrics(error)]
+    problems = [*more, *_changes(mesh, cell), *problems]
+    outcome = not_ok("invalid", *problems) if problems else Outcome(status="ok")
+    described = about | report | {"uv_hash": hash_of(uv)}
+    if seconds is None:
+        described["rounds"] = (_round([timing]),)
+    return _with_memory(outcome.model_copy(update=described), memory), uv
 
 
-def time_cell(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Round:
-    """How long does a call take, after one to warm up? Several calls where they are short.
+def time_cell(
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, checked: Checked
+) -> Round | Outcome:
+    """Time a call, after one to warm up; several calls where they are short.
 
-    A call of more than :data:`LONG_CALL` seconds is timed without a warm-up.
-
-    Raises whatever the algorithm raises.
+    A call of more than :data:`LONG_CALL` seconds is timed without a warm-up. The maps are judged
+    when all is timed. An outcome where the algorithm raised, or a call returned a worse map than
+    the one that was checked.
     """
     call = _call(algorithm, mesh, cell)
+    try:
+        with linear_algebra(cell.solves, cell.backend):
+            timings, maps = _timed(call, mesh)
+    except BaseException as error:
+        return outcome_of_error(error, mesh)
+    problems = [fault for t in timings if (fault := phases_fault(t))][:1]
+    try:
+        problems += _other_maps(algorithm, mesh, maps, checked)
+    except MemoryError as error:
+        return outcome_of_error(error, mesh)
+    except Exception as error:
+        problems.append(_no_metrics(error))
+    problems += _changes(mesh, cell)
+    if problems:
+        return not_ok("invalid", *problems)
+    hashes = [hash_of(uv) for uv in maps if not isinstance(uv, Fault)]
+    same = tuple(found == checked.uv_hash for found in hashes)
+    return _round(timings).model_copy(update={"uv_hash": hashes[-1], "same_bits": same})
+
+
+def _timed(call: Call, mesh: TriangleMesh) -> tuple[list[Timing], list[Complex | Fault]]:
+    """Return the timed calls, and the map of each as it was right after the call."""
+    found, timing = _without_collector(call)
+    if timing.total > LONG_CALL:
+        return [timing], [map_of(found, mesh)]
     timings: list[Timing] = []
-    with linear_algebra(cell.solves, cell.backend):
+    maps: list[Complex | Fault] = []
+    gc.collect()
+    gc.freeze()  # collecting again looks at what is new, and leaves the rest out of the caches
+    while len(timings) < ENOUGH_CALLS and sum(t.total for t in timings) < ENOUGH_SECONDS:
         found, timing = _without_collector(call)
-        if timing.total > LONG_CALL:
-            return _round([timing], _hash(getattr(found, "uv", None)))
-        gc.collect()
-        gc.freeze()  # collecting again looks at what is new, and leaves the rest out of the caches
-        while len(timings) < ENOUGH_CALLS and sum(t.total for t in timings) < ENOUGH_SECONDS:
-            found, timing = _without_collector(call)
-            timings.append(timing)
-        gc.unfreeze()
-    return _round(timings, _hash(getattr(found, "uv", None)))
+        timings.append(timing)
+        maps.append(map_of(found, mesh))
+    gc.unfreeze()
+    return timings, maps
 
 
-def outcome_of_error(error: Exception, mesh: TriangleMesh) -> Outcome:
-    """As what is a call on this mesh recorded that raised this?"""
-    if isinstance(error, AlgorithmFailed):
-        cause = "; ".join([str(error), *_broken_premises(mesh)])
-        return Outcome(status="failed", cause=cause, gave_up=True)
-    if isinstance(error, CembenchError):
-        return Outcome(status="failed", cause=str(error))
-    told = "".join(traceback.format_exception(error))
-    if isinstance(error, MemoryError):
-        return Outcome(
-            status="out_of_memory", cause=str(error) or "memory was refused", traceback=told
-        )
-    return Outcome(status="failed", cause=f"{type(error).__name__}: {error}", traceback=told)
+def _other_maps(
+    algorithm: Algorithm, mesh: TriangleMesh, maps: list[Complex | Fault], checked: Checked
+) -> list[Fault]:
+    """Return what is wrong with the first map that is not as good as the checked one."""
+    judged = {checked.uv_hash}
+    for number, uv in enumerate(maps, start=1):
+        if isinstance(uv, Fault):
+            wrong = [uv]
+        elif hash_of(uv) in judged:
+            continue
+        else:
+            judged.add(hash_of(uv))
+            with _unruffled():
+                wrong = faults(algorithm, mesh, uv) or _other_energy(mesh, uv, checked)
+        if wrong:
+            told = f"call {number} of {len(maps)} returned another map than the check"
+            return [Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong]
+    return []
+
+
+def _other_energy(mesh: TriangleMesh, uv: Complex, checked: Checked) -> list[Fault]:
+    if checked.relative_energy is None:
+        return []
+    area = image_area(mesh, uv)
+    energy = (dirichlet_energy(mesh, uv) - area) / area
+    if abs(energy - checked.relative_energy) <= SAME_ENERGY:
+        return []
+    told = f"E_C over the area is {energy:.9g}, not {checked.relative_energy:.9g}"
+    return [Fault(kind=FaultKind.OTHER_ENERGY, detail=told)]
+
+
+def _judged(
+    algorithm: Algorithm, mesh: TriangleMesh, uv: Complex
+) -> tuple[dict[str, Any], list[Fault]]:
+    """Return what an outcome says of a map, and the faults."""
+    with _unruffled():
+        problems = faults(algorithm, mesh, uv)
+        about = {
+            "metrics": {name: _finite(v) for name, v in all_metrics(mesh, uv).items()},
+            "boundaries": _boundaries(mesh, uv),
+            "notes": () if problems else tuple(remarks(algorithm, mesh, uv)),
+        }
+    return about, problems
+
+
+@contextmanager
+def _unruffled() -> Iterator[None]:
+    """Let no warning be an error: the algorithm may have made it one, for NumPy or for Python."""
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _no_metrics(error: Exception) -> Fault:
+    told = f"its metrics cannot be computed: {said_by(error)}"
+    return Fault(kind=FaultKind.NO_METRICS, detail=told)
+
+
+def _changes(mesh: TriangleMesh, cell: Cell) -> list[Fault]:
+    if TriangleMesh(mesh.V, mesh.F).hash == cell.mesh_hash:
+        return []
+    return [Fault(kind=FaultKind.MESH_CHANGED, detail=MESH_CHANGED)]
 
 
 def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
@@ -139,10 +231,10 @@ def _without_collector(call: Call) -> tuple[Any, Timing]:
         gc.enable()
 
 
-def _round(timings: list[Timing], uv_hash: str | None = None) -> Round:
+def _round(timings: list[Timing]) -> Round:
     middle = sorted(timings, key=lambda timing: timing.total)[(len(timings) - 1) // 2]
     calls = tuple(timing.total for timing in timings)
-    return Round(calls=calls, phases=middle.phases, uv_hash=uv_hash)
+    return Round(calls=calls, phases=middle.phases)
 
 
 def _with_memory(outcome: Outcome, memory: Memory) -> Outcome:
@@ -150,82 +242,9 @@ def _with_memory(outcome: Outcome, memory: Memory) -> Outcome:
     return outcome.model_copy(update=found)
 
 
-def _hash(uv: Any) -> str | None:
-    return hashlib.sha256(uv.tobytes()).hexdigest() if isinstance(uv, np.ndarray) else None
-
-
-def _unusable(found: Any, mesh: TriangleMesh) -> str | None:
-    """Why can no figure be computed from this result? None where it can."""
-    if not isinstance(found, Parameterization):
-        return f"it returned a {type(found).__name__}, not a Parameterization"
-    uv = found.uv
-    if not isinstance(uv, np.ndarray) or uv.shape != (mesh.n,) or uv.dtype != np.complex128:
-        got = f"{uv.dtype} {uv.shape}" if isinstance(uv, np.ndarray) else type(uv).__name__
-        return f"uv is {got}; required is complex128 ({mesh.n},)"
-    bad = np.flatnonzero(~np.isfinite(uv))
-    if len(bad):
-        return f"uv is NaN or infinite at {len(bad)} vertices, the first being {bad[0]}"
-    return None
-
-
-def _broken_premises(mesh: TriangleMesh) -> list[str]:
-    broken = [notice for notice in mesh.notices if notice.startswith("Definition 1")]
-    return [f"the mesh breaks a premise of the paper: {'; '.join(broken)}"] if broken else []
-
-
-def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
-    """Which promises does this map break? Empty for a valid one."""
-    problems = []
-    if algorithm.target in ("disk", "circular holes"):
-        outer = max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
-        name = "boundary" if len(mesh.loops) == 1 else "outer boundary"
-        off = np.abs(np.abs(uv[outer]) - 1).max()
-        if off > CIRCLE_TOLERANCE:
-            problems.append(f"the {name} lies off the unit circle by up to {off:.2g}")
-    if algorithm.target == "circular holes":
-        problems += _crossings(mesh, uv)
-    flipped = flipped_triangles(mesh, uv)
-    if image_area(mesh, uv) <= 0 or flipped == mesh.m:
-        problems.append("the map reverses the surface's orientation")
-    elif flipped:
-        problems.append(f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})")
-        problems += _broken_premises(mesh)
-    return problems
-
-
-def _crossings(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
-    """Do the boundaries' images cross?
-
-    Where no triangle is folded and none do, the map is injective: a point has as many preimages as
-    the outer polygon winds round it, less the holes'.
-    """
-    crossing = crossing_segments([uv[loop] for loop in mesh.loops])
-    if crossing is None:
-        return []
-    one, other = (f"boundary {int(mesh.loops[k].min())}" for k in crossing)
-    whom = "itself" if one == other else other
-    return [f"{one} crosses {whom} (boundaries are called by their smallest vertex)"]
-
-
-def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: NDArray[np.complex128]) -> list[str]:
-    """What should a reader know of a valid map? That its holes are no circles, where they are none.
-
-    How circular the holes are is a figure like the energy, not a promise: `boundaries` has it.
-    """
-    if algorithm.target != "circular holes":
-        return []
-    circles = boundary_circles(mesh, uv)[1:]
-    off = [circle for circle in circles if not circle.circularity <= CIRCULAR]
-    if not off:
-        return []
-    worst = max(circle.circularity for circle in off)
-    return [
-        f"{len(off)} of {len(circles)} holes are no circles: off by up to {worst:.2g} of the radius"
-    ]
-
-
 def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:
-    if len(mesh.loops) == 1:
+    circles = boundary_circles(mesh, uv) if len(mesh.loops) > 1 else ()
+    if not all(np.isfinite(circle.centre) for circle in circles):
         return ()
     return tuple(
         Boundary(
@@ -235,7 +254,7 @@ def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundar
             radius=_finite(circle.radius),
             circularity=_finite(circle.circularity),
         )
-        for circle in boundary_circles(mesh, uv)
+        for circle in circles
     )
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeVar
@@ -16,6 +15,7 @@ from cembench.mesh.files import is_mesh_file, read_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
+from cembench.running.sources import hash_of, sources_of
 
 M = TypeVar("M", bound=TriangleMesh)
 
@@ -29,6 +29,8 @@ class Task:
     mesh: TriangleMesh
     facts: MeshFacts
     plugins: tuple[str, ...] = ()
+    #: SHA-256 of the files that the cell's `code_hash` is made of, by relative paths.
+    sources: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,7 @@ def plan_cells(
         if names.count(name) > 1:
             raise MeshError(f"two surfaces are called {name!r}; rename one of the files.")
     arguments = distribute_parameters(algorithms, parameters)
+    sources = {a.name: sources_of(a) for a in algorithms}
     tasks = []
     for mesh in meshes:
         takers = [a for a in algorithms if isinstance(mesh, a.mesh_type)]
@@ -93,7 +96,7 @@ def plan_cells(
             cell = Cell(
                 algorithm=taker.name,
                 parameters=arguments[taker.name],
-                code_hash=code_hash(taker),
+                code_hash=hash_of(sources[taker.name]),
                 mesh=mesh.name,
                 mesh_hash=mesh.hash,
                 solves=how.solves,
@@ -101,7 +104,7 @@ def plan_cells(
                 threads=how.threads,
                 repeats=how.repeats,
             )
-            tasks.append(Task(cell, taker, mesh, facts, tuple(plugins)))
+            tasks.append(Task(cell, taker, mesh, facts, tuple(plugins), sources[taker.name]))
     return tasks
 
 
@@ -230,9 +233,3 @@ def standing_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> Stan
     dataset = recognised(registry.datasets.values(), path, mesh.hash)
     row = dataset.paper_row if dataset else ""
     return Standing(row, "model") if row else Standing()
-
-
-def code_hash(algorithm: Algorithm) -> str:
-    """SHA-256 of the source file that declares an algorithm."""
-    source = Path(algorithm.function.__code__.co_filename)
-    return hashlib.sha256(source.read_bytes()).hexdigest()

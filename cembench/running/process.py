@@ -56,6 +56,22 @@ class Ending:
     #: How many processes it left behind, which were ended.
     left: int = 0
 
+    @property
+    def how(self) -> str:
+        """Say how it ended by itself: by which signal, or with what code and last words."""
+        if self.code < 0:
+            return f"was ended by signal {_signal_name(-self.code)}"
+        last = f": {self.said.splitlines()[-1]}" if self.said else ""
+        return f"ended with code {self.code}{last}"
+
+
+def _signal_name(number: int) -> str:
+    """Return the name of a signal; most real-time signals have none."""
+    try:
+        return signal.Signals(number).name
+    except ValueError:
+        return str(number)
+
 
 class Started(Protocol):
     """A process, the first of its group: what is used here of `subprocess.Popen`."""
@@ -121,7 +137,8 @@ def run_limited(start: Start, limits: Limits, log: Path) -> Ending:
                 break
     finally:
         code, left = _end_all(process, tree, mark)
-    said = (said + log.read_bytes())[-KEPT_OUTPUT_BYTES:]
+    with suppress(OSError):  # the process may have removed it
+        said = (said + log.read_bytes())[-KEPT_OUTPUT_BYTES:]
     return Ending(code, limit, seen, said.decode(errors="replace").strip(), left)
 
 
@@ -160,12 +177,12 @@ def _resident_bytes(process: psutil.Process) -> int:
 
 def _drain(log: Path, said: bytes) -> bytes:
     """Keep the end of a log that grows too large, and empty the file."""
-    if log.stat().st_size <= _LARGEST_LOG_BYTES:
-        return said
-    with log.open("rb") as file:
-        file.seek(-KEPT_OUTPUT_BYTES, os.SEEK_END)
-        said = file.read()
-    os.truncate(log, 0)
+    with suppress(OSError):  # the process may have removed it
+        if log.stat().st_size > _LARGEST_LOG_BYTES:
+            with log.open("rb") as file:
+                file.seek(-KEPT_OUTPUT_BYTES, os.SEEK_END)
+                said = file.read()
+            os.truncate(log, 0)
     return said
 
 

@@ -16,10 +16,11 @@ from typing import Literal, NoReturn
 import numpy as np
 from pydantic import BaseModel
 
+from cembench.core.errors import MeshError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, load_algorithm
 from cembench.results.records import Cell, Outcome, Round
-from cembench.running.measure import check_cell, outcome_of_error, time_cell
+from cembench.running.measure import Checked, check_cell, time_cell
 from cembench.running.process import die_with_parent, limit_memory
 
 #: What the geometry loads where it needs it, because it takes a tenth of a second.
@@ -42,6 +43,8 @@ class Job(BaseModel):
     answer_file: Path
     #: Takes the map of a check.
     uv_file: Path
+    #: What the maps of timed calls are compared with.
+    checked: Checked = Checked()
     memory_bytes: int | None = None
     #: The number of the process that this one ends with.
     parent: int
@@ -68,7 +71,7 @@ def main(path: Path) -> None:
 def end() -> NoReturn:
     """End at once: taking an interpreter down with all its libraries takes longer than a call."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError):  # the algorithm may have closed it
+        with suppress(Exception):  # the algorithm may have closed or replaced it
             stream.flush()
     os._exit(0)
 
@@ -87,11 +90,8 @@ def _check(job: Job) -> Answer:
 
 
 def _time(job: Job) -> Answer:
-    algorithm, mesh = _loaded(job)
-    try:
-        return Answer(round=time_cell(algorithm, mesh, job.cell))
-    except Exception as error:
-        return Answer(outcome=outcome_of_error(error, mesh))
+    found = time_cell(*_loaded(job), job.cell, job.checked)
+    return Answer(outcome=found) if isinstance(found, Outcome) else Answer(round=found)
 
 
 def _loaded(job: Job) -> tuple[Algorithm, TriangleMesh]:
@@ -99,7 +99,10 @@ def _loaded(job: Job) -> tuple[Algorithm, TriangleMesh]:
     V, F = (np.load(file) for file in job.mesh_files)
     V.setflags(write=False)
     F.setflags(write=False)
-    return algorithm, _MESH_TYPES[job.mesh_type](V, F, job.cell.mesh, job.notices)
+    mesh = _MESH_TYPES[job.mesh_type](V, F, job.cell.mesh, job.notices)
+    if mesh.hash != job.cell.mesh_hash:
+        raise MeshError(f"{job.mesh_files[0]} or {job.mesh_files[1]} was changed; run again.")
+    return algorithm, mesh
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from cembench.conformal.metrics import (
     image_area,
 )
 from cembench.registry import Algorithm, Registry
-from cembench.running.measure import CIRCLE_TOLERANCE, CIRCULAR
+from cembench.running.judge import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
 from cembench.validation.finding import Finding

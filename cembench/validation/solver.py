@@ -16,6 +16,7 @@ from cembench.registry import Algorithm, Registry, load_registry
 from cembench.results.records import Outcome
 from cembench.running.local import Options, map_once
 from cembench.running.plan import How, Task, plan_cells
+from cembench.running.plugins import load_with_plugins
 
 Complex = NDArray[np.complex128]
 Call = Callable[[Task], tuple[Outcome, Complex | None]]
@@ -84,7 +85,7 @@ def load_solver(text: str) -> tuple[Algorithm, Registry, tuple[str, ...]]:
             )
         return registry.algorithm(file), registry, ()
     plugin = str(Path(file).resolve()) if file.endswith(".py") else file
-    registry = load_registry([plugin])
+    registry = load_with_plugins([plugin])
     built_in = set(load_registry().algorithms)
     declared = [a for key, a in registry.algorithms.items() if key not in built_in]
     if name:

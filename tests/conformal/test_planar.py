@@ -1,12 +1,16 @@
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
 from cembench.conformal.planar import (
     backward_arcs,
-    crossing_segments,
+    crossing_polygons,
     fitted_circle,
+    orientations,
     polygon_area,
     signed_areas,
+    turns,
 )
 
 
@@ -61,7 +65,7 @@ def square(corner, side=1.0):
     ],
 )
 def test_polygons_that_cross_are_found(curves, answer):
-    assert crossing_segments(curves) == answer
+    assert crossing_polygons(curves) == answer
 
 
 def test_crossings_agree_with_trying_every_pair():
@@ -74,7 +78,7 @@ def test_crossings_agree_with_trying_every_pair():
         ]
         expected = any(_polygons_cross(a, b) for k, a in enumerate(curves) for b in curves[:k])
         found.add(expected)
-        assert (crossing_segments(curves) is not None) == expected
+        assert (crossing_polygons(curves) is not None) == expected
     assert found == {True, False}
 
 
@@ -89,3 +93,55 @@ def _polygons_cross(a, b):
             if 0 <= t <= 1 and 0 <= w <= 1:
                 return True
     return False
+
+
+def test_a_point_repeated_in_a_row_counts_once_and_a_spike_crosses():
+    repeated = np.insert(square(0), 2, square(0)[2])
+    assert crossing_polygons([repeated]) is None
+    spike = np.array([0, 1, 1 + 1j, 0.5 + 0.5j, 1 + 1j, 1j])
+    assert crossing_polygons([spike]) == (0, 0)
+
+
+def test_a_polygon_with_many_sides_in_every_strip_is_quickly_found_simple():
+    inward = np.exp(1j * np.linspace(0, 400, 8000)) * np.linspace(1, 51, 8000)
+    spiral = np.concatenate([inward, 1.001 * inward[::-1]])
+    assert crossing_polygons([spiral]) is None
+
+
+def fraction_orientation(a, b, c):
+    (ax, ay), (bx, by), (cx, cy) = ((Fraction(z.real), Fraction(z.imag)) for z in (a, b, c))
+    area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    return (area > 0) - (area < 0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 1e-180, 1e200])
+def test_orientations_are_exact(scale):
+    """Corners on or a rounding error off a line, and two in one point."""
+    rng = np.random.default_rng(3)
+    a, b = rng.normal(size=(2, 300, 2)) @ [1, 1j]
+    c = a + rng.uniform(-1, 2, 300) * (b - a) + rng.choice([0, 1e-17, 1e-16, 1e-8], 300)
+    c[:20] = a[:20]
+    z = np.concatenate([a, b, c]) * scale
+    F = np.arange(900).reshape(3, 300).T
+    expected = [fraction_orientation(*z[corners]) for corners in F]
+    np.testing.assert_array_equal(orientations(z, F), expected)
+    assert {-1, 0, 1} == set(expected)
+    with np.errstate(over="ignore", invalid="ignore"):
+        assert (np.sign(signed_areas(z, F)) != expected).any()
+
+
+def test_orientations_of_what_is_not_finite_are_0():
+    z = np.array([0, 1, 1j, np.nan, np.inf])
+    np.testing.assert_array_equal(
+        orientations(z, np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])), [1, 0, 0]
+    )
+
+
+def test_turns_of_a_loop():
+    assert turns(ring()) == (1, 1, 0)
+    assert turns(ring() ** 2) == (2, 2, 0)
+    assert turns(ring()[::-1])[1:] == (-1, 12)
+    assert turns(np.exp(1j * np.array([0, 0.1, 0.2]))) == (1, 0, 1)  # on a half: one wide arc
+    rounded = ring()
+    rounded = np.insert(rounded, 1, rounded[0] * np.exp(-3e-16j))
+    assert turns(rounded)[0] == 1

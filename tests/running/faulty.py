@@ -2,10 +2,12 @@
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+import warnings
 
 import numpy as np
 
@@ -220,3 +222,87 @@ def tells_where(mesh: DiskMesh) -> Parameterization:
         f"{sys.argv[0]} {os.environ['OPENBLAS_NUM_THREADS']} {os.getpgid(0) == os.getpid()} "
         f"{sorted(name for name in sys.modules if name.startswith('algorithms.'))} {len(later)}"
     )
+
+
+def flat(mesh):
+    return mesh.V[:, 0] + 1j * mesh.V[:, 1]
+
+
+@algorithm("wound-twice", title="Covers the disk twice", target="disk")
+def wound_twice(mesh: DiskMesh) -> Parameterization:
+    z = flat(mesh)
+    return Parameterization(z**2 / np.maximum(abs(z), 1e-300))
+
+
+@algorithm("zeros-later", title="Zeros when called again", target="disk")
+def zeros_later(mesh: DiskMesh) -> Parameterization:
+    uv = good_map(mesh) * (not later)
+    later.append(True)
+    return Parameterization(uv)
+
+
+@algorithm("worse-later", title="A worse map when called again", target="disk")
+def worse_later(mesh: DiskMesh) -> Parameterization:
+    uv = good_map(mesh)
+    uv[mesh.interior] *= 0.99 if later else 1.0
+    later.append(True)
+    return Parameterization(uv)
+
+
+@algorithm("raises-real-time-signal", title="Ends by a real-time signal", target="disk")
+def raises_real_time_signal(mesh: DiskMesh) -> Parameterization:
+    os.kill(os.getpid(), signal.SIGRTMIN + 3)
+
+
+@algorithm("removes-scratch", title="Removes the folder of the answer", target="disk")
+def removes_scratch(mesh: DiskMesh) -> Parameterization:
+    shutil.rmtree(scratch())
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("replaces-scratch", title="Puts a file in its place", target="disk")
+def replaces_scratch(mesh: DiskMesh) -> Parameterization:
+    shutil.rmtree(scratch())
+    scratch().write_text("mine")
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("spoils-meshes", title="Writes to the mesh files of all", target="disk")
+def spoils_meshes(mesh: DiskMesh) -> Parameterization:
+    for file in scratch().glob("*-V.npy"):
+        np.save(file, 2 * mesh.V)
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("answers-itself", title="Writes the answer itself", target="disk")
+def answers_itself(mesh: DiskMesh) -> Parameterization:
+    (scratch() / "answer.json").write_text('{"outcome": {"status": "splendid"}}')
+    os._exit(0)
+
+
+@algorithm("answers-at-length", title="Writes an endless answer", target="disk")
+def answers_at_length(mesh: DiskMesh) -> Parameterization:
+    (scratch() / "answer.json").write_bytes(b" " * 2**25)
+    os._exit(0)
+
+
+@algorithm("moves-away", title="Changes its folder and closes its output", target="disk")
+def moves_away(mesh: DiskMesh) -> Parameterization:
+    os.chdir("/")
+    sys.stdout = None
+    warnings.simplefilter("error")
+    np.seterr(all="raise")
+    return Parameterization(good_map(mesh))
+
+
+@algorithm("exits-politely", title="Calls sys.exit", target="disk")
+def exits_politely(mesh: DiskMesh) -> Parameterization:
+    sys.exit(0)
+
+
+def scratch():
+    """The folder of the answer, as a started worker or a forked process knows it."""
+    frame = sys._getframe()
+    while "job" not in frame.f_locals:
+        frame = frame.f_back
+    return frame.f_locals["job"].answer_file.parent

@@ -11,6 +11,7 @@ from cembench.results.records import Outcome, Round
 from cembench.running.environment import with_threads
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.local import Launcher, Options
+from cembench.running.measure import Checked
 from tests.running.test_local import MEMORY, tasks_of
 
 pytestmark = pytest.mark.skipif(not can_fork(1), reason="processes are not forked here")
@@ -24,7 +25,7 @@ def launcher(tmp_path):
 
 
 def timed(launcher, name, **how):
-    return launcher.time(tasks_of(name, **how)[0])
+    return launcher.time(tasks_of(name, **how)[0], Checked())
 
 
 def test_processes_of_a_round_are_forked_from_one_server_until_it_is_closed(launcher):

@@ -9,6 +9,7 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.registry import load_registry
+from cembench.results.records import FaultKind
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.local import Options, Watcher, in_random_order, map_once, run_tasks
@@ -40,6 +41,9 @@ def tasks_of(*names, faces=600, **how):
         ("off-circle", "invalid", "off the unit circle by up to 0.001"),
         ("folded", "invalid", "triangles are folded"),
         ("writes", "invalid", "changed the mesh"),
+        ("wound-twice", "invalid", "goes round the circle 2 times, not once"),
+        ("raises-real-time-signal", "failed", "ended by signal 37"),
+        ("exits-politely", "failed", "SystemExit: 0"),
     ],
 )
 def test_every_fault_is_a_status_with_its_cause(name, status, cause):
@@ -49,7 +53,9 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause):
     assert re.search(cause, record.outcome.cause), record.outcome.cause
     if name in ("raises", "exits"):
         assert record.outcome.traceback
-    assert (uv is None) == (name not in ("mirrored", "off-circle", "folded", "writes"))
+    assert record.outcome.faults
+    kept = ("mirrored", "off-circle", "folded", "writes", "wound-twice")
+    assert (uv is None) == (name not in kept)
 
 
 def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
@@ -89,6 +95,42 @@ def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
     )
     assert outcomes["good"].notes == ()
     assert time.monotonic() - started < 60
+
+
+def test_what_a_process_does_to_its_answer_or_to_the_others_fails_it_alone(tmp_path):
+    expected = {
+        "removes-scratch": ("failed", "the folder for its answer is gone"),
+        "replaces-scratch": ("failed", "the folder for its answer is gone"),
+        "answers-itself": ("failed", "an answer that cannot be read: Input should be 'ok'"),
+        "answers-at-length": ("failed", "cannot be read: it takes 33,554,432 bytes"),
+        "spoils-meshes": ("ok", None),
+        "moves-away": ("ok", None),
+        "good": ("ok", None),
+    }
+    store = Store(tmp_path)
+    found = run_tasks(tasks_of(*expected), store)
+    outcomes = {record.cell.algorithm: record.outcome for record in found}
+    for name, (status, cause) in expected.items():
+        assert outcomes[name].status == status, (name, outcomes[name].cause)
+        assert cause is None or cause in outcomes[name].cause
+    assert run_tasks(tasks_of(*expected), store) == found
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds", "cause"),
+    [
+        ("zeros-later", (FaultKind.OTHER_MAP, FaultKind.OFF_CIRCLE), "off the unit circle by up"),
+        ("worse-later", (FaultKind.OTHER_MAP, FaultKind.OTHER_ENERGY), "E_C over the area is"),
+    ],
+)
+def test_a_timed_call_that_returns_a_worse_map_makes_the_cell_invalid(tmp_path, name, kinds, cause):
+    (record,) = run_tasks(tasks_of(name), Store(tmp_path))
+    outcome = record.outcome
+    assert (outcome.status, outcome.rounds) == ("invalid", ())
+    assert outcome.cause.startswith("in round 1 of 1: call 1 of ")
+    assert "returned another map than the check" in outcome.cause
+    assert cause in outcome.cause
+    assert tuple(fault.kind for fault in outcome.faults)[:2] == kinds
 
 
 def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(tmp_path):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cembench import HoledMesh, Parameterization, algorithm
-from cembench.running.measure import check_cell, faults
+from cembench.running.judge import faults
+from cembench.running.measure import check_cell
 from cembench.running.plan import How, plan_cells
 from tests import gallery
 
@@ -21,7 +22,7 @@ def mapped(uv):
 
     spec = given.__cembench__
     task = plan_cells([spec], [MESH], {}, How(repeats=1))[0]
-    return check_cell(spec, MESH, task.cell)[0], faults(spec, MESH, uv)
+    return check_cell(spec, MESH, task.cell)[0], [f.detail for f in faults(spec, MESH, uv)]
 
 
 def holes():

@@ -28,5 +28,5 @@ class LauncherHere:
     def check(self, task):
         return call_here(task)
 
-    def time(self, task):
-        return time_cell(task.algorithm, task.mesh, task.cell)
+    def time(self, task, checked):
+        return time_cell(task.algorithm, task.mesh, task.cell, checked)

@@ -1,0 +1,1 @@
+"""Records of measurements, where they are stored, and how they are compared."""

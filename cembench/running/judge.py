@@ -1,0 +1,137 @@
+"""Judge a map: whether it keeps the promises of its target.
+
+A map whose image triangles all have positive area takes each value as often as the boundaries'
+images wind round it. So it is injective where no triangle is folded and the boundaries' images are
+polygons that neither cross themselves nor each other; both are decided exactly for the given
+doubles.
+
+Boundary vertices can lie closer together on the circle than doubles can tell apart. Angles that
+differ by no more than rounding (:data:`~cembench.conformal.planar.ANGLE_ROUNDING`) therefore count
+as in order. Nothing is lost by that: where two neighbours fall into one point, the triangle at
+their edge has no area and counts as folded, and where they change places by a rounding error,
+either that triangle is folded or the polygon crosses itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
+from cembench.conformal.planar import crossing_polygons, polygon_area, turns
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import Algorithm
+from cembench.results.records import Fault, FaultKind
+
+Complex = NDArray[np.complex128]
+
+#: How far from the unit circle a boundary vertex of a disk may lie.
+CIRCLE_TOLERANCE = 1e-9
+#: How far from a circle, relative to its radius, a hole's image may be and still be called one.
+CIRCULAR = 1e-3
+
+
+def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]:
+    """Return the promises that this map breaks; none for a valid one.
+
+    A boundary that is in the wrong place comes before folds, one that is only out of order after
+    them: it is what folded the triangles beside it.
+    """
+    flipped = flipped_triangles(mesh, uv)
+    is_reversed = image_area(mesh, uv) <= 0 or flipped == mesh.m
+    placed: list[Fault] = []
+    order: list[Fault] = []
+    if algorithm.target in ("disk", "circular holes"):
+        placed, order = _of_the_circle(mesh, uv)
+    if algorithm.target == "circular holes":
+        placed += _crossings(mesh, uv)
+        placed += _turned_holes(mesh, uv) if not (placed or is_reversed) else []
+    elif algorithm.target == "disk" and not (flipped or placed or order):
+        order = _crossings(mesh, uv)
+    if is_reversed:
+        off = [fault for fault in placed if fault.kind is not FaultKind.WINDING]
+        return [*off, _fault(FaultKind.REVERSED, "the map reverses the surface's orientation")]
+    if flipped:
+        told = f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})"
+        told = "; ".join([told, *broken_premises(mesh)])
+        placed.append(_fault(FaultKind.FOLDED, told))
+    return placed + order
+
+
+def broken_premises(mesh: TriangleMesh) -> list[str]:
+    """Return what to say of a mesh that breaks a premise of the paper; nothing of another."""
+    broken = [notice for notice in mesh.notices if notice.startswith("Definition 1")]
+    return [f"the mesh breaks a premise of the paper: {'; '.join(broken)}"] if broken else []
+
+
+def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[str]:
+    """Return what a reader should know of a map without faults.
+
+    That a free boundary overlaps itself, which its target does not rule out; and that holes are not
+    circles: how circular they are is a metric like the energy, not a promise.
+    """
+    if algorithm.target == "free boundary":
+        found = _crossings(mesh, uv)
+        return [f"the image overlaps itself: {fault.detail}" for fault in found]
+    return _uncircular_holes(mesh, uv) if algorithm.target == "circular holes" else []
+
+
+def _fault(kind: FaultKind, detail: str) -> Fault:
+    return Fault(kind=kind, detail=detail)
+
+
+def _outer(mesh: TriangleMesh, uv: Complex) -> NDArray[np.int64]:
+    return max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
+
+
+def _of_the_circle(mesh: TriangleMesh, uv: Complex) -> tuple[list[Fault], list[Fault]]:
+    """Whether the outer boundary lies on the unit circle and goes round it once; and in order."""
+    z = uv[_outer(mesh, uv)]
+    name = "boundary" if len(mesh.loops) == 1 else "outer boundary"
+    found, order = [], []
+    off = np.abs(np.abs(z) - 1).max()
+    if off > CIRCLE_TOLERANCE:
+        told = f"the {name} lies off the unit circle by up to {off:.2g}"
+        found.append(_fault(FaultKind.OFF_CIRCLE, told))
+    around, winding, backward = turns(z)
+    if around != 1 and winding not in (0, 1):  # 0: all points may lie on half of the circle
+        told = f"the {name} goes round the circle {winding} times, not once counter-clockwise"
+        found.append(_fault(FaultKind.WINDING, told))
+    elif around != 1:
+        told = f"{backward} of {len(z)} arcs of the {name} go backward"
+        order.append(_fault(FaultKind.BOUNDARY_ORDER, told))
+    return found, order
+
+
+def _crossings(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
+    crossing = crossing_polygons([uv[loop] for loop in mesh.loops])
+    if crossing is None:
+        return []
+    one, other = (f"boundary {int(mesh.loops[k].min())}" for k in crossing)
+    whom = "itself" if one == other else other
+    told = f"{one} crosses {whom} (boundaries are called by their smallest vertex)"
+    return [_fault(FaultKind.BOUNDARIES_CROSS, told)]
+
+
+def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
+    """Holes that run counter-clockwise, like the outer boundary: the surface lies inside them."""
+    outer = _outer(mesh, uv)
+    turned = [k for k in mesh.loops if k is not outer and polygon_area(uv[k]) >= 0]
+    return [
+        _fault(
+            FaultKind.HOLE_ORIENTATION,
+            f"boundary {int(loop.min())} runs counter-clockwise; a hole's image runs clockwise",
+        )
+        for loop in turned
+    ]
+
+
+def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[str]:
+    circles = boundary_circles(mesh, uv)[1:]
+    off = [circle for circle in circles if not circle.circularity <= CIRCULAR]
+    if not off:
+        return []
+    worst = max(circle.circularity for circle in off)
+    return [
+        f"{len(off)} of {len(circles)} holes are no circles: off by up to {worst:.2g} of the radius"
+    ]

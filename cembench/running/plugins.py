@@ -1,0 +1,78 @@
+"""Load the user's plug-ins, each in a process of its own first.
+
+Importing a plug-in runs it: it may end the process, crash, or never return. So a process that has
+nothing to lose does it before this one. Whatever ends that process, or keeps it from ending, is an
+error that names the plug-in.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from cembench.core.errors import RegistryError, said_by
+from cembench.registry import Registry, declared_by, load_registry
+from cembench.running.process import Ending, Limits, die_with_parent, run_limited, spawning
+
+#: Wall-clock seconds that importing a plug-in may take.
+IMPORT_SECONDS = 60.0
+#: What the process writes where all is well; anything else it writes is what is wrong.
+_LOADED = b"loaded"
+
+
+def load_with_plugins(plugins: Sequence[str], seconds: float = IMPORT_SECONDS) -> Registry:
+    """Load the registry with these plug-ins, each of which was loaded elsewhere before.
+
+    Raises
+    ------
+    RegistryError
+        As :func:`~cembench.registry.load_registry`; also where importing a plug-in ends the process
+        that does it, or takes longer than `seconds`.
+
+    """
+    for plugin in plugins:
+        _try(plugin, seconds)
+    return load_registry(plugins)
+
+
+def _try(plugin: str, seconds: float) -> None:
+    """Load a plug-in in a process of its own."""
+    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
+        answer = Path(folder) / "answer"
+        command = [sys.executable, "-m", "cembench.running.plugins", plugin, str(answer)]
+        start = spawning([*command, str(os.getpid())], os.environ)
+        ending = run_limited(start, Limits(seconds), Path(folder) / "log")
+        said = answer.read_bytes() if answer.is_file() else None
+    if said is None or ending.limit:
+        raise RegistryError(
+            f"plug-in {plugin!r} cannot be imported: {_told(ending, seconds)}. Repair it: "
+            "importing a plug-in must only declare functions."
+        )
+    if said != _LOADED:
+        raise RegistryError(said.decode(errors="replace"))
+
+
+def _told(ending: Ending, seconds: float) -> str:
+    if ending.limit:
+        return f"that took more than {seconds:g} s"
+    return f"the process that did it {ending.how}"
+
+
+def _main(plugin: str, answer: Path, parent: int) -> None:
+    die_with_parent(parent)
+    try:
+        declared_by(plugin)
+        told = _LOADED
+    except RegistryError as error:
+        told = str(error).encode(errors="replace")
+    except BaseException as error:  # nobody interrupts this process but the plug-in
+        told = f"plug-in {plugin!r} cannot be imported: {said_by(error)}.".encode(errors="replace")
+    answer.write_bytes(told)
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    _main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))

@@ -1,0 +1,172 @@
+"""Take apart what an algorithm returned or raised, into plain data of bounded size.
+
+An algorithm may return anything: what leaves these functions are arrays, numbers and texts of our
+own making, or a fault that says what is wrong. Nothing it does here, short of ending the process or
+never answering, is more than a fault.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import operator
+import traceback
+from itertools import islice
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import to_json
+
+from cembench.core.clock import Timing
+from cembench.core.errors import AlgorithmFailed, CembenchError, message_of, said_by, shortened
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
+from cembench.running.judge import broken_premises
+
+#: The longest traceback that is kept, in characters.
+LONGEST_TRACEBACK = 20_000
+#: The most iterations, energies and phases that are kept, and bytes of extras as JSON.
+MOST_ITERATIONS = 2**53
+MOST_ENERGIES = 100_000
+MOST_PHASES = 100
+MOST_EXTRAS_BYTES = 1_000_000
+
+
+def map_of(found: Any, mesh: TriangleMesh) -> NDArray[np.complex128] | Fault:
+    """Return a copy of the map, or why it is none: of another type or shape, or not finite."""
+    if not isinstance(found, Parameterization):
+        told = f"it returned a {_type_of(found)}, not a Parameterization"
+        return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=told)
+    try:
+        uv = found.uv
+    except BaseException as error:
+        return Fault(kind=FaultKind.RAISED, detail=f"its uv cannot be read: {said_by(error)}")
+    plain = np.asarray(uv) if isinstance(uv, np.ndarray) else None  # without a subclass's methods
+    if plain is None or plain.shape != (mesh.n,) or plain.dtype != np.complex128:
+        got = _type_of(uv) if plain is None else f"{plain.dtype} {plain.shape}"
+        told = f"uv is {got}; required is complex128 ({mesh.n},)"
+        return Fault(kind=FaultKind.WRONG_SHAPE, detail=shortened(told))
+    bad = np.flatnonzero(~np.isfinite(plain))
+    if len(bad):
+        told = f"uv is NaN or infinite at {len(bad)} vertices, the first being {bad[0]}"
+        return Fault(kind=FaultKind.NOT_FINITE, detail=told)
+    return np.array(plain, dtype=np.complex128)
+
+
+def hash_of(uv: NDArray[np.complex128]) -> str:
+    """Return the SHA-256 of a map's bytes."""
+    return hashlib.sha256(uv.tobytes()).hexdigest()
+
+
+def report_of(found: Parameterization) -> tuple[dict[str, Any], list[Fault]]:
+    """Return iterations, energies and extras by the names of :class:`Outcome`, and the faults.
+
+    What is faulty is left out.
+    """
+    report: dict[str, Any] = {}
+    wrong = []
+    for name, read in (
+        ("iterations", _iterations),
+        ("energy_history", _energies),
+        ("extras", _extras),
+    ):
+        try:
+            report[name] = read(getattr(found, name))
+        except BaseException as error:
+            told = str(error) if isinstance(error, _WrongReportError) else said_by(error)
+            wrong.append(Fault(kind=FaultKind.WRONG_REPORT, detail=f"{name} {told}"))
+    return report, wrong
+
+
+def phases_fault(timing: Timing) -> Fault | None:
+    """Return what is wrong with the seconds and phases of a call; None where nothing is."""
+    names, seconds = list(timing.phases), [timing.total, *timing.phases.values()]
+    told = ""
+    if len(names) > MOST_PHASES:
+        told = f"it names {len(names)} phases; at most {MOST_PHASES} are kept"
+    elif not all(
+        isinstance(name, str) and len(name) <= 100 and shortened(name) == name for name in names
+    ):
+        told = "a phase's name is not a text of at most 100 characters"
+    elif not all(math.isfinite(s) and s >= 0 for s in seconds):
+        told = "the seconds of a phase are negative or not finite"
+    return Fault(kind=FaultKind.WRONG_REPORT, detail=told) if told else None
+
+
+def outcome_of_error(error: BaseException, mesh: TriangleMesh) -> Outcome:
+    """Return how a call on this mesh is recorded that raised this."""
+    if isinstance(error, AlgorithmFailed):
+        said = shortened("; ".join([message_of(error), *broken_premises(mesh)]))
+        return not_ok("failed", Fault(kind=FaultKind.GAVE_UP, detail=said), gave_up=True)
+    if isinstance(error, CembenchError):
+        said = shortened(message_of(error))
+        return not_ok("failed", Fault(kind=FaultKind.RAISED, detail=said))
+    status: Status = "failed"
+    fault = Fault(kind=FaultKind.RAISED, detail=said_by(error))
+    if isinstance(error, MemoryError):
+        status = "out_of_memory"
+        said = shortened(message_of(error) or "memory was refused")
+        fault = Fault(kind=FaultKind.OUT_OF_MEMORY, detail=said)
+    return not_ok(status, fault, traceback=_traceback_of(error))
+
+
+class _WrongReportError(Exception):
+    """What is wrong with a value, to be read after its name."""
+
+
+def _iterations(given: Any) -> int:
+    try:
+        count = operator.index(given)
+    except TypeError:
+        raise _WrongReportError(f"is {_shown(given)}; required is a whole number") from None
+    if not 0 <= count <= MOST_ITERATIONS:
+        raise _WrongReportError(f"is {_shown(given)}; allowed is 0 to 2^53")
+    return count
+
+
+def _energies(given: Any) -> tuple[float, ...]:
+    energies = list(islice(given, MOST_ENERGIES + 1))
+    if len(energies) > MOST_ENERGIES:
+        raise _WrongReportError(f"holds more than {MOST_ENERGIES:,} energies")
+    for k, energy in enumerate(energies):
+        if not isinstance(energy, Real) or not math.isfinite(energy):
+            raise _WrongReportError(
+                f"holds {_shown(energy)} at position {k}; required are finite numbers"
+            )
+    return tuple(map(float, energies))
+
+
+def _extras(given: Any) -> dict[str, Any]:
+    if not isinstance(given, dict):
+        raise _WrongReportError(f"is a {_type_of(given)}; required is a dict")
+    if not all(isinstance(name, str) for name in given):
+        raise _WrongReportError("has names that are not strings")
+    try:
+        text = to_json(given, inf_nan_mode="null")
+    except Exception as error:
+        raise _WrongReportError(f"cannot be written as JSON: {said_by(error)}") from None
+    if len(text) > MOST_EXTRAS_BYTES:
+        raise _WrongReportError(f"takes {len(text):,} bytes; allowed are {MOST_EXTRAS_BYTES:,}")
+    plain: dict[str, Any] = json.loads(text)
+    return plain
+
+
+def _type_of(value: Any) -> str:
+    return shortened(str(type(value).__name__), 100)
+
+
+def _shown(value: Any) -> str:
+    """Return a value of a plain type as it is, and any other by its type."""
+    return shortened(repr(value), 100) if type(value) in (float, str) else f"a {_type_of(value)}"
+
+
+def _traceback_of(error: BaseException) -> str:
+    try:
+        told = "".join(traceback.format_exception(error))
+    except BaseException as another:
+        told = f"{said_by(error)} (no traceback: {_type_of(another)})"
+    return shortened(told, LONGEST_TRACEBACK)
