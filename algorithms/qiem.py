@@ -163,7 +163,7 @@ def _centred(S: Real | None, mass: Real) -> Real | None:
 def _boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
     """Turn the boundary's circle to a parallel, project it from the pole beyond it, scale."""
     loop = S[mesh.boundary]
-    turn = np.linalg.svd(loop - loop.mean(axis=0))[2].T
+    turn = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2].T
     loop = loop @ turn
     # The half that is mapped to the disk lies on the other side of the parallel.
     in_south = (S[mesh.interior] @ turn[:, 2]).mean() < loop[:, 2].mean()

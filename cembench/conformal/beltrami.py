@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
+from cembench.conformal.laplacian import corner_products, half_cotangents, laplacian_of_weights
 from cembench.conformal.planar import signed_areas
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -32,6 +32,34 @@ def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float
     planar triangle has no area.
     """
     area = signed_areas(uv, F)
+    E, G, mixed = _first_fundamental_form(uv, F, V, area)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        root = np.sign(area) * np.sqrt(np.maximum(E * G - mixed**2, 0.0))
+        mu: Complex = (E - G + 2j * mixed) / (E + G + 2 * root)
+    return mu
+
+
+def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Largest over smallest stretch of the map between ``uv[F]`` and ``V[F]``, (m,); 1 at least.
+
+    Infinite where an image has no area. It is (1 + |mu|) / |1 - |mu||, mu being that of
+    :func:`beltrami_coefficients`, written as (1 + |mu|)^2 / (1 - |mu|^2) with the ratio of the
+    areas as the root: no difference of nearly equal numbers is taken, so slivers cost no digits.
+    """
+    area = signed_areas(uv, F)
+    E, G, mixed = _first_fundamental_form(uv, F, V, area)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        root = corner_products(V, F)[1] / (2 * np.abs(area))
+        whole = E + G + 2 * root
+        modulus = np.hypot(E - G, 2 * mixed) / whole
+        found = (1 + modulus) ** 2 * whole / (4 * root)
+    return np.where(np.isnan(found), np.inf, found)
+
+
+def _first_fundamental_form(
+    uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64], area: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """E, G and F of the map that carries planar triangles of these signed areas to ``V[F]``."""
     # The gradient of the hat function of a corner is i times the opposite edge over 2 area.
     dx = np.zeros((len(F), V.shape[1]))
     dy = np.zeros_like(dx)
@@ -42,16 +70,7 @@ def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float
             dy += gradient.imag[:, None] * V[F[:, c]]
         E, G = np.einsum("td,td->t", dx, dx), np.einsum("td,td->t", dy, dy)
         mixed = np.einsum("td,td->t", dx, dy)
-        root = np.sign(area) * np.sqrt(np.maximum(E * G - mixed**2, 0.0))
-        mu: Complex = (E - G + 2j * mixed) / (E + G + 2 * root)
-    return mu
-
-
-def dilatations_of(mu: Complex) -> NDArray[np.float64]:
-    """Largest over smallest stretch, (1 + |mu|) / |1 - |mu||; infinite where mu is NaN."""
-    modulus = np.nan_to_num(np.abs(mu), nan=1.0)
-    with np.errstate(divide="ignore"):
-        return (1 + modulus) / np.abs(1 - modulus)
+    return E, G, mixed
 
 
 def unfolded(mu: Complex) -> Complex:

@@ -16,7 +16,7 @@ from cembench.conformal.laplacian import by_rows
 from cembench.conformal.planar import polygon_area
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -117,8 +117,10 @@ class BorderedLaplacian:
             return dirichlet - polygon_area(f_b)
 
     def dirichlet_to_neumann(self) -> DirichletToNeumann:
-        """S = L_bb - L_bi L_ii^-1 L_ib, as its triangular factor."""
-        return DirichletToNeumann(self._whole.schur_factor())
+        """S = L_bb - L_bi L_ii^-1 L_ib, as its triangular factor or, of a long boundary, solves."""
+        if len(self.boundary) > LARGEST_DENSE:
+            return DirichletToNeumann(self._whole.schur_times, self._whole.schur_solved)
+        return DirichletToNeumann.of_factor(self._whole.schur_factor())
 
     @cached_property
     def S(self) -> Real:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,31 +19,33 @@ class DirichletToNeumann:
 
     Parameters
     ----------
-    C : float (B - 1, B - 1), Fortran order
-        Lower triangular; C C^T is S without its last row and column. They follow from the others,
-        since the rows of S sum to zero.
+    times, solved : function
+        The products, with (B - 1, k), of S without its last row and column and of the inverse of
+        that. The last row and column follow from the others, since the rows of S sum to zero.
 
-    Both products cost B^2 operations; S itself is never formed.
+    S itself is never formed.
 
     """
 
-    def __init__(self, C: Real) -> None:
-        self._C = C
+    def __init__(self, times: Callable[[Real], Real], solved: Callable[[Real], Real]) -> None:
+        self._times, self._solved = times, solved
+
+    @classmethod
+    def of_factor(cls, C: Real) -> Self:
+        """From C (B - 1, B - 1), lower triangular in Fortran order; B^2 operations a product."""
+        return cls(
+            lambda X: triangle_times(C, triangle_times(C, X, transposed=True)),
+            lambda X: triangle_solved(C, triangle_solved(C, X), transposed=True),
+        )
 
     def __call__(self, f: NDArray[Any]) -> NDArray[Any]:
         """S f for f (B,) or (B, k), real or complex."""
-        found = by_real_columns(self._product, (f - f[-1])[:-1])
+        found = by_real_columns(self._times, (f - f[-1])[:-1])
         return np.concatenate([found, -found.sum(axis=0, keepdims=True)])
 
     def inverse(self, g: Real) -> Real:
         """(S + m m^T)^-1 g with m = 1 / B: what inverts S up to its constants; g (B,) or (B, k)."""
         total = g.sum(axis=0)
-        x = by_real_columns(self._solution, (g - total / len(g))[:-1])
+        x = by_real_columns(self._solved, (g - total / len(g))[:-1])
         mean = x.sum(axis=0) / len(g)
         return np.concatenate([x - mean + total, (total - mean)[None]])
-
-    def _product(self, X: Real) -> Real:
-        return triangle_times(self._C, triangle_times(self._C, X, transposed=True))
-
-    def _solution(self, X: Real) -> Real:
-        return triangle_solved(self._C, triangle_solved(self._C, X), transposed=True)

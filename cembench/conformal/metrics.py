@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.beltrami import beltrami_coefficients, dilatations_of
+from cembench.conformal.beltrami import dilatations as dilatations_between
 from cembench.conformal.laplacian import corner_products, half_cotangents
 from cembench.conformal.planar import fitted_circle, orientations, polygon_area
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -22,6 +22,8 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+#: What share of E_D rounding may take E_C below zero.
+LEAST_ENERGY = 1e-9
 #: How many triangles stand for all in :class:`SampledAngleError`.
 SAMPLE = 4_000
 
@@ -86,7 +88,7 @@ def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:
 
     Shape (m,); infinite for a triangle that collapsed to a segment or a point.
     """
-    return dilatations_of(beltrami_coefficients(uv, mesh.F, mesh.V))
+    return dilatations_between(uv, mesh.F, mesh.V)
 
 
 @dataclass(frozen=True)
@@ -282,6 +284,19 @@ def metrics_markdown() -> str:
     """Return the table of all metrics for a document."""
     rows = "\n".join(f"| `{m.name}` | {m.meaning} | {m.unit or '-'} |" for m in METRICS)
     return f"| name | meaning | unit |\n|---|---|---|\n{rows}\n"
+
+
+def lost_in_rounding(metrics: Mapping[str, float]) -> list[str]:
+    """Name the figures that say nothing: not finite, or an energy below what is possible."""
+    found = [
+        f"{name} is {value}, which is not a figure"
+        for name, value in metrics.items()
+        if not np.isfinite(value)
+    ]
+    energy, whole = metrics["conformal_energy"], metrics["dirichlet_energy"]
+    if energy < -LEAST_ENERGY * abs(whole):
+        found.append(f"conformal_energy is {energy:.3g}, which only rounding can make negative")
+    return found
 
 
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:

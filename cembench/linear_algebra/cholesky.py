@@ -42,6 +42,10 @@ class LinearAlgebra:
 #: Right-hand sides that are solved for together: enough to be fast, few enough to need no memory.
 _COLUMNS_AT_ONCE = 64
 
+#: Up to this order the block behind a leading one is kept dense, as it fills up when the leading
+#: block is eliminated: beyond it its n^3 operations and n^2 numbers are worth avoiding.
+LARGEST_DENSE = 5_000
+
 _DEFAULT = LinearAlgebra()
 _current: ContextVar[LinearAlgebra] = ContextVar("cembench_linear_algebra", default=_DEFAULT)
 
@@ -106,7 +110,8 @@ class Cholesky:
     A : sparse (n, n)
         Symmetric positive definite, both triangles stored.
     leading : int, optional
-        Also solve with the block ``A[:leading, :leading]``; under "reuse" from the same factor.
+        Also solve with the block ``A[:leading, :leading]``; under "reuse" from the same factor,
+        unless more than :data:`LARGEST_DENSE` rows follow it: then it has a factor of its own.
 
     Raises
     ------
@@ -185,6 +190,18 @@ class Cholesky:
                 return by_real_columns(self._kept.extended, x)
         return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
 
+    def schur_times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """S x for the Schur complement S of :meth:`schur_factor`, by one solve; x (m, k)."""
+        k = self._leading
+        E, D = sparse.csr_array(self._A[k:, :k]), self._A[k:, k:]
+        return D @ x - E @ self.solve_leading(E.T @ x)
+
+    def schur_solved(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+        """S^-1 x, likewise: what A^-1 has in the place of S^-1."""
+        padded = np.zeros((self._A.shape[0], x.shape[1]))
+        padded[self._leading :] = x
+        return self.solve(padded)[self._leading :]
+
     def _schur_factor_by_solves(self) -> NDArray[np.float64]:
         k = self._leading
         solve = self._kept.solve_leading if self._kept else self._leading_factor().solve
@@ -207,6 +224,10 @@ class Cholesky:
 
 
 def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
+    if backend == "cvxopt" and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
+        from cembench.linear_algebra.cholmod import cholmod_solver
+
+        return _SeparateFactors(cholmod_solver, A, leading)
     return _factor_class(backend)(A, leading)
 
 
@@ -226,7 +247,7 @@ def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], 
 
 
 class _SeparateFactors:
-    """For libraries that solve only with the whole factor: the leading block gets one of its own.
+    """For factors that solve only as a whole: the leading block gets one of its own.
 
     It is factored when first used. Nothing is kept over an update.
     """
@@ -250,7 +271,7 @@ class _SeparateFactors:
         return self._solve_leading(B)
 
     def schur_factor(self) -> None:
-        """These libraries do not show their factors."""
+        """These factors are not shown."""
 
     def condensed(self, B: NDArray[np.float64]) -> None:
         """Nor half a solve."""

@@ -8,6 +8,8 @@ not connected with what follows it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from cvxopt import amd, cholmod, matrix, spmatrix
 from numpy.typing import NDArray
@@ -111,6 +113,11 @@ class CholmodFactor:
         cholmod.solve(self._symbolic, x, sys=_BACKWARD)
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
         return np.array(x)[: self._leading]
+
+
+def cholmod_solver(A: sparse.csc_array) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+    """Factor A as a whole; the result solves with it."""
+    return CholmodFactor(A, None).solve
 
 
 def _set_options() -> None:

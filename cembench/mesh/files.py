@@ -1,16 +1,11 @@
-"""Mesh files: OBJ, OFF, PLY (ASCII and binary) and STL, read and written through libraries.
+"""Mesh files read as checked surfaces, and surfaces and maps written as OBJ, OFF, PLY and STL.
 
-MATLAB files (MAT, before version 7.3) are read too: variables v (n, 3), and f (m, 3) from 1.
-
-Reading keeps every vertex, in the file's order and in float64, and only the geometry: texture
-seams of an OBJ do not cut the surface. Polygons are cut into triangles by fans, with a notice.
+Polygons are cut into triangles by fans, with a notice.
 """
 
 from __future__ import annotations
 
-import io
 import os
-import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -21,17 +16,18 @@ import meshio
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
-from scipy.io import loadmat
 
 from cembench.core.errors import MeshError
+from cembench.mesh.reading import READERS as _READERS
+from cembench.mesh.reading import read_soup
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
-Arrays = tuple[NDArray[np.float64], NDArray[np.int64], tuple[str, ...]]
 M = TypeVar("M", bound=TriangleMesh)
 
 
 def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:  # type: ignore[assignment]
-    """Which checked surface does this file hold? Its name is the file's stem.
+    """Read a file as a checked surface, which is named after the file's stem.
 
     Raises
     ------
@@ -39,55 +35,25 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
         The file is missing, empty, of unknown format or damaged, or its mesh fails a check.
 
     """
-    path = Path(path)
+    soup = read_soup(path)
     try:
-        V, F, notices = read_arrays(path)
-        return mesh_type.from_arrays(V, F, name=path.stem, notices=notices)
+        return checked(soup, mesh_type)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from None
 
 
-def is_mesh_file(path: Path) -> bool:
-    """Is this a file whose name says that it can be read as a mesh?"""
-    return path.is_file() and path.suffix.lower() in _READERS
-
-
-def read_arrays(path: Path) -> Arrays:
-    """What vertices (n, 3), triangles (m, 3) and notices does this file give, unchecked?
+def checked(soup: Soup, mesh_type: type[M]) -> M:
+    """Check polygons as a surface of this kind, cut into triangles.
 
     Raises
     ------
     MeshError
-        The file is missing, empty, of unknown format or damaged.
+        A check fails.
 
     """
-    if not path.is_file():
-        what = "this is a folder, not a file" if path.is_dir() else "there is no such file"
-        raise MeshError(f"{what}. Check the path; paths are relative to {Path.cwd()}.")
-    read = _READERS.get(path.suffix.lower())
-    if read is None:
-        raise MeshError(
-            f"unknown mesh format {path.suffix!r}; allowed: {', '.join(_READERS)}. "
-            "Convert the file to one of these."
-        )
-    if path.stat().st_size == 0:
-        raise MeshError("the file is empty (0 bytes). Export or download it again.")
-    try:
-        V, F, notices = read(path)
-    except MeshError:
-        raise
-    except Exception as error:  # the libraries raise anything on a damaged file
-        detail = str(error).strip() or type(error).__name__
-        raise MeshError(
-            f"the file cannot be read as {path.suffix[1:].upper()} ({detail}). It is damaged, cut "
-            "short, or of another format than its name says; export it again."
-        ) from error
-    if len(F) == 0:
-        raise MeshError(
-            f"no faces: {len(V)} vertices were found, but not one triangle or polygon. The file "
-            "holds a point cloud, was cut short, or is of another format than its name says."
-        )
-    return V, F, notices
+    polygons = int((soup.sizes > 3).sum())
+    cut = (f"{polygons} polygons were cut into triangles",) if polygons else ()
+    return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=soup.notices + cut)
 
 
 def write_mesh(
@@ -133,92 +99,6 @@ def check_writable_format(path: Path, *, with_uv: bool) -> None:
         raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
 
 
-def _read_obj(path: Path) -> Arrays:
-    text = path.read_text(encoding="utf-8", errors="replace").replace("\\\n", " ")
-    # Positions alone: the library refuses texture coordinates that are not one a vertex.
-    kept = [line for line in map(str.lstrip, text.splitlines()) if line[:2] in ("v ", "f ")]
-    faces_begin = next((k for k, line in enumerate(kept) if line[0] == "f"), len(kept))
-    vertices_end = max((k for k, line in enumerate(kept) if line[0] == "v"), default=-1)
-    found = meshio.obj.read(io.StringIO(re.sub(r"/\S*", "", "\n".join(kept))))
-    V, F, notices = _from_meshio(found)
-    relative = F < -1  # the library subtracts 1 from what the file counts from 1, or back from -1
-    if relative.any():
-        if vertices_end > faces_begin:
-            raise MeshError(
-                "relative (negative) face indices between the vertices are not supported. "
-                "Export it with absolute indices."
-            )
-        F = np.where(relative, F + 1 + len(V), F)
-    return V, F, notices
-
-
-def _read_ply(path: Path) -> Arrays:
-    return _from_meshio(meshio.ply.read(path))
-
-
-def _read_stl(path: Path) -> Arrays:
-    with np.errstate(over="ignore"):  # of the triangle count that an ASCII file seems to hold
-        return _from_meshio(meshio.stl.read(path))
-
-
-def _from_meshio(found: meshio.Mesh) -> Arrays:
-    points = np.asarray(found.points, dtype=np.float64)
-    V = points[:, :3] if points.ndim == 2 else points.reshape(0, 3)
-    blocks = [
-        np.asarray(block.data, dtype=np.int64)
-        for block in found.cells
-        if block.type in ("triangle", "quad", "polygon") and block.data.shape[1] >= 3
-    ]
-    F = np.concatenate([_fans(block) for block in blocks]) if blocks else np.empty((0, 3), int)
-    polygons = sum(len(block) for block in blocks if block.shape[1] > 3)
-    return V, F, _polygon_notice(polygons)
-
-
-def _fans(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Triangles of polygons that all have the same number of corners, (k, c) -> (k (c - 2), 3)."""
-    c = polygons.shape[1]
-    corners = np.stack([np.zeros(c - 2, int), np.arange(1, c - 1), np.arange(2, c)], axis=1)
-    return polygons[:, corners].reshape(-1, 3)
-
-
-def _polygon_notice(polygons: int) -> tuple[str, ...]:
-    return (f"{polygons} polygons were cut into triangles",) if polygons else ()
-
-
-def _read_off(path: Path) -> Arrays:
-    found = trimesh.load_mesh(path, process=False)
-    words = re.sub(r"#.*", "", path.read_text()).split()
-    declared = int(words[2])
-    if len(found.faces) < declared:
-        raise MeshError(
-            f"{declared} faces are declared but {len(found.faces)} were found. It was cut short."
-        )
-    cut = f"polygons were cut: {declared} faces became {len(found.faces)} triangles"
-    notice = (cut,) if len(found.faces) > declared else ()
-    return np.asarray(found.vertices, float), np.asarray(found.faces, np.int64), notice
-
-
-def _read_mat(path: Path) -> Arrays:
-    try:
-        content = loadmat(path)
-    except NotImplementedError:
-        raise MeshError(
-            "MATLAB files of version 7.3 are not supported. In MATLAB, save it with "
-            "save(..., '-v7')."
-        ) from None
-    missing = [name for name in ("v", "f") if name not in content]
-    if missing:
-        present = ", ".join(name for name in content if not name.startswith("__")) or "none"
-        raise MeshError(
-            f"no variable {missing[0]!r}; it has: {present}. Needed are v (n, 3), the vertices, "
-            "and f (m, 3), the triangles counted from 1."
-        )
-    F = np.asarray(content["f"])
-    if not np.issubdtype(F.dtype, np.number) or (np.round(F) != F).any() or F.min(initial=1) < 1:
-        raise MeshError("variable 'f' must hold whole numbers from 1 on, the triangles' corners.")
-    return np.asarray(content["v"], dtype=np.float64), F.astype(np.int64) - 1, ()
-
-
 def _write_obj(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
     nothing, none = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
     if UV is None:
@@ -241,13 +121,6 @@ def _write_stl(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
     trimesh.Trimesh(mesh.V, mesh.F, process=False).export(path)
 
 
-_READERS: dict[str, Callable[[Path], Arrays]] = {
-    ".obj": _read_obj,
-    ".off": _read_off,
-    ".ply": _read_ply,
-    ".stl": _read_stl,
-    ".mat": _read_mat,
-}
 _WRITERS: dict[str, Callable[[Path, TriangleMesh, ArrayLike | None], None]] = {
     ".obj": _write_obj,
     ".off": _write_off,

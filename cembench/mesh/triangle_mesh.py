@@ -21,6 +21,11 @@ from cembench.mesh import topology
 
 #: A triangle counts as degenerate when its area is below this share of its longest edge squared.
 DEGENERATE_AREA = 1e-15
+#: Below this share a triangle is kept, with a notice: cotangents lose digits with its square.
+SLIVER_AREA = 1e-6
+#: Coordinates and edges in between: the fourth powers of lengths are computed with.
+LARGEST_LENGTH = 1e60
+SMALLEST_LENGTH = 1e-60
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +65,7 @@ class TriangleMesh:
 
         """
         V, F = _as_arrays(V, F)
-        _check_values(V, F)
+        notices += _check_values(V, F)
         _check_edges(F)
         F, flipped = _oriented(F)
         if flipped:
@@ -209,7 +214,8 @@ def _some(indices: NDArray[np.int64], most: int = 5) -> str:
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
 
 
-def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
+def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:
+    """Raise for coordinates or indices that are no triangles; a notice of those hardly any."""
     bad = np.flatnonzero(~np.isfinite(V).all(axis=1))
     if len(bad):
         raise MeshError(
@@ -231,6 +237,7 @@ def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
             f"isolated vertices, in no triangle: {_some(bad)} (counted from 0). "
             "Remove unreferenced vertices and save again."
         )
+    _check_scale(V, F)
     corners = V[F]
     edges = corners[:, [1, 2, 0]] - corners
     double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
@@ -241,6 +248,30 @@ def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
             f"degenerate triangles (zero area): {_some(bad)} (counted from 0), the first with "
             f"vertices {F[bad[0]].tolist()}. Angles are not defined there; merge duplicate "
             "vertices or collapse these triangles."
+        )
+    thin = np.flatnonzero(double_area <= 2 * SLIVER_AREA * longest)
+    if not len(thin):
+        return ()
+    return (
+        f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
+        f"{_some(thin)}; energies and dilatations lose digits in rounding there",
+    )
+
+
+def _check_scale(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
+    """Raise where products of lengths would overflow or vanish, whatever the surface's shape."""
+    advice = "Angles do not depend on the scale: divide all coordinates by the same number."
+    largest = np.abs(V).max()
+    if largest > LARGEST_LENGTH:
+        raise MeshError(
+            f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}. {advice}"
+        )
+    spans = np.abs(V[F[:, [1, 2, 0]]] - V[F]).max(axis=(1, 2))
+    tiny = np.flatnonzero((spans > 0) & (spans < SMALLEST_LENGTH))
+    if len(tiny):
+        raise MeshError(
+            f"triangle {_some(tiny)} (counted from 0) spans less than {SMALLEST_LENGTH:g}, the "
+            f"first {spans[tiny[0]]:.3g}. {advice}"
         )
 
 

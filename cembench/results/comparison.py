@@ -2,8 +2,9 @@
 
 Compared are ratios of times taken in one round, each in a fresh process, in random order: what
 slows the machine for a while slows both. Had both the same cost, either would be the faster one of
-a round with probability 1/2, so the interval of the median ratio (:mod:`cembench.results.intervals`) is
-exact under any noise, and "faster" is said wrongly in at most 5 % of all comparisons.
+a round with probability 1/2, so the interval of the median ratio
+(:mod:`cembench.results.intervals`) is exact under any noise, and "faster" is said wrongly in at
+most 5 % of all comparisons.
 """
 
 from __future__ import annotations

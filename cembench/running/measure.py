@@ -18,7 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from cembench.conformal.metrics import all_metrics, boundary_circles, dirichlet_energy, image_area
+from cembench.conformal.metrics import (
+    all_metrics,
+    boundary_circles,
+    dirichlet_energy,
+    image_area,
+    lost_in_rounding,
+)
 from cembench.core.clock import Timing, measure
 from cembench.core.errors import said_by
 from cembench.linear_algebra.cholesky import linear_algebra
@@ -185,10 +191,12 @@ def _judged(
     """Return what an outcome says of a map, and the faults."""
     with _unruffled():
         problems = faults(algorithm, mesh, uv)
+        metrics = all_metrics(mesh, uv)
+        told = () if problems else (*remarks(algorithm, mesh, uv), *lost_in_rounding(metrics))
         about = {
-            "metrics": {name: _finite(v) for name, v in all_metrics(mesh, uv).items()},
+            "metrics": {name: _finite(v) for name, v in metrics.items()},
             "boundaries": _boundaries(mesh, uv),
-            "notes": () if problems else tuple(remarks(algorithm, mesh, uv)),
+            "notes": told,
         }
     return about, problems
 

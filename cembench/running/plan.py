@@ -11,7 +11,8 @@ from typing import Any, TypeVar
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
 from cembench.mesh.datasets import recognised
-from cembench.mesh.files import is_mesh_file, read_mesh
+from cembench.mesh.files import checked, read_mesh
+from cembench.mesh.reading import is_named_like_a_mesh, read_soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
@@ -153,12 +154,16 @@ def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
 
     """
     kinds = list(dict.fromkeys(a.mesh_type for a in algorithms))
+    soup = read_soup(path)
     for kind in kinds[1:]:
         try:
-            return read_mesh(path, kind)
+            return checked(soup, kind)
         except MeshError:
             continue
-    return read_mesh(path, kinds[0])
+    try:
+        return checked(soup, kinds[0])
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
 
 
 def gather_surfaces(
@@ -179,19 +184,28 @@ def gather_surfaces(
 
 
 def mesh_files(folder: Path) -> list[Path]:
-    """The mesh files of a folder, by name.
+    """The entries of a folder that are named like mesh files, by name.
+
+    What is not a file after all (a pipe, a folder, a broken link) is among them, so that reading it
+    says so.
 
     Raises
     ------
     MeshError
-        There is no such folder, or no mesh in it.
+        This is not a folder, it cannot be listed, or there is no mesh in it.
 
     """
-    found = sorted(path for path in folder.glob("*") if is_mesh_file(path))
-    if not found:
-        why = "holds no OBJ, OFF, PLY, STL or MAT file" if folder.is_dir() else "is no folder"
-        raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
-    return found
+    try:
+        found = sorted(path for path in folder.iterdir() if is_named_like_a_mesh(path))
+    except (FileNotFoundError, NotADirectoryError):
+        why = "is not a folder"
+    except OSError as error:
+        why = f"cannot be listed ({error.strerror or error})"
+    else:
+        why = "holds no OBJ, OFF, PLY, STL or MAT file"
+        if found:
+            return found
+    raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
 
 
 def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:

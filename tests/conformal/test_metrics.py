@@ -19,6 +19,7 @@ from cembench.conformal.metrics import (
     boundary_circles,
     corner_angles,
     dilatations,
+    lost_in_rounding,
     metrics_markdown,
 )
 from tests import gallery
@@ -178,3 +179,23 @@ def test_a_record_holds_every_metric_of_the_table_in_its_order():
 def test_the_readme_has_the_table_of_metrics():
     readme = Path(__file__).parents[2] / "README.md"
     assert metrics_markdown() in readme.read_text()
+
+
+@pytest.mark.parametrize("thin", [1e-3, 1e-9, 1e-14])
+def test_dilatations_of_slivers_are_those_of_the_stretch(thin):
+    """A strip flattened by a factor, mapped to where it came from: 1 / thin everywhere."""
+    V, F = gallery.flat_rectangle()
+    mesh = DiskMesh.from_arrays(V * [1, thin, 1], F)
+    found = dilatations(mesh, V[:, 0] + 1j * V[:, 1])
+    np.testing.assert_allclose(found, 1 / thin, rtol=1e-9)
+    np.testing.assert_allclose(dilatations(mesh, planar(mesh)), 1, rtol=1e-6)
+
+
+def test_figures_that_rounding_has_eaten_are_named():
+    sound = {"conformal_energy": 1e-3, "dirichlet_energy": 3.0, "dilatation_max": 2.0}
+    assert lost_in_rounding(sound) == []
+    assert lost_in_rounding(sound | {"conformal_energy": -1e-12}) == []
+    (note,) = lost_in_rounding(sound | {"conformal_energy": -7.0})
+    assert "conformal_energy is -7" in note
+    notes = lost_in_rounding(sound | {"dilatation_max": np.inf, "conformal_energy": np.nan})
+    assert [note.split()[0] for note in notes] == ["conformal_energy", "dilatation_max"]

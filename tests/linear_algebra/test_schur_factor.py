@@ -1,11 +1,15 @@
 import numpy as np
 import pytest
+from cembench.algorithms.cem import cem
+from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from scipy import sparse
 
+from cembench.conformal import bordered
 from cembench.conformal.laplacian import laplacian
-from cembench.core.errors import NotPositiveDefinite
-from cembench.linear_algebra import cholmod
+from cembench.conformal.metrics import flipped_triangles
+from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
+from cembench.linear_algebra import cholesky, cholmod
 from cembench.linear_algebra.cholesky import Cholesky, available_backends, linear_algebra
 from cembench.mesh.triangle_mesh import DiskMesh
 from tests import gallery
@@ -113,3 +117,62 @@ def test_half_solves_do_without_a_factor_that_can_be_seen(system, monkeypatch):
     found = Cholesky(A, leading=k).condensed(b), Cholesky(A, leading=k).extended(b[k:])
     for one, other in zip(expected, found, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-10)
+
+
+@pytest.mark.parametrize("backend", available_backends())
+@pytest.mark.parametrize("solves", ["reuse", "backslash"])
+def test_products_of_a_schur_complement_that_is_too_large_for_its_factor(
+    system, backend, solves, monkeypatch
+):
+    A, k = system
+    S = schur_complement(A, k)
+    x = np.random.default_rng(2).standard_normal((len(S), 2))
+    monkeypatch.setattr(cholesky, "LARGEST_DENSE", len(S) - 1)
+    with linear_algebra(solves, backend):
+        factor = Cholesky(A, leading=k)
+        np.testing.assert_allclose(factor.schur_times(x), S @ x, atol=1e-10)
+        np.testing.assert_allclose(factor.schur_solved(S @ x), x, atol=1e-9)
+        C = factor.schur_factor()
+    np.testing.assert_allclose(C @ C.T, S, atol=1e-12)
+
+
+def spiral(turns=16, columns=3200):
+    """A narrow strip, rolled up: nearly all that it has is boundary."""
+    i, j, F = gallery.grid(2, columns)
+    angle = 2 * np.pi * turns * j / columns
+    radius = 1 + angle / 4 + 0.2 * i
+    z = radius * np.exp(1j * angle)
+    return DiskMesh.from_arrays(np.stack([z.real, z.imag, 0 * z.real], 1), F[:, ::-1])
+
+
+@pytest.mark.parametrize("function", [cem, direct_cem])
+def test_a_long_boundary_never_becomes_a_dense_matrix(function, monkeypatch):
+    mesh = spiral()
+    assert len(mesh.boundary) > cholesky.LARGEST_DENSE
+
+    def dense(*_):
+        raise AssertionError("the boundary's matrix was made dense")
+
+    monkeypatch.setattr(cholmod, "trailing_block", dense)
+    monkeypatch.setattr(Cholesky, "schur_factor", dense)
+    monkeypatch.setattr(
+        cholmod.CholmodFactor,
+        "solve_leading",
+        dense,  # of a factor whose trailing block has filled up
+    )
+    try:
+        uv = function(mesh).uv
+    except AlgorithmFailed:
+        assert function is cem  # its start puts such a boundary out of order
+    else:
+        assert flipped_triangles(mesh, uv) == 0
+
+
+def test_direct_cem_minimises_the_same_energy_without_the_dense_factor(monkeypatch):
+    mesh = hemi_ellipsoid(600)
+    expected = direct_cem(mesh)
+    for module in (cholesky, bordered):
+        monkeypatch.setattr(module, "LARGEST_DENSE", 1)
+    found = direct_cem(mesh)
+    np.testing.assert_allclose(found.energy_history, expected.energy_history, rtol=1e-9)
+    np.testing.assert_allclose(found.uv, expected.uv, atol=1e-6)

@@ -1,6 +1,7 @@
 """Bad files at the command line: each its own message, exit code 2, nothing written."""
 
 import json
+import os
 import re
 
 import numpy as np
@@ -21,12 +22,12 @@ FILES = {
     "a.xyz": ("0 0 0\n", "unknown mesh format '.xyz'; allowed: .obj, .off, .ply, .stl"),
     "points.obj": ("v 0 0 0\nv 1 0 0\n", "no faces: 2 vertices were found"),
     "prose.obj": ("hello world\n", "no faces"),
-    "prose.off": ("hello world\n", "cannot be read as OFF"),
+    "prose.off": ("hello world\n", "line 1, 'hello world': .* 'hello'"),
     "prose.ply": ("hello world\n", "cannot be read as PLY"),
     "prose.stl": ("hello world\n", "cannot be read as STL|no faces"),
-    "cut.off": ("OFF\n4 2 0\n0 0 0\n1 0 0\n", "cannot be read as OFF"),
-    "letters.obj": ("v a b c\nf 1 1 1\n", "cannot be read as OBJ"),
-    "flat.obj": ("v 0 0\nv 1 0\nv 1 1\nf 1 2 3\n", r"vertices have shape \(3, 2\)"),
+    "cut.off": ("OFF\n4 2 0\n0 0 0\n1 0 0\n", "4 vertices are declared, but 2 were found"),
+    "letters.obj": ("v a b c\nf 1 1 1\n", "line 1, 'v a b c': could not convert .* 'a'"),
+    "flat.obj": ("v 0 0\nv 1 0\nv 1 1\nf 1 2 3\n", "line 1, 'v 0 0': a vertex needs 3 numbers"),
     "nan.obj": (obj(np.where(V == 3, np.nan, V), F), "NaN or infinite at vertex 3, 9"),
     "inf.obj": (obj(np.where(V == 3, np.inf, V), F), "NaN or infinite"),
     "range.obj": (obj(V, np.where(F == 5, 77, F)), "vertex index out of range"),
@@ -114,3 +115,33 @@ def test_a_tube_goes_to_the_algorithms_that_take_holes(cli, tmp_path):
     assert code == 0
     assert {cell["algorithm"] for cell in json.loads(out)["cells"]} >= {"koebe-cem"}
     assert "cem" not in {cell["algorithm"] for cell in json.loads(out)["cells"]}
+
+
+def test_a_folder_of_meshes_leaves_nothing_out_in_silence(cli, tmp_path):
+    (tmp_path / "meshes").mkdir()
+    (tmp_path / "meshes" / "good.obj").write_text(obj(V, F))
+    (tmp_path / "meshes" / "notes.txt").write_text("no mesh")
+    odd = tmp_path / "meshes" / "odd.obj"
+    for make, message in (
+        (odd.mkdir, "this is a folder"),
+        (lambda: os.mkfifo(odd), "this is a pipe"),
+        (
+            lambda: odd.symlink_to("nowhere"),
+            "this is a symbolic link to nowhere, which does not exist",
+        ),
+        (lambda: odd.write_bytes(b"ply\nformat"), "no faces"),
+    ):
+        make()
+        code, _, err = cli("run", "--mesh-dir", tmp_path / "meshes", "-a", "cem", "--dry-run")
+        assert (code, f"{odd}: {message}" in err) == (2, True), err
+        odd.rmdir() if odd.is_dir() else odd.unlink()
+    assert cli("run", "--mesh-dir", tmp_path / "meshes", "-a", "cem", "--dry-run")[0] == 0
+
+
+def test_a_folder_that_is_none_or_holds_no_mesh(cli, tmp_path):
+    for folder, message in (
+        (tmp_path / "nowhere", "is not a folder"),
+        (tmp_path, "holds no OBJ, OFF, PLY, STL or MAT file"),
+    ):
+        code, _, err = cli("run", "--mesh-dir", folder)
+        assert (code, f"--mesh-dir {folder} {message}" in err) == (2, True), err

@@ -1,8 +1,11 @@
 import numpy as np
 import pytest
+from cembench.algorithms.harmonic_circle import harmonic_circle
 from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import DiskMesh, HoledMesh, MeshError, TriangleMesh
+from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import ParameterError
 from tests import gallery
 
@@ -132,3 +135,34 @@ def test_an_outer_boundary_that_is_not_there(vertex, message):
     assert 320 in mesh.interior
     with pytest.raises(ParameterError, match=rf"outer={vertex}: .*{message}.*longest loops"):
         mesh.outer_and_holes(vertex)
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"),
+    [
+        (1e200, r"a coordinate is 5e\+200 in size; allowed is up to 1e\+60.*divide"),
+        (1e300, r"a coordinate is 5e\+300 in size"),
+        (1e-200, r"triangle 0, .* spans less than 1e-60, the first 1e-200.*divide"),
+        (1e-310, "spans less than 1e-60"),
+    ],
+)
+def test_scales_that_overflow_or_vanish_are_refused(scale, message):
+    V, F = gallery.flat_rectangle()
+    with pytest.raises(MeshError, match=message):
+        TriangleMesh.from_arrays(V * scale, F)
+
+
+@pytest.mark.parametrize("scale", [2.0**-180, 2.0**180])
+def test_allowed_scales_change_no_figure(scale):
+    mesh = hemi_ellipsoid(300)
+    scaled = DiskMesh.from_arrays(mesh.V * scale, mesh.F)
+    uv = harmonic_circle(mesh).uv
+    np.testing.assert_array_equal(harmonic_circle(scaled).uv, uv)
+    assert all_metrics(scaled, uv) == all_metrics(mesh, uv)
+
+
+def test_slivers_are_reported():
+    V, F = gallery.flat_rectangle()
+    (notice,) = TriangleMesh.from_arrays(V * [1, 1e-7, 1], F).notices
+    assert notice.startswith("slivers, with less area than 1e-06 of their longest edge squared: ")
+    assert not TriangleMesh.from_arrays(V * [1, 1e-5, 1], F).notices

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from enum import StrEnum
 
-from cembench.results import paper
 from cembench.core.errors import RegistryError
 from cembench.registry import Registry
+from cembench.results import paper
 
 #: How many of the smallest models `quick` takes, and the most triangles in `standard`.
 QUICK_MODELS = 8

@@ -1,9 +1,9 @@
 import pytest
 
-from cembench.results import paper
 from cembench import DiskMesh, RegistryError, surface
-from cembench.results.paper.profiles import Profile, algorithms_of, models, surfaces_of
 from cembench.registry import Registry, load_registry
+from cembench.results import paper
+from cembench.results.paper.profiles import Profile, algorithms_of, models, surfaces_of
 
 
 def registry_of(rows):

@@ -1,0 +1,157 @@
+"""MATLAB files of versions 5 to 7.2: v (n, 3), and f (m, 3) counted from 1.
+
+Own code, because scipy's reader crashes the process on some damaged files, and never ends on some
+of version 4. Here every length is compared with what is there before anything is read.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import MeshError
+from cembench.mesh.soup import Soup, damaged
+
+_HEADER_BYTES = 128
+#: The types of elements that hold numbers, and those of an array and of one that is compressed.
+_NUMBERS = {
+    1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
+}  # fmt: skip
+_ARRAY, _COMPRESSED = 14, 15
+#: The classes of arrays of numbers, and the flag of complex ones.
+_NUMERIC_CLASSES, _COMPLEX = range(6, 16), 0x0800
+#: So much of a compressed array holds its name, which says whether the rest is wanted.
+_BEGINNING = 4096
+
+
+def read_mat(path: Path) -> Soup:
+    """Read the variables v and f of a MATLAB file; all others are skipped."""
+    content = path.read_bytes()
+    order = _byte_order(content)
+    present: list[str] = []
+    found: dict[str, NDArray[Any]] = {}
+    for kind, element in _elements(content[_HEADER_BYTES:], order):
+        begin = _inflated(element, _BEGINNING) if kind == _COMPRESSED else element
+        size = len(begin)
+        if kind == _COMPRESSED:
+            kind, size = _two_numbers(begin, 0, order)
+            begin = begin[8:]
+        if kind != _ARRAY:
+            raise damaged(f"it cannot be read as MAT: an element of type {kind} where arrays are")
+        name = _head(_elements(begin, order), order)[0]
+        present.append(name)
+        if name in ("v", "f") and name not in found:
+            whole = element if begin is element else _inflated_whole(element, size + 8)[8:]
+            found[name] = _matrix(whole, order)
+    missing = [name for name in ("v", "f") if name not in found]
+    if missing:
+        raise MeshError(
+            f"no variable {missing[0]!r}; it has: {', '.join(present) or 'none'}. Needed are "
+            "v (n, 3), the vertices, and f (m, 3), the triangles counted from 1."
+        )
+    v, f = found["v"], found["f"]
+    if (np.abs(f.astype(np.float64)) >= 2**53).any() or (np.round(f) != f).any() or (f < 1).any():
+        raise MeshError("variable 'f' must hold whole numbers from 1 on, the triangles' corners.")
+    return Soup.from_arrays(v, f, np.full(len(f), 3), counted_from=1)
+
+
+def _byte_order(content: bytes) -> str:
+    """How numpy calls the byte order of a file of version 5."""
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:_HEADER_BYTES], "")
+    version = np.frombuffer(content, f"{order}u2", 1, 124)[0] if order else 0
+    if version == 0x0100:
+        return order
+    if version == 0x0200 or (len(content) >= 20 and 0 in content[:4]):
+        raise MeshError(
+            f"MATLAB files of version {'7.3' if version else '4'} are not supported. In MATLAB, "
+            "save it with save(..., '-v7')."
+        )
+    raise damaged("it cannot be read as MAT: it does not begin as files of versions 5 to 7.2 do")
+
+
+def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """The types and contents of the data elements, one after another."""
+    at = 0
+    while at < len(content):
+        kind, size = _two_numbers(content, at, order)
+        begin = at + 8
+        if kind >> 16:  # so short that it is stored in its own head
+            kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
+        at = begin + size + (0 if kind == _COMPRESSED else -(begin + size) % 8)
+        if begin + size > len(content):
+            raise damaged(
+                f"it cannot be read as MAT: an element of {size} bytes is declared, but "
+                f"{len(content) - begin} follow"
+            )
+        yield kind, content[begin : begin + size]
+
+
+def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
+    if at + 8 > len(content):
+        raise damaged("it cannot be read as MAT: it ends within the head of an element")
+    first, second = np.frombuffer(content, f"{order}u4", 2, at).tolist()
+    return first, second
+
+
+def _inflated(element: bytes, most: int) -> bytes:
+    try:
+        return zlib.decompressobj().decompress(element, most)
+    except zlib.error as error:
+        raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+
+
+def _inflated_whole(element: bytes, size: int) -> bytes:
+    """All bytes of a compressed element, so many by its own word, its checksum compared."""
+    stream = zlib.decompressobj()
+    try:
+        found = stream.decompress(element, size + 1)
+    except zlib.error as error:
+        raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+    if len(found) != size or not stream.eof:
+        raise damaged(
+            f"it cannot be read as MAT: a compressed element of {size} bytes holds {len(found)}, "
+            "or was cut short"
+        )
+    return found
+
+
+def _numbers(part: tuple[int, bytes], order: str) -> NDArray[Any]:
+    """The numbers of an element."""
+    kind, content = part
+    if kind not in _NUMBERS or len(content) % int(_NUMBERS[kind][1:]):
+        raise damaged(
+            f"it cannot be read as MAT: {len(content)} bytes of type {kind} are not numbers"
+        )
+    return np.frombuffer(content, order + _NUMBERS[kind])
+
+
+def _head(parts: Iterator[tuple[int, bytes]], order: str) -> tuple[str, list[int], int]:
+    """The name of an array, its shape, and the number that holds its class and flags."""
+    flags, shape, name = (_numbers(next(parts, (0, b"")), order) for _ in range(3))
+    if not len(flags):
+        raise damaged("it cannot be read as MAT: an array has no class")
+    return name.tobytes().decode("latin-1"), shape.tolist(), int(flags[0])
+
+
+def _matrix(content: bytes, order: str) -> NDArray[Any]:
+    """The real numbers (rows, 3) of an array."""
+    parts = _elements(content, order)
+    name, shape, flags = _head(parts, order)
+    numeric = flags & 0xFF in _NUMERIC_CLASSES and not flags & _COMPLEX
+    if not numeric or len(shape) != 2 or shape[1] != 3:
+        raise MeshError(
+            f"variable {name!r} must be real numbers of shape (rows, 3); it has shape "
+            f"{tuple(shape)} and is {'numeric' if numeric else 'not real numbers'}."
+        )
+    numbers = _numbers(next(parts, (0, b"")), order)
+    if len(numbers) != math.prod(shape):
+        raise damaged(
+            f"variable {name!r} declares {shape[0]} rows of 3, but {len(numbers)} numbers follow"
+        )
+    return numbers.reshape(shape, order="F")

@@ -1,0 +1,98 @@
+"""Wavefront OBJ files: the vertices and the faces, nothing else.
+
+Own code, because meshio, trimesh and libigl each lose faces of legal files without a word (after a
+tab, in an indented line, in a last line cut short) or refuse them (comments behind a face, texture
+seams, Latin-1 text).
+"""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Iterator
+from pathlib import Path
+
+from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown
+
+#: Statements that hold no polygon and are skipped; any other word is reported.
+_SKIPPED = frozenset(
+    "vt vn vp deg bmat step cstype p l curv curv2 surf parm trim hole scrv sp end con bevel "  # noqa: SIM905
+    "c_interp d_interp lod shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
+)
+#: Statements that end in a name: a backslash at their end belongs to it.
+_NAMED = frozenset(("o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib"))
+
+
+def read_obj(path: Path) -> Soup:
+    """Read the vertices and polygons of an OBJ file; texture seams do not cut the surface."""
+    coordinates, corners, sizes = array("d"), array("q"), array("q")
+    unknown: list[str] = []
+    # Latin-1 decodes any bytes: names and comments may be of any encoding.
+    with path.open(encoding="latin-1") as file:
+        lines = enumerate(file, 1)
+        for number, line in lines:
+            words = line.split()
+            if not words or words[0] in _NAMED:
+                continue
+            if "#" in line or "\\" in line or number == 1:
+                words = _whole_statement(line, lines)
+            try:
+                if words[0] == "v":
+                    coordinates.extend(_point(words))
+                elif words[0] in ("f", "fo"):
+                    face = _face(words, len(coordinates) // 3)
+                    corners.extend(face)
+                    sizes.append(len(face))
+                elif words[0] and words[0] not in _SKIPPED and words[0] not in _NAMED:
+                    unknown.append(f"line {number}, {shown(line)}")
+            except (ValueError, OverflowError) as error:
+                raise damaged(f"line {number}, {shown(line)}: {error}") from None
+    return Soup.from_arrays(
+        coordinates, corners, sizes, counted_from=1, notices=_unknown_notice(unknown)
+    )
+
+
+def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
+    """The words of a line without its comment, and of the lines on which a backslash continues it.
+
+    They are never none: an empty statement is one empty word.
+    """
+    words: list[str] = []
+    while True:
+        words += line.removeprefix(BYTE_ORDER_MARK).split("#", 1)[0].split()
+        if not words or not words[-1].endswith("\\"):
+            return words or [""]
+        words[-1:] = words[-1].removesuffix("\\").split()
+        line = next(lines, (0, ""))[1]
+
+
+def _point(words: list[str]) -> list[float]:
+    """The three coordinates; a weight or a colour may follow them."""
+    numbers = [float(word) for word in words[1:]]
+    if len(numbers) < 3:
+        raise ValueError(f"a vertex needs 3 numbers, but this one has {len(numbers)}")
+    refuse_underscores(words)
+    return numbers[:3]
+
+
+def _face(words: list[str], vertices: int) -> list[int]:
+    """The vertex indices, counted from 1; below 0 they count back from the last vertex so far."""
+    face = [int(word.split("/", 1)[0]) for word in words[1:]]
+    if len(face) < 3:
+        raise ValueError(f"a face needs 3 corners, but this one has {len(face)}")
+    refuse_underscores(words)
+    if min(face) < 1:
+        if 0 in face or min(face) < -vertices:
+            raise ValueError(
+                f"vertex index out of range; the file counts from 1, or back from -1 to -{vertices}"
+            )
+        face = [k if k > 0 else vertices + 1 + k for k in face]
+    return face
+
+
+def _unknown_notice(unknown: list[str]) -> tuple[str, ...]:
+    if not unknown:
+        return ()
+    return (
+        f"lines that are not statements of OBJ were ignored: {len(unknown)}, the first: "
+        f"{unknown[0]}",
+    )

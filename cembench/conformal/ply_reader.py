@@ -1,0 +1,336 @@
+"""PLY files, ASCII and binary: the vertices and the polygons out of any elements and properties.
+
+Own code, because meshio hangs on a header cut short and refuses most legal headers, trimesh refuses
+binary polygons of several sizes and reads ASCII files cut short without a word, and plyfile takes
+twice the time for ASCII. The header says what the body must hold, so the sizes are compared before
+anything is read.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+import warnings
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import MeshError
+from cembench.mesh.soup import Soup, damaged, shown
+
+#: A header ends within so many bytes, or this is not a PLY file.
+_LONGEST_HEADER = 1 << 20
+_TYPES = {
+    "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
+    "short": "i2", "int16": "i2", "ushort": "u2", "uint16": "u2",
+    "int": "i4", "int32": "i4", "uint": "u4", "uint32": "u4",
+    "int64": "i8", "uint64": "u8",
+    "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
+}  # fmt: skip
+_BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
+#: How the module struct calls the types.
+_STRUCT = {
+    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
+    "f4": "f", "f8": "d",
+}  # fmt: skip
+_CORNERS = ("vertex_indices", "vertex_index")
+
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class _Property:
+    """A number, or a list where `size` is given: a number of that type says how many follow."""
+
+    name: str
+    item: np.dtype[Any]
+    size: np.dtype[Any] | None = None
+
+    @property
+    def least_bytes(self) -> int:
+        return (self.size or self.item).itemsize
+
+
+@dataclass(frozen=True)
+class _Element:
+    """Rows that have the same properties."""
+
+    name: str
+    count: int
+    properties: list[_Property]
+
+    @property
+    def least_bytes(self) -> int:
+        return self.count * sum(p.least_bytes for p in self.properties)
+
+    def index(self, names: tuple[str, ...], *, of_list: bool) -> int:
+        """The index of the property that has one of these names."""
+        for k, p in enumerate(self.properties):
+            if p.name in names and (p.size is not None) == of_list:
+                return k
+        present = ", ".join(p.name for p in self.properties) or "none"
+        kind = "list" if of_list else "number"
+        raise damaged(
+            f"element {self.name!r} has no property {names[0]!r} that is a {kind}; its properties "
+            f"are: {present}"
+        )
+
+
+def read_ply(path: Path) -> Soup:
+    """Read the vertices and polygons of a PLY file; all other elements and properties are skipped.
+
+    Coordinates have the precision that the header declares, in text too.
+    """
+    content = np.fromfile(path, dtype=np.uint8)
+    form, elements, begin, lines = _header(content[:_LONGEST_HEADER].tobytes())
+    body = content[begin:]
+    _check_elements(elements)
+    coordinates = _element(elements, "vertex")
+    wanted = {
+        "vertex": [coordinates.index((axis,), of_list=False) for axis in "xyz"],
+        "face": [_element(elements, "face").index(_CORNERS, of_list=True)],
+    }
+    stored = elements
+    if form == "ascii":
+        body = _numbers(body, lines).view(np.uint8)
+        stored = [_as_doubles(element) for element in elements]
+    _check_size(stored, body, form)
+    at = 0
+    found: dict[str, list[_Column]] = {}
+    for element in stored:
+        found[element.name], at = _read_rows(element, body, at, wanted.get(element.name, []))
+    _check_rest(elements, body[at:], form)
+    types = [coordinates.properties[k].item for k in wanted["vertex"]]
+    with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused as such
+        V = [
+            column.items.astype(t.newbyteorder("="))
+            for t, column in zip(types, found["vertex"], strict=True)
+        ]
+    (faces,) = found["face"]
+    return Soup.from_arrays(np.stack(V, axis=1), _whole(faces.items), faces.sizes)
+
+
+def _header(text: bytes) -> tuple[str, list[_Element], int, int]:
+    """The format, the elements, and after how many bytes and lines the body begins."""
+    first = re.match(rb"ply[ \t]*(\r\n|\r|\n)", text)
+    if not first:
+        raise damaged("it cannot be read as PLY: the first line is not 'ply'")
+    end_of_line = first[1]
+    last = re.search(end_of_line + rb"end_header[ \t]*" + end_of_line, text)
+    if not last:
+        raise damaged(f"the header does not end: no line 'end_header' in {len(text)} bytes")
+    lines = text[: last.start()].decode("latin-1").split(end_of_line.decode())
+    form, elements = "", list[_Element]()
+    for number, line in enumerate(lines[1:], 2):
+        words = line.split()
+        match words:
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case ["format", name, _] if name in _BYTE_ORDERS and not form:
+                form = name
+            case ["element", name, count] if form and re.fullmatch("[0-9]{1,18}", count):
+                elements.append(_Element(name, int(count), []))
+            case ["property", "list", size, item, name] if (
+                elements and item in _TYPES and _TYPES.get(size, "f")[0] != "f"
+            ):
+                types = (np.dtype(_BYTE_ORDERS[form] + _TYPES[t]) for t in (item, size))
+                elements[-1].properties.append(_Property(name, *types))
+            case ["property", item, name] if elements and item in _TYPES:
+                item_type = np.dtype(_BYTE_ORDERS[form] + _TYPES[item])
+                elements[-1].properties.append(_Property(name, item_type))
+            case _:
+                raise damaged(
+                    f"line {number} of the header, {shown(line)}, is not a format, element or "
+                    "property of PLY"
+                )
+    return form, elements, last.end(), len(lines) + 1
+
+
+def _element(elements: list[_Element], name: str) -> _Element:
+    for element in elements:
+        if element.name == name:
+            return element
+    present = ", ".join(element.name for element in elements) or "none"
+    raise damaged(f"there is no element {name!r}; the header declares: {present}")
+
+
+def _check_elements(elements: list[_Element]) -> None:
+    """Raise where polygons would be passed over: in triangle strips, or in elements of one name."""
+    names = [element.name for element in elements]
+    if "tristrips" in names:
+        raise MeshError("triangle strips are not supported. Export it with an element 'face'.")
+    for name in names:
+        if names.count(name) > 1:
+            raise damaged(f"the header declares element {name!r} {names.count(name)} times")
+
+
+def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
+    """The numbers of a text, one after another."""
+    text = body.tobytes().strip()
+    if not text:
+        return np.empty(0)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # numpy warned where it raises today
+            return np.fromstring(text, sep=" ")
+    except (ValueError, DeprecationWarning):
+        pass
+    for number, line in enumerate(body.tobytes().decode("latin-1").splitlines(), header_lines + 1):
+        for word in line.split():
+            if not _is_number(word):
+                raise damaged(f"line {number}, {shown(line)}: {shown(word)} is not a number")
+    raise damaged("the body holds what is not a number")
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return "_" not in word
+
+
+def _as_doubles(element: _Element) -> _Element:
+    """The element as its text is stored: every number, also a list's size, as a double."""
+    double = np.dtype("f8")
+    properties = [
+        _Property(p.name, double, None if p.size is None else double) for p in element.properties
+    ]
+    return replace(element, properties=properties)
+
+
+def _check_size(elements: list[_Element], body: Bytes, form: str) -> None:
+    """Raise where the file is too short for what its header declares."""
+    unit, what = (8, "numbers") if form == "ascii" else (1, "bytes")
+    needed = sum(element.least_bytes for element in elements)
+    if needed > len(body):
+        raise damaged(
+            f"the header declares {_counts(elements)}, which take at least {needed // unit} "
+            f"{what}, but {len(body) // unit} {what} follow it"
+        )
+
+
+def _check_rest(elements: list[_Element], rest: Bytes, form: str) -> None:
+    """Raise where the file goes on behind what its header declares."""
+    unit, what = (8, "numbers") if form == "ascii" else (1, "bytes")
+    if len(rest) if form == "ascii" else rest[:_LONGEST_HEADER].tobytes().strip():
+        raise damaged(
+            f"the header declares {_counts(elements)}, but {len(rest) // unit} {what} more follow "
+            "them"
+        )
+
+
+def _counts(elements: list[_Element]) -> str:
+    return ", ".join(f"{element.count} of {element.name!r}" for element in elements)
+
+
+@dataclass(frozen=True, eq=False)
+class _Column:
+    """A property in all rows: how many items each has, and the items one after another."""
+
+    sizes: NDArray[np.int64]
+    items: NDArray[Any]
+
+
+def _read_rows(
+    element: _Element, body: Bytes, at: int, wanted: list[int]
+) -> tuple[list[_Column], int]:
+    """The wanted properties of an element that begins at a byte, and the byte behind it."""
+    if element.least_bytes == 0:
+        return [_Column(np.empty(0, np.int64), np.empty(0)) for _ in wanted], at
+    row = _row_like_the_first(element, body, at)
+    end = at + element.count * row.itemsize
+    if end > len(body):
+        return _walk_rows(element, body, at, wanted)
+    rows = np.frombuffer(body, row, element.count, at)
+    lists = [k for k, p in enumerate(element.properties) if p.size is not None]
+    if any((rows[f"size {k}"] != rows[f"size {k}"][0]).any() for k in lists):
+        return _walk_rows(element, body, at, wanted)
+    columns = [rows[f"items {k}"].reshape(element.count, -1) for k in wanted]
+    return [_Column(np.full(element.count, c.shape[1]), c.ravel()) for c in columns], end
+
+
+def _row_like_the_first(element: _Element, body: Bytes, at: int) -> np.dtype[Any]:
+    """The layout of all rows if their lists are as long as those of the first row."""
+    everything = list(range(len(element.properties)))
+    first, _ = _walk_rows(replace(element, count=1), body, at, everything)
+    fields: list[Any] = []
+    for k, (p, column) in enumerate(zip(element.properties, first, strict=True)):
+        if p.size is not None:
+            fields.append((f"size {k}", p.size))
+        fields.append((f"items {k}", p.item, (int(column.sizes[0]),)))
+    return np.dtype(fields)
+
+
+def _walk_rows(
+    element: _Element, body: Bytes, at: int, wanted: list[int]
+) -> tuple[list[_Column], int]:
+    """What :func:`_read_rows` returns, row by row, as their lists may have any lengths."""
+    starts = {k: array("q") for k in wanted}
+    sizes = {k: array("q") for k in wanted}
+    steps = [
+        (k, p.item.itemsize, p.least_bytes, None if p.size is None else _unpacker(p.size))
+        for k, p in enumerate(element.properties)
+    ]
+    end = len(body)
+    for row in range(element.count):
+        for k, item_bytes, least_bytes, unpack in steps:
+            size = 1
+            if at + least_bytes > end:
+                raise _ends_within(element, row)
+            if unpack is not None:
+                (found,) = unpack(body, at)
+                at += least_bytes
+                size = int(found) if 0 <= found <= end else -1
+                if size != found:
+                    raise damaged(
+                        f"list {element.properties[k].name!r} of {element.name!r} {row} (counted "
+                        f"from 0) declares {found} items"
+                    )
+            if k in starts:
+                starts[k].append(at)
+                sizes[k].append(size)
+            at += size * item_bytes
+        if at > end:
+            raise _ends_within(element, row)
+    return [
+        _Column(np.asarray(sizes[k]), _items(body, starts[k], sizes[k], element.properties[k].item))
+        for k in wanted
+    ], at
+
+
+def _unpacker(size: np.dtype[Any]) -> Callable[[Any, int], tuple[Any, ...]]:
+    order = "=" if size.byteorder == "|" else size.byteorder
+    return struct.Struct(order + _STRUCT[size.str[1:]]).unpack_from
+
+
+def _items(
+    body: Bytes, starts: Sequence[int], sizes: Sequence[int], item: np.dtype[Any]
+) -> NDArray[Any]:
+    """The items of lists that begin at these bytes, one list after another."""
+    begin, count = np.asarray(starts), np.asarray(sizes)
+    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    # An array of the items that begin at each byte, which may overlap: a view, not a copy.
+    at_each_byte = np.ndarray(max(0, len(body) - item.itemsize + 1), item, body, strides=(1,))
+    return at_each_byte[np.repeat(begin, count) + within * item.itemsize]
+
+
+def _ends_within(element: _Element, row: int) -> MeshError:
+    return damaged(
+        f"the header declares {element.count} of {element.name!r}, but the file ends within "
+        f"{element.name!r} {row} (counted from 0)"
+    )
+
+
+def _whole(indices: NDArray[Any]) -> NDArray[np.int64]:
+    if indices.dtype.kind != "f":
+        return indices.astype(np.int64)
+    bad = np.flatnonzero(~(np.abs(indices) < 2**53) | (indices != np.rint(indices)))
+    if len(bad):
+        raise damaged(f"vertex index {indices[bad[0]]} is not a whole number")
+    return indices.astype(np.int64)

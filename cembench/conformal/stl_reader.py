@@ -1,0 +1,92 @@
+"""STL files, binary and ASCII: triangles whose corners are merged where they coincide exactly.
+
+Own code, because meshio and trimesh read a file cut short as an empty one, and meshio refuses
+upper-case ASCII.
+"""
+
+from __future__ import annotations
+
+from array import array
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown
+
+_HEADER_BYTES = 84
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+#: Which words follow each other at the beginnings of an ASCII file's lines.
+_FACET = ("facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet")
+
+
+def read_stl(path: Path) -> Soup:
+    """Read the triangles of an STL file, and the vertices in the order of their first corners."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(_HEADER_BYTES)
+    declared = int.from_bytes(head[80:], "little")
+    if len(head) == _HEADER_BYTES and size == _HEADER_BYTES + declared * _TRIANGLE.itemsize:
+        triangles = np.fromfile(path, _TRIANGLE, declared, offset=_HEADER_BYTES)
+        return _merged(triangles["corners"])
+    begin = head.decode("latin-1").removeprefix(BYTE_ORDER_MARK).lstrip()
+    # Binary files may begin so too, but hold zeros, if only as a leading digit of their count.
+    if begin[:5].lower() == "solid" and "\0" not in begin:
+        return _read_ascii(path)
+    if len(head) < _HEADER_BYTES:
+        raise damaged(f"it cannot be read as STL: {size} bytes, less than a header has")
+    whole, rest = divmod(size - _HEADER_BYTES, _TRIANGLE.itemsize)
+    raise damaged(
+        f"{declared} triangles are declared, but the file holds {whole}"
+        + (f" and {rest} bytes more" if rest else "")
+    )
+
+
+def _read_ascii(path: Path) -> Soup:
+    """Read facets, of which each must be whole, out of solids, of which each must end."""
+    coordinates = array("d")
+    in_solid, step = False, 0
+    with path.open(encoding="latin-1") as file:
+        for number, line in enumerate(file, 1):
+            words = line.lower().split()
+            if not words:
+                continue
+            expected = _FACET[step] if in_solid else "solid"
+            if words[0].removeprefix(BYTE_ORDER_MARK) == expected:
+                if expected == "vertex":
+                    coordinates.extend(_point(number, line, words[1:]))
+                step = (step + 1) % len(_FACET) if in_solid else 0
+                in_solid = True
+            elif words[0] == "endsolid" and in_solid and step == 0:
+                in_solid = False
+            else:
+                also = " or 'endsolid'" if in_solid and step == 0 else ""
+                raise damaged(f"line {number}, {shown(line)}: expected is {expected!r}{also}")
+    if in_solid:
+        raise damaged(
+            f"the file ends within a solid, after {len(coordinates) // 9} whole triangles: no "
+            "'endsolid'"
+        )
+    return _merged(np.asarray(coordinates))
+
+
+def _point(number: int, line: str, words: list[str]) -> list[float]:
+    try:
+        refuse_underscores(words)
+        x, y, z = map(float, words)
+    except ValueError:
+        raise damaged(f"line {number}, {shown(line)}: a vertex needs 3 numbers") from None
+    return [x, y, z]
+
+
+def _merged(corners: NDArray[Any]) -> Soup:
+    points = corners.reshape(-1, 3)
+    order = np.lexsort(points.T)  # stable, so a point's first corner comes first
+    ordered = points[order]
+    is_new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))[: len(points)]
+    first = order[is_new]
+    rank = np.argsort(np.argsort(first))
+    F = np.empty(len(points), dtype=np.int64)
+    F[order] = rank[np.cumsum(is_new) - 1]
+    return Soup.from_arrays(points[np.sort(first)], F, np.full(len(points) // 3, 3))

@@ -1,0 +1,96 @@
+"""Mesh files as soups of polygons: OBJ, OFF, PLY (ASCII and binary), STL and MATLAB files.
+
+Every vertex is kept, in the file's order and in float64, and only the geometry. No face is lost in
+silence: what the file declares must be what it holds, and what is no legal statement is an error or
+a notice. Every reader goes through the file once, so none can hang.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+from cembench.conformal.mat_reader import read_mat
+from cembench.conformal.obj_reader import read_obj
+from cembench.conformal.off_reader import read_off
+from cembench.conformal.ply_reader import read_ply
+from cembench.conformal.stl_reader import read_stl
+from cembench.core.errors import MeshError
+from cembench.mesh.soup import Soup
+
+READERS: dict[str, Callable[[Path], Soup]] = {
+    ".obj": read_obj,
+    ".off": read_off,
+    ".ply": read_ply,
+    ".stl": read_stl,
+    ".mat": read_mat,
+}
+_SPECIAL_FILES = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def is_named_like_a_mesh(path: Path) -> bool:
+    """Whether a file of this name could be read as a mesh."""
+    return path.suffix.lower() in READERS
+
+
+def read_soup(path: str | os.PathLike[str]) -> Soup:
+    """Read the vertices and polygons of a file, without any check of the surface.
+
+    Raises
+    ------
+    MeshError
+        The file is missing, empty, of unknown format or damaged, is not a regular file, or holds no
+        face.
+
+    """
+    path = Path(path)
+    try:
+        _check_file(path)
+        return READERS[path.suffix.lower()](path).named(path.stem)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from error.__cause__
+    except MemoryError as error:
+        raise MeshError(f"{path}: the file is too large for this machine's memory.") from error
+    except OSError as error:
+        raise MeshError(
+            f"{path}: the file cannot be read ({error.strerror or error}). Check its permissions "
+            "and the disk."
+        ) from error
+
+
+def _check_file(path: Path) -> None:
+    """Raise for what is not a regular file with content, before anything waits for a pipe."""
+    if str(path) == "-":
+        raise MeshError(
+            "standard input cannot be read as a mesh. Save it to a file, and name that."
+        )
+    try:
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        what = "there is no such file"
+        if path.is_symlink():
+            what = f"this is a symbolic link to {path.readlink()}, which does not exist"
+        raise MeshError(f"{what}. Check the path; paths are relative to {Path.cwd()}.") from None
+    except ValueError:
+        raise MeshError("this is not a possible name of a file. Check the path.") from None
+    for is_special, what in _SPECIAL_FILES:
+        if is_special(found.st_mode):
+            raise MeshError(
+                f"this is {what}, not a file. Name a mesh file; what a pipe or a device gives can "
+                "be saved to one."
+            )
+    if not is_named_like_a_mesh(path):
+        raise MeshError(
+            f"unknown mesh format {path.suffix!r}; allowed: {', '.join(READERS)}. "
+            "Convert the file to one of these."
+        )
+    if found.st_size == 0:
+        raise MeshError("the file is empty (0 bytes). Export or download it again.")
