@@ -12,13 +12,13 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
-from cembench.conformal.mat_reader import read_mat
-from cembench.conformal.obj_reader import read_obj
-from cembench.conformal.off_reader import read_off
-from cembench.conformal.ply_reader import read_ply
-from cembench.conformal.stl_reader import read_stl
 from cembench.core.errors import MeshError
+from cembench.mesh.mat_reader import read_mat
+from cembench.mesh.obj_reader import read_obj
+from cembench.mesh.off_reader import read_off
+from cembench.mesh.ply_reader import read_ply
 from cembench.mesh.soup import Soup
+from cembench.mesh.stl_reader import read_stl
 
 READERS: dict[str, Callable[[Path], Soup]] = {
     ".obj": read_obj,
