@@ -13,6 +13,8 @@ from cembench.algorithms.cem import cem
 from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
+from cembench.core.atomic import write
+
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
@@ -49,7 +51,8 @@ def main() -> None:
     fall.legend(frameon=False)
     fall.grid(alpha=0.3)
     figure.tight_layout()
-    figure.savefig(PICTURE, dpi=140, metadata={"Software": ""})
+    picture = {"format": "png", "dpi": 140, "metadata": {"Software": ""}}
+    write(PICTURE, lambda file: figure.savefig(file, **picture))
     print(f"start {start.energy_history[0]:.6f}, end {end.energy_history[-1]:.6f}")
 
 

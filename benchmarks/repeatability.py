@@ -28,7 +28,7 @@ from statistics import median
 from time import monotonic
 from typing import Any
 
-from cembench.core.atomic import write
+from cembench.core.atomic import write_text
 from cembench.results.comparison import circumstances, compare, references
 from cembench.results.intervals import LEVEL
 from cembench.results.records import DEFAULT_ROUNDS, Record
@@ -70,11 +70,6 @@ def main() -> None:
             file=sys.stderr,
         )
     print(text)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file that is whole or not there."""
-    write(path, lambda file: file.write(text.encode()))
 
 
 def run_command(chosen: argparse.Namespace, folder: Path, seed: int) -> list[str]:

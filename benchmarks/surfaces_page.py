@@ -20,6 +20,7 @@ from cembench.surfaces.contact_sheet import contact_sheet
 from cembench.surfaces.rows import ROWS
 
 from cembench.conformal.metrics import all_metrics
+from cembench.core.atomic import write_text
 from cembench.mesh.datasets import is_fetched
 from cembench.mesh.files import read_mesh
 from cembench.registry import Registry, load_registry
@@ -59,7 +60,7 @@ def main() -> None:
     before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
     after = rest.partition(END)[2]
     text = f"{before}{BEGIN}\n\n{tables(lines)}\n{END}{after}"
-    PAGE.write_text(text, encoding="utf-8")
+    write_text(PAGE, text)
 
 
 def stand_ins(registry: Registry) -> Iterable[Line]:

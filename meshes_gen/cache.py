@@ -1,25 +1,25 @@
 """Surfaces made once: a cache keyed by everything that they depend on.
 
-A file is written under a name of its own and then renamed, so a reader sees a whole file or none;
-two processes that make the same surface at once both succeed, and the later one wins. What cannot
-be read back (a half-written or damaged file) counts as absent.
+A reader sees a whole file or none; two processes that make the same surface at once both succeed,
+and the later one wins. What cannot be read back (a half-written or damaged file) counts as absent.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
-import uuid
 import zipfile
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from cembench.core.errors import MeshError
+from cembench.core import atomic
+from cembench.core.errors import MeshError, RecordError
+from cembench.core.names import file_name
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -51,7 +51,7 @@ def content_key(name: str, parameters: Mapping[str, Any]) -> str:
 
 def place_of(name: str, parameters: Mapping[str, Any]) -> Path:
     """The file in which the surface of this name and parameters lies once it has been made."""
-    return cache_directory() / "surfaces" / f"{name}-{content_key(name, parameters)}.npz"
+    return cache_directory() / "surfaces" / f"{file_name(name)}-{content_key(name, parameters)}.npz"
 
 
 def cached(
@@ -65,10 +65,8 @@ def cached(
     mesh = read(mesh_type, path)
     if mesh is None:
         mesh = make()
-        try:
+        with suppress(RecordError):
             write(mesh, path)
-        except OSError:
-            return mesh
     return mesh
 
 
@@ -97,20 +95,11 @@ def write(mesh: TriangleMesh, path: Path) -> None:
             f"{mesh.name} has {mesh.n} vertices; the cache holds at most "
             f"{np.iinfo(np.int32).max}. Use the mesh without the cache."
         )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.stem}-{os.getpid()}-{uuid.uuid4().hex}.part")
-    try:
-        with temporary.open("wb") as file:
-            np.savez(
-                file,
-                V=mesh.V,
-                F=mesh.F.astype(np.int32),
-                hash=np.array(mesh.hash),
-                name=np.array(mesh.name),
-                notices=np.array(mesh.notices, dtype=np.str_),
-            )
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    arrays: dict[str, Any] = {
+        "V": mesh.V,
+        "F": mesh.F.astype(np.int32),
+        "hash": np.array(mesh.hash),
+        "name": np.array(mesh.name),
+        "notices": np.array(mesh.notices, dtype=np.str_),
+    }
+    atomic.write(path, lambda file: np.savez(file, **arrays))

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cembench.core.atomic import write, write_bytes
+from cembench.core.names import file_name
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 from .local_operations import vertex_normals
@@ -76,15 +78,15 @@ def thumbnail(
 
     `view` is the direction from the surface to the eye, z up; `size` in pixels.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
-        data = Path(folder) / "mesh.npz"
+        data, drawn = Path(folder) / "mesh.npz", Path(folder) / "drawn.png"
         np.savez(data, V=mesh.V, F=mesh.F, view=np.asarray(view, dtype=float), size=size)
         done = subprocess.run(
-            [sys.executable, "-c", _DRAW, str(data), str(path)], capture_output=True, timeout=300
+            [sys.executable, "-c", _DRAW, str(data), str(drawn)], capture_output=True, timeout=300
         )
-    if done.returncode == 0 and path.is_file():
-        return "pyvista"
+        if done.returncode == 0 and drawn.is_file():
+            write_bytes(path, drawn.read_bytes())
+            return "pyvista"
     _draw_with_matplotlib(mesh, path, view, size)
     return "matplotlib"
 
@@ -116,7 +118,7 @@ def _draw_with_matplotlib(mesh: TriangleMesh, path: Path, view: Sequence[float],
     )
     axes.set_aspect("equal")
     axes.set_axis_off()
-    figure.savefig(path)
+    write(path, lambda file: figure.savefig(file, format="png"))
 
 
 def contact_sheet(
@@ -132,13 +134,12 @@ def contact_sheet(
     FigureCanvasAgg(figure)
     with tempfile.TemporaryDirectory() as folder:
         for k, (name, mesh) in enumerate(meshes.items()):
-            picture = Path(folder) / f"{name}.png"
+            picture = Path(folder) / f"{file_name(name)}.png"
             thumbnail(mesh, picture, view=VIEWS.get(name, DEFAULT_VIEW), size=size)
             axes = figure.add_subplot(rows, columns, k + 1)
             axes.imshow(image.imread(picture))
             axes.set_axis_off()
             axes.set_title(f"{name}\n{mesh.m:,} faces", fontsize=11, y=-0.12)
     figure.subplots_adjust(left=0, right=1, top=1, bottom=0.03, wspace=0, hspace=0.12)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path)
+    write(path, lambda file: figure.savefig(file, format="png"))
     return path

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -164,6 +165,9 @@ def map_(
     preview: Annotated[
         bool, typer.Option("--preview", help="Draw a PNG, beside the output.")
     ] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write over the input, or a picture not made here.")
+    ] = False,
     plugin: Plugins = [],  # noqa: B006
     solves: SolvesOption = Solves.reuse,
     backend: BackendOption = Backend.cvxopt,
@@ -176,6 +180,9 @@ def map_(
 
     The UVs are the map itself (the unit disk for target "disk"), with 17 significant digits.
     """
+    from cembench.core.names import file_name
+    from cembench.core.outputs import refuse_inputs
+    from cembench.drawing.own_pictures import check_replaceable
     from cembench.mesh.files import check_writable_format, write_mesh
     from cembench.report.render.terminal import figures_table
     from cembench.results.record_rows import row
@@ -189,6 +196,12 @@ def map_(
         check_writable_format(output, with_uv=True)
     if not mesh.exists() and str(mesh) in registry.datasets:
         mesh = fetch_verbs.fetched(registry.dataset(str(mesh)))
+    usual = Path(f"{file_name(f'{mesh.stem}_{algorithm}')}.png")
+    picture = usual if output is None else output.with_suffix(".png")
+    if output is not None:
+        refuse_inputs(output, [mesh], force=force)
+    if preview and not force:
+        check_replaceable(picture)
     with err.status("reading", spinner="line"):
         surface = read_mesh_for(mesh, [chosen])
         standing = {surface.name: standing_of_file(registry, mesh, surface)}
@@ -203,7 +216,6 @@ def map_(
             write_mesh(output, surface, uv)
             written["output"] = str(output)
         if preview:
-            picture = (output or Path(f"{mesh.stem}_{algorithm}")).with_suffix(".png")
             with err.status("drawing", spinner="line"):
                 written["preview"] = str(picture)
                 _draw(surface, uv, picture, record)
@@ -285,11 +297,13 @@ def run(
     -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
     docs/measuring.md tells what is timed, and what an interval means.
     """
+    from cembench.results import run_folder
     from cembench.results.paper.profiles import algorithms_of, surfaces_of
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
 
+    run_folder.check(output)
     policies = _policies(solves)
     options = Options(timeout, _memory_bytes(memory), fresh, rerun_failed, seed)
     registry = registry_with(plugin)
@@ -332,13 +346,17 @@ def reproduce(
     One round each, so that it takes minutes; `run --profile quick` has the rounds that intervals
     need. What the folder already holds is not measured again. The report lies in it too.
     """
+    from cembench.core import folders
     from cembench.registry import load_registry
+    from cembench.results import run_folder
     from cembench.results.paper.profiles import surfaces_of
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import How, generate_surface, plan_cells, standing_of
 
+    run_folder.check(output)
+    folders.check(output / "report", "report")
     options = Options(memory_bytes=_memory_bytes(None), fresh=fresh)
     registry = load_registry()
     surfaces = []
@@ -588,6 +606,8 @@ def _registry_as_json(
 
 def main() -> None:
     """Run the command line; errors meant for the user are one line, without a traceback."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files need not be text
     try:
         app()
     except CembenchError as error:

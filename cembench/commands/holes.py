@@ -45,8 +45,10 @@ def holes(
     """
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
+    from cembench.results import run_folder
     from cembench.running.plan import surface_named
 
+    run_folder.check(run)
     registry = load_registry()
     surfaces = [surface_named(registry, name, HoledMesh, faces) for name in meshes]
     for mesh in surfaces:

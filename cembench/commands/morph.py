@@ -88,6 +88,7 @@ def morph(
         list[str], typer.Option("--plugin", help="FILE.py or module:name with more algorithms.")
     ] = [],  # noqa: B006
     timeout: Annotated[float, typer.Option(min=0.1, help="Seconds that a map may take.")] = 600.0,
+    force: Annotated[bool, typer.Option("--force", help="Write over the surfaces read.")] = False,
     as_json: Json = False,
 ) -> None:
     """Morph surfaces into each other through conformal maps (Section 6).
@@ -96,16 +97,23 @@ def morph(
     first surface's vertices are carried onto all others. Without --landmarks those are taken that
     the surfaces have by name, as the generated faces do; with none at all, curvature aligns them.
     """
+    from cembench.core.outputs import refuse_inputs
     from cembench.drawing.camera import viewpoints
+    from cembench.results import run_folder
     from cembench.workflows.morphing.drawing import check_views
     from cembench.workflows.morphing.landmarks import common_landmarks, read_landmarks
     from cembench.workflows.morphing.morph import morph as morphed
-    from cembench.workflows.morphing.writers import check_output
+    from cembench.workflows.morphing.writers import check_output, files_of
 
     chosen_views = split([views])
     check_views(chosen_views)
+    sources = [Path(name) for name in surfaces] + ([landmarks] if landmarks else [])
     for place in output:
         check_output(place)
+        for file in files_of(place, frames):
+            refuse_inputs(file, sources, force=force)
+    if run is not None:
+        run_folder.check(run)
     if len(surfaces) < 2:
         raise ParameterError("a morph needs two surfaces or more; name at least one other.")
     registry = registry_with(plugin)

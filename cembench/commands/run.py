@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.console import Json, out, print_json, warn
-from cembench.core.errors import RecordError
+from cembench.core.errors import ParameterError, RecordError
+from cembench.core.outputs import refuse_inputs
 from cembench.report.export import Format
 
 if TYPE_CHECKING:
@@ -131,6 +132,9 @@ def merge(
     runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
     *,
     output: Annotated[Path, typer.Option("-o", "--output", help="Where they come together.")],
+    force: Annotated[
+        bool, typer.Option("--force", help="Also if the output is one of the runs.")
+    ] = False,
     as_json: Json = False,
 ) -> None:
     """Bring the records of several runs together in one folder.
@@ -140,9 +144,9 @@ def merge(
     from cembench.results.store import Store
     from cembench.results.store import merge as merged
 
+    refuse_inputs(output, runs, force=force)
     into = Store(output)
-    with into.locked():
-        count = merged([Store(run) for run in runs], into)
+    count = merged([Store(run) for run in runs], into)
     machines = sorted({record.environment for record in into.records()})
     if as_json:
         print_json({"output": str(output), "cells": count, "environments": machines})
@@ -164,10 +168,13 @@ def export(
     """Write all records of a run as one table, a row a cell."""
     from cembench.report.export import export_rows
     from cembench.results.record_rows import rows
+    from cembench.results.run_folder import is_own
     from cembench.results.store import Store
 
-    found = rows(Store(run).records())
     path = output or run / f"rows.{form.value}"
+    if is_own(run, path):
+        raise ParameterError(f"-o {path} is a part of the run itself; name another file.")
+    found = rows(Store(run).records())
     export_rows(found, path, form)
     if as_json:
         print_json({"output": str(path), "rows": len(found)})

@@ -46,8 +46,10 @@ def theory(
     """
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry
+    from cembench.results import run_folder
     from cembench.running.plan import surface_named
 
+    run_folder.check(run)
     registry = load_registry()
     surfaces = [surface_named(registry, name, DiskMesh, faces) for name in meshes]
     found: list[tuple[dict[str, Any], Exhibit]] = []
@@ -224,7 +226,7 @@ def _tables(given: list[Check], said: list[Check], energies: list[dict[str, Any]
 def _show(facts: dict[str, Any], exhibit: Exhibit, run: Path) -> None:
     from rich.table import Table as Grid
 
-    from cembench.results.exhibits import exhibit_folder
+    from cembench.results.exhibits import place_of
 
     vertices = f"{facts['vertices']:,} vertices, {facts['boundary_vertices']} on the boundary"
     out.print(f"{facts['mesh']}: {vertices}", style="bold", markup=False)
@@ -251,7 +253,7 @@ def _show(facts: dict[str, Any], exhibit: Exhibit, run: Path) -> None:
         grid.add_row(row["name"], *("-" if c is None else f"{c:.6f}" for c in cells))
     out.print(grid)
     out.print(exhibit.text, markup=False)
-    out.print(f"picture  {exhibit_folder(run, exhibit.name) / 'theory.png'}", soft_wrap=True)
+    out.print(f"picture  {place_of(run, exhibit.name, 'theory.png')}", soft_wrap=True, markup=False)
 
 
 #: Each verb with the examples that its help shows.

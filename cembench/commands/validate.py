@@ -80,12 +80,15 @@ def validate(
     Exit code 0: valid, and what was required holds; 1: not; 2: wrong usage.
     docs/write_a_solver.md shows it at work.
     """
+    from cembench.core import folders
     from cembench.running.local import Options
     from cembench.running.plan import distribute_parameters
     from cembench.validation.examine import Asked, examine
     from cembench.validation.solver import Solver, in_a_process, load_solver
     from cembench.validation.terminal import validation_text
 
+    if output is not None:
+        folders.check(output, "validation")
     with err.status(f"importing {escape(plugin)}", spinner="line"):
         algorithm, registry, plugins = load_solver(plugin)
     arguments = distribute_parameters([algorithm], assignments(parameter))[algorithm.name]
@@ -141,7 +144,10 @@ def _chosen(
 @contextmanager
 def _folder(output: Path | None) -> Iterator[Path]:
     """Where the runs go: the user's folder, or one that is gone in the end."""
+    from cembench.core import folders
+
     if output is not None:
+        folders.claim(output, "validation")
         yield output
         return
     with TemporaryDirectory(prefix="cembench-") as folder:
@@ -161,14 +167,20 @@ def _telling() -> Telling:
 
 def _write(found: Validation, folder: Path) -> dict[str, str]:
     """Lay the validation into the folder, as JSON and as a page; where is each?"""
-    from cembench.core.atomic import write_model
-    from cembench.report.render.html import write_html
+    from cembench.core import folders
+    from cembench.core.atomic import draft_folder, unwritable, write_model
+    from cembench.report.render.html import FILE, write_html
     from cembench.validation.document import document_of
 
-    path = folder / "validation.json"
-    write_model(path, found)
-    page = write_html(document_of(found, folder), folder)
-    return {"output": str(path), "page": str(page)}
+    name = "validation.json"
+    try:
+        with draft_folder(folder) as draft:
+            write_model(draft / name, found)
+            write_html(document_of(found, folder, draft), draft)
+            folders.publish(draft, folder, "validation")
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    return {"output": str(folder / name), "page": str(folder / FILE)}
 
 
 def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:

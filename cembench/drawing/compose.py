@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
+from cembench.drawing.own_pictures import SOFTWARE
 from cembench.drawing.scene import FOLDED
 
 Picture = NDArray[np.uint8]
@@ -110,7 +111,7 @@ def page(
         for text, style in zip(words, (TITLE, CAPTION, NOTE), strict=True):
             _add_words(figure, text, style, size)
         buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=DPI)
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": SOFTWARE})
     return buffer.getvalue()
 
 

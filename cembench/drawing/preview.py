@@ -12,7 +12,6 @@ rasterizer in numpy draws, and matplotlib puts the page together in either case.
 from __future__ import annotations
 
 import io
-import os
 import signal
 import subprocess
 import sys
@@ -26,8 +25,10 @@ import numpy as np
 from matplotlib.image import imsave
 from numpy.typing import NDArray
 
+from cembench.core.atomic import write_bytes
 from cembench.core.errors import ParameterError, RenderError
 from cembench.drawing import compose, draw_numpy
+from cembench.drawing.own_pictures import SOFTWARE
 from cembench.drawing.scene import FINER, Scene, image_in_window
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -113,7 +114,7 @@ def write_preview(
     outline = image_in_window(uv)[:, :2]
     overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
     png = compose.page(surface, image, overlay, (title, caption, _note(scene)), size)
-    _write(path, png)
+    write_bytes(path, png, error=RenderError, parents=False)
     return drawn
 
 
@@ -125,8 +126,8 @@ def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = 
     _check(mesh, uv, SIZE)
     (surface, _), drawn = _draw(Scene.of(mesh, uv), side, "pyvista")
     file = io.BytesIO()
-    imsave(file, surface, format="png")
-    _write(path, file.getvalue())
+    imsave(file, surface, format="png", metadata={"Software": SOFTWARE})
+    write_bytes(path, file.getvalue(), error=RenderError, parents=False)
     return drawn
 
 
@@ -251,18 +252,3 @@ def _explained(stderr: str) -> str:
     if last.startswith("ImportError"):
         return f"pyvista cannot be loaded ({last}); {SYSTEM_LIBRARIES}"
     return f"pyvista failed ({last})"
-
-
-def _write(path: Path, content: bytes) -> None:
-    """All of it or nothing, also when two processes write the same file."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(content)
-        part.replace(path)
-    except OSError as error:
-        with suppress(OSError):
-            part.unlink()
-        raise RenderError(
-            f"the picture cannot be written to {path}: {error.strerror or error}. "
-            "Choose a file in a folder that exists and can be written to."
-        ) from error

@@ -12,11 +12,13 @@ import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 from platformdirs import user_cache_dir
 
-from cembench.core.errors import DatasetError
+from cembench.core.atomic import write
+from cembench.core.errors import DatasetError, RecordError
+from cembench.core.names import file_name
 
 #: Overrides the directory of the cache.
 CACHE_VARIABLE = "CEMBENCH_CACHE"
@@ -91,7 +93,7 @@ class Dataset:
     @property
     def path(self) -> Path:
         """Where it lies once it has been fetched."""
-        return cache_directory() / "datasets" / self.file
+        return cache_directory() / "datasets" / file_name(self.file)
 
     @property
     def origin(self) -> str:
@@ -114,37 +116,47 @@ def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None 
     DatasetError
         A server that does not answer, a download that breaks off, a file whose checksum is wrong;
         the message names file and URL.
+    RecordError
+        The cache cannot be written to, or its disk is full.
 
     """
+    if is_fetched(dataset):
+        return dataset.path
+    try:
+        write(
+            dataset.path,
+            lambda file: _download(dataset, file, timeout, progress),
+            check=lambda draft: _check_sum(dataset, draft),
+        )
+    except RecordError as error:
+        raise RecordError(
+            f"cannot keep {dataset.file} from {dataset.url}: {error} {CACHE_VARIABLE} names the "
+            "folder of the cache."
+        ) from error
+    return dataset.path
+
+
+def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progress | None) -> None:
     import pooch
     import requests
 
-    d = dataset
-    pooch.get_logger().setLevel("WARNING")  # it would tell of every download
+    download = pooch.HTTPDownloader(timeout=timeout, progressbar=progress or False)
     try:
-        found = pooch.retrieve(
-            d.url,
-            known_hash=f"sha256:{d.sha256}",
-            fname=d.path.name,
-            path=d.path.parent,
-            downloader=pooch.HTTPDownloader(timeout=timeout, progressbar=progress or False),
-        )
+        download(dataset.url, file, None)
     except requests.RequestException as error:
         raise DatasetError(
-            f"cannot fetch {d.file} from {d.url}: {type(error).__name__}: {error}. Check the "
-            f"network, set {MIRROR_VARIABLE} to a mirror, or put the file at {d.path}."
+            f"cannot fetch {dataset.file} from {dataset.url}: {type(error).__name__}: {error}. "
+            f"Check the network, set {MIRROR_VARIABLE} to a mirror, or put the file at "
+            f"{dataset.path}."
         ) from error
-    except ValueError as error:
+
+
+def _check_sum(dataset: Dataset, path: Path) -> None:
+    if _sha256(path) != dataset.sha256:
         raise DatasetError(
-            f"{d.file} from {d.url} is damaged or another file: its SHA-256 is not {d.sha256}. "
-            f"Try again, or set {MIRROR_VARIABLE} to another mirror."
-        ) from error
-    except OSError as error:
-        raise DatasetError(
-            f"cannot keep {d.file} from {d.url} at {d.path}: {error}. Make the directory writable "
-            f"or set {CACHE_VARIABLE} to another one."
-        ) from error
-    return Path(found)
+            f"{dataset.file} from {dataset.url} is damaged or another file: its SHA-256 is not "
+            f"{dataset.sha256}. Try again, or set {MIRROR_VARIABLE} to another mirror."
+        )
 
 
 def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:

@@ -5,11 +5,11 @@ Polygons are cut into triangles by fans, with a notice.
 
 from __future__ import annotations
 
+import errno
 import os
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import igl
 import meshio
@@ -17,12 +17,16 @@ import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.atomic import write_by
 from cembench.core.errors import MeshError
 from cembench.mesh.reading import READERS as _READERS
 from cembench.mesh.reading import read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
+Writer = Callable[[Path, TriangleMesh, ArrayLike | None], None]
+#: From a file that was written, and its mesh, to the arrays in it.
+ReadBack = Callable[[Path, TriangleMesh], tuple[NDArray[Any], ...]]
 M = TypeVar("M", bound=TriangleMesh)
 
 
@@ -61,9 +65,10 @@ def write_mesh(
 ) -> None:
     """Write the surface, and the map as its texture coordinates, in full precision.
 
-    The file appears whole or not at all. UVs have 17 significant digits (OBJ) or are float64 (PLY):
-    with fewer, triangles fold where the map shrinks the surface. They are the map itself, not
-    moved into the unit square.
+    The file appears whole or not at all, and only if it holds every coordinate and every triangle
+    when it is read back: libraries that write do not all report a full disk. UVs have 17
+    significant digits (OBJ) or are float64 (PLY): with fewer, triangles fold where the map shrinks
+    the surface. They are the map itself, not moved into the unit square.
 
     Raises
     ------
@@ -74,15 +79,14 @@ def write_mesh(
     path = Path(path)
     check_writable_format(path, with_uv=uv is not None)
     UV = None if uv is None else np.stack([uv.real, uv.imag], axis=1)
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".cembench-") as folder:
-            draft = Path(folder) / f"draft{path.suffix.lower()}"
-            _WRITERS[path.suffix.lower()](draft, mesh, UV)
-            draft.replace(path)
-    except OSError as error:
-        raise MeshError(
-            f"{path} cannot be written: {error.strerror or error}. Choose another place."
-        ) from error
+    write, read_back = _WRITERS[path.suffix.lower()]
+    write_by(
+        path,
+        lambda draft: write(draft, mesh, UV),
+        check=lambda draft: _check_written(read_back, draft, mesh, UV),
+        error=MeshError,
+        parents=False,
+    )
 
 
 def check_writable_format(path: Path, *, with_uv: bool) -> None:
@@ -118,13 +122,61 @@ def _write_off(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
 
 
 def _write_stl(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
-    trimesh.Trimesh(mesh.V, mesh.F, process=False).export(path)
+    with path.open("wb") as file:
+        trimesh.Trimesh(mesh.V, mesh.F, process=False).export(file, file_type="stl")
 
 
-_WRITERS: dict[str, Callable[[Path, TriangleMesh, ArrayLike | None], None]] = {
-    ".obj": _write_obj,
-    ".off": _write_off,
-    ".ply": _write_ply,
-    ".stl": _write_stl,
+def _check_written(
+    read_back: ReadBack, path: Path, mesh: TriangleMesh, UV: NDArray[np.float64] | None
+) -> None:
+    """Raise OSError where a file does not hold what was to be written.
+
+    STL has no connectivity and single precision: its triangles' corners are compared.
+    """
+    wanted: tuple[NDArray[Any], ...] = (mesh.V, mesh.F) if UV is None else (mesh.V, mesh.F, UV)
+    if read_back is _stl_arrays:
+        wanted = (mesh.V[mesh.F].astype(np.float32),)
+    try:
+        found = read_back(path, mesh)
+    except Exception:  # the libraries raise anything on a file that is cut short
+        found = ()
+    if len(found) != len(wanted) or not all(map(np.array_equal, found, wanted)):
+        size = path.stat().st_size
+        raise OSError(errno.EIO, f"only {size} bytes of it arrived; is the disk full?")
+
+
+def _obj_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
+    V, UV, _, F, _, _ = igl.readOBJ(path)
+    return (V, F, UV) if len(UV) else (V, F)
+
+
+def _off_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
+    found = meshio.off.read(path)
+    return found.points, found.cells_dict["triangle"]
+
+
+def _ply_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
+    header, end, body = path.read_bytes().partition(b"end_header\n")
+    if not end or b"format binary_little_endian 1.0" not in header:
+        return ()
+    columns = header.count(b"property double")
+    face = np.dtype([("corners", "u1"), ("F", "<i4", 3)])
+    split = 8 * columns * mesh.n
+    coordinates = np.frombuffer(body[:split], "<f8").reshape(mesh.n, columns)
+    V, UV = coordinates[:, :3], coordinates[:, 3:]
+    F = np.frombuffer(body[split:], face)["F"]
+    return (V, F, UV) if columns > 3 else (V, F)
+
+
+def _stl_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
+    facet = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+    return (np.frombuffer(path.read_bytes()[84:], facet)["corners"],)
+
+
+_WRITERS: dict[str, tuple[Writer, ReadBack]] = {
+    ".obj": (_write_obj, _obj_arrays),
+    ".off": (_write_off, _off_arrays),
+    ".ply": (_write_ply, _ply_arrays),
+    ".stl": (_write_stl, _stl_arrays),
 }
 _WITH_UV = (".obj", ".ply")

@@ -17,6 +17,7 @@ from scipy.sparse import csgraph
 
 from cembench.core.clock import phase
 from cembench.core.errors import MeshError, ParameterError
+from cembench.core.names import printable
 from cembench.mesh import topology
 
 #: A triangle counts as degenerate when its area is below this share of its longest edge squared.
@@ -74,7 +75,7 @@ class TriangleMesh:
         notices += cls._check_topology(V, F)
         V.setflags(write=False)
         F.setflags(write=False)
-        return cls(V, F, name, notices)
+        return cls(V, F, printable(name), notices)
 
     @classmethod
     def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from PIL import Image
 
+from cembench.core.atomic import write_bytes, write_text
 from cembench.report.document import Figure
 from cembench.report.palette import PLAIN, Look
 
@@ -123,12 +124,11 @@ _NO_DATE = {
 def write_plot(plot: Plot, folder: Path) -> Figure:
     """Draw a plot into ``folder/figures``; the report's figure, with its files and its data."""
     place = folder / "figures"
-    place.mkdir(parents=True, exist_ok=True)
     files = []
     for form, content in _drawn(plot).items():
-        (place / f"{plot.name}.{form}").write_bytes(content)
+        write_bytes(place / f"{plot.name}.{form}", content)
         files.append(PurePosixPath("figures", f"{plot.name}.{form}"))
-    (place / f"{plot.name}.csv").write_text(data_of(plot), encoding="utf-8")
+    write_text(place / f"{plot.name}.csv", data_of(plot))
     return Figure(
         name=plot.name,
         title=plot.title,

@@ -11,9 +11,11 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from cembench.core.atomic import read_model, write_model
+from cembench.core.atomic import read_model, unwritable, write_model
 from cembench.core.errors import RecordError
-from cembench.results.records import MeshOrigin
+from cembench.core.names import file_name
+from cembench.results import run_folder
+from cembench.results.records import MeshOrigin, Printable
 
 FOLDER = "exhibits"
 _DESCRIPTION = "exhibit.json"
@@ -54,7 +56,7 @@ class Exhibit(BaseModel):
     name: str
     title: str
     text: str
-    command: str
+    command: Printable
     origin: MeshOrigin
     figure: str = ""
     pictures: tuple[Picture, ...] = ()
@@ -63,10 +65,27 @@ class Exhibit(BaseModel):
 
 
 def exhibit_folder(run: Path, name: str) -> Path:
-    """Where the files of an exhibit lie; made if need be."""
-    folder = run / FOLDER / name
-    folder.mkdir(parents=True, exist_ok=True)
+    """Where the files of an exhibit lie; made if need be, and the run's folder too.
+
+    Raises
+    ------
+    RecordError
+        The folder `run` is not a run and not empty, or cannot be written to.
+
+    """
+    run_folder.claim(run)
+    folder = place_of(run, name)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise unwritable(folder, error) from error
     return folder
+
+
+def place_of(run: Path, name: str, file: str = "") -> Path:
+    """Where an exhibit of this name, or a file of it, would lie; never outside the run."""
+    folder = run / FOLDER / file_name(name)
+    return folder / file_name(file) if file else folder
 
 
 def write_exhibit(run: Path, exhibit: Exhibit) -> Path:

@@ -9,9 +9,11 @@ import hashlib
 import json
 from collections.abc import Sequence
 from enum import StrEnum
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+from cembench.core.names import file_name, printable
 
 #: Changes when a record's meaning does; a record of another version is not resumed from.
 SCHEMA_VERSION = 1
@@ -23,6 +25,15 @@ DEFAULT_ROUNDS = 6
 #: Is a surface a model of the paper, a stand-in for one, or neither?
 MeshOrigin = Literal["model", "stand-in", "surface"]
 
+
+def _escaped(value: object) -> object:
+    """Return words with escapes for what cannot be printed; what is not words as it is."""
+    return printable(value) if isinstance(value, str) else value
+
+
+#: Words that somebody else has chosen, as names of files; what cannot be printed is escaped.
+Printable = Annotated[str, BeforeValidator(_escaped)]
+
 Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
 
 
@@ -31,12 +42,12 @@ class Cell(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    algorithm: str
+    algorithm: Printable
     parameters: dict[str, Any] = Field(default_factory=dict)
     #: Of the source file that declares the algorithm, and of what a plug-in imports from beside it
     #: (see :mod:`cembench.running.sources`): an edited plug-in is a new cell.
     code_hash: str
-    mesh: str
+    mesh: Printable
     mesh_hash: str
     solves: str = "reuse"
     backend: str = "cvxopt"
@@ -53,7 +64,8 @@ class Cell(BaseModel):
     @property
     def label(self) -> str:
         """A file name that a person can read and that no other cell has."""
-        return f"{self.mesh}--{self.algorithm}--{self.key[:12]}"
+        mesh, algorithm = file_name(self.mesh, 150), file_name(self.algorithm, 60)
+        return f"{mesh}--{algorithm}--{self.key[:12]}"
 
 
 class FaultKind(StrEnum):

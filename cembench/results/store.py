@@ -10,8 +10,11 @@
     RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
         <id>.jsonl  <id>.npz                      a line for each process that has ended, the map
     RUN/lock                                      held by the run that measures
+    RUN/cembench.json                             says that the folder is a run
+    RUN/scratch-<token>/                          what passes between processes, while it measures
 
-Every other file is written to a draft, flushed to disk and renamed: it is whole or not there.
+The names of meshes and algorithms are cut and cleaned where no file can have them. Every file but
+the journals is written to a draft, flushed to disk and renamed: it is whole or not there.
 A cell's samples become its record when the last is there; the record is written before they are
 deleted, so that whatever moment a run is killed at, each finished process is known exactly once.
 """
@@ -29,11 +32,21 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
 
-from cembench.core.atomic import DRAFT, flush_folder, read_model, unwritable, write, write_model
+from cembench.core.atomic import (
+    flush_folder,
+    read_model,
+    unwritable,
+    write,
+    write_bytes,
+    write_model,
+    write_text,
+)
 from cembench.core.errors import RecordError
+from cembench.core.folders import is_empty_file
+from cembench.core.names import file_name
 from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.results import run_folder
 from cembench.results.records import SCHEMA_VERSION, Cell, Record
 from cembench.results.samples import Samples, read_map
 
@@ -46,11 +59,8 @@ class Store:
 
     def find(self, cell: Cell) -> Record | None:
         """What was recorded of this cell, if anything, under whatever name its mesh had?"""
-        path = self._record_path(cell)
-        if path.exists():
-            return _read_record(path)
-        others = sorted((self.folder / "records").glob(f"*--{cell.key[:12]}.json"))
-        return _read_record(others[0]) if others else None
+        path = self._found(self._record_path(cell), cell)
+        return None if path is None else _read_record(path)
 
     def rename(self, record: Record, cell: Cell, *, keep: bool) -> Record:
         """Record the same under the name that the cell's mesh has now; with `keep` also as it was.
@@ -61,8 +71,11 @@ class Store:
         environment = self.environments().get(record.environment, {"id": record.environment})
         self.save(renamed, self.uv(record.cell), environment)
         if not keep:
-            self._record_path(record.cell).unlink(missing_ok=True)
-            self._map_path(record.cell).unlink(missing_ok=True)
+            for path_of in (self._record_path, self._map_path):
+                before, now = path_of(record.cell), path_of(cell)
+                # Where capital letters do not count, both names may be of one file.
+                if before.exists() and not (now.exists() and now.samefile(before)):
+                    before.unlink()
         return renamed
 
     def records(self) -> list[Record]:
@@ -89,9 +102,9 @@ class Store:
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
     ) -> None:
         """Write the environment, the map and last the record, so that a record finds its map."""
-        about = self.folder / "environments" / f"{record.environment}.json"
+        about = self.folder / "environments" / f"{file_name(record.environment)}.json"
         if not about.exists():
-            write(about, lambda file: file.write(json.dumps(environment, indent=2).encode()))
+            write_text(about, json.dumps(environment, indent=2))
         if uv is not None:
             write(self._map_path(record.cell), lambda file: np.savez_compressed(file, uv=uv))
         else:
@@ -105,7 +118,8 @@ class Store:
 
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
         """The recorded map (n,), or None where there is none."""
-        return read_map(self._map_path(cell))
+        path = self._found(self._map_path(cell), cell)
+        return None if path is None else read_map(path)
 
     def save_mesh(self, mesh: TriangleMesh) -> None:
         """Keep a surface, once: with its map, every metric can be computed again."""
@@ -139,7 +153,8 @@ class Store:
 
     def samples(self, cell: Cell, environment: str) -> Samples:
         """What was measured so far of a cell in this environment, and goes on to be."""
-        return Samples(self.folder / "samples" / cell.label / f"{environment}.jsonl")
+        journal = f"{file_name(environment)}.jsonl"
+        return Samples(self.folder / "samples" / cell.label / journal)
 
     def rounds_done(self, cell: Cell) -> int | None:
         """How many rounds of an unfinished cell are kept? None where it was not begun."""
@@ -152,13 +167,13 @@ class Store:
 
     def save_plan(self, cells: Sequence[Cell]) -> None:
         """Keep which cells were asked for, in order."""
-        text = _CELLS.dump_json(list(cells), indent=1)
-        write(self.folder / "plan.json", lambda file: file.write(text))
+        text = run_folder.CELLS.dump_json(list(cells), indent=1)
+        write_bytes(self.folder / run_folder.PLAN, text)
 
     def plan(self) -> list[Cell]:
         """The cells that were last asked for; none where no plan was kept."""
-        path = self.folder / "plan.json"
-        return _CELLS.validate_json(path.read_bytes()) if path.exists() else []
+        path = self.folder / run_folder.PLAN
+        return run_folder.CELLS.validate_json(path.read_bytes()) if path.exists() else []
 
     def environments(self) -> dict[str, dict[str, Any]]:
         """What is known of the machines, by id."""
@@ -172,7 +187,15 @@ class Store:
         Two runs at a time would slow each other and be wrong about both. So the second waits, after
         calling `waiting`, and then finds done what the first did. The system frees the lock of a
         run that is killed; what that left half-written is cleared away here.
+
+        Raises
+        ------
+        RecordError
+            A folder that is not a run and not empty: nothing is changed in it. One that cannot be
+            written to.
+
         """
+        run_folder.check(self.folder)
         lock = self._lock()
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -182,22 +205,23 @@ class Store:
                 waiting()
                 lock.acquire()
         except OSError as error:
-            raise unwritable(self.folder / "lock", error) from error
-        scratch = self.folder / "scratch"
+            raise unwritable(lock_path(self.folder), error) from error
         try:
-            shutil.rmtree(scratch, ignore_errors=True)
-            for draft in self.folder.rglob(f"{DRAFT}*"):
-                draft.unlink(missing_ok=True)
-            scratch.mkdir()
-            yield scratch
+            try:
+                scratch = run_folder.empty_scratch(self.folder)
+            except OSError as error:
+                raise unwritable(self.folder, error) from error
+            try:
+                yield scratch
+            finally:
+                shutil.rmtree(scratch, ignore_errors=True)
         finally:
-            shutil.rmtree(scratch, ignore_errors=True)
             lock.release()
 
     def is_locked(self) -> bool:
         """Is somebody measuring into this folder now?"""
-        if not (self.folder / "lock").exists():
-            return False
+        if not is_empty_file(lock_path(self.folder)):
+            return False  # opening it would empty it
         try:
             with self._lock().acquire(timeout=0):
                 return False
@@ -205,7 +229,16 @@ class Store:
             return True
 
     def _lock(self) -> FileLock:
-        return FileLock(self.folder / "lock")
+        return FileLock(lock_path(self.folder))
+
+    def _found(self, path: Path, cell: Cell) -> Path | None:
+        """A file of a cell: the one with its name, else one of the same key; None: there is none.
+
+        A mesh may have been renamed, and names that no file can have were once kept as they are.
+        """
+        if path.exists():
+            return path
+        return min(path.parent.glob(f"*--{cell.key[:12]}{path.suffix}"), default=None)
 
     def _record_path(self, cell: Cell) -> Path:
         return self.folder / "records" / f"{cell.label}.json"
@@ -214,32 +247,36 @@ class Store:
         return self.folder / "maps" / f"{cell.label}.npz"
 
     def _mesh_path(self, mesh_hash: str) -> Path:
-        return self.folder / "meshes" / f"{mesh_hash[:32]}.npz"
+        return self.folder / "meshes" / f"{file_name(mesh_hash[:32])}.npz"
 
 
 def merge(runs: Iterable[Store], into: Store) -> int:
     """Bring the records of several runs together; how many are there then?
 
     Of a cell that several runs hold, one that ended ok counts before one that did not, and then
-    the later one.
+    the later one. All runs are read before anything is written.
     """
+    found = [(run, run.records()) for run in runs]
     best: dict[str, tuple[tuple[bool, str], Store, Record]] = {}
-    for run in [*runs, *([into] if (into.folder / "records").is_dir() else [])]:
-        for record in run.records():
-            rank = (record.outcome.status == "ok", record.started_at)
-            key = record.cell.key
-            if key not in best or best[key][0] < rank:
-                best[key] = (rank, run, record)
-    for _, run, record in best.values():
-        environment = run.environments().get(record.environment, {"id": record.environment})
-        into.save(record, run.uv(record.cell), environment)
-        mesh = run.mesh(record.cell)
-        if mesh is not None:
-            into.save_mesh(mesh)
+    with into.locked():
+        for run, records in [*found, (into, into.finished())]:
+            for record in records:
+                rank = (record.outcome.status == "ok", record.started_at)
+                key = record.cell.key
+                if key not in best or best[key][0] < rank:
+                    best[key] = (rank, run, record)
+        for _, run, record in best.values():
+            environment = run.environments().get(record.environment, {"id": record.environment})
+            into.save(record, run.uv(record.cell), environment)
+            mesh = run.mesh(record.cell)
+            if mesh is not None:
+                into.save_mesh(mesh)
     return len(best)
 
 
-_CELLS = TypeAdapter(list[Cell])
+def lock_path(folder: Path) -> Path:
+    """The file whose lock a run holds while it measures."""
+    return folder / run_folder.LOCK
 
 
 def _read_record(path: Path) -> Record:

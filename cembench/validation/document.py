@@ -36,15 +36,15 @@ _TITLES = {
 }
 
 
-def document_of(validation: Validation, folder: Path) -> Report:
-    """The report; records are read from the runs in the folder, and plots are drawn into it."""
+def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
+    """The report; records are read from the folder `runs`, and plots are drawn into `folder`."""
     sections = [
         Section("verdict", "Verdict", (Text(f"{validation.title}: {sentence(validation)}."),))
     ]
     records: dict[str, Record] = {}
     for stage in STAGES:
-        if stage not in validation.skipped and (folder / stage / "records").is_dir():
-            records |= {record.cell.key: record for record in Store(folder / stage).records()}
+        if stage not in validation.skipped and (runs / stage / "records").is_dir():
+            records |= {record.cell.key: record for record in Store(runs / stage).records()}
     for stage in STAGES:
         items = list(_items(validation, stage, folder, records))
         sections.append(Section(stage, _TITLES[stage], tuple(items)))

@@ -11,6 +11,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict
 
+from cembench.results.records import Printable
 from cembench.validation.finding import Finding, Stage
 from cembench.validation.quality import Against, Sides, Speed
 from cembench.validation.scaling import Growth
@@ -36,9 +37,9 @@ class Validation(BaseModel):
     algorithm: str
     title: str
     target: str
-    source: str
+    source: Printable
     parameters: dict[str, Any]
-    command: str
+    command: Printable
     environment: str
     findings: tuple[Finding, ...]
     #: Stages that were not reached, with the reason.

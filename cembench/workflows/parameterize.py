@@ -120,6 +120,7 @@ class Result:
             replaced. Nothing is half-written.
 
         """
+        from cembench.core.outputs import refuse_existing
         from cembench.mesh.files import write_mesh
 
         path = Path(path)

@@ -9,6 +9,7 @@ import re
 import threading
 from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,12 +19,13 @@ from scipy.io import savemat
 
 from cembench import registry
 from cembench.commands import fetch as fetch_verbs
-from cembench.core.errors import DatasetError, RegistryError
+from cembench.core.errors import DatasetError, RecordError, RegistryError
 from cembench.mesh.datasets import Dataset, fetch, is_fetched
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
 from cembench.running.plan import Standing, standing_of_file
+from tests.limits import files_of_at_most, tree
 from tests.real_meshes import real_mesh
 
 
@@ -134,8 +136,19 @@ def test_missing_on_the_mirror(server, tiny, monkeypatch):
 
 def test_cache_that_is_no_folder(tiny, tmp_path):
     (tmp_path / "cache").write_text("in the way")
-    with pytest.raises(DatasetError, match=r"cannot keep tiny\.mat .* or set CEMBENCH_CACHE"):
+    with pytest.raises(RecordError, match=r"cannot keep tiny\.mat .* CEMBENCH_CACHE"):
         fetch(tiny)
+
+
+def test_a_full_disk_leaves_what_was_there_and_ends_with_2(cli, server, tiny, known):
+    tiny.path.parent.mkdir(parents=True)
+    tiny.path.write_bytes(b"older")
+    with files_of_at_most(1000):
+        code, out, err = cli("fetch", "tiny")
+    assert (code, out) == (2, "")
+    assert "cannot be written: File too large. Make room there" in err
+    assert tree(tiny.path.parent) == {Path("tiny.mat"): b"older"}
+    assert fetch(tiny).read_bytes() == server.content
 
 
 def test_progress_is_told_of_every_byte(server, tiny):

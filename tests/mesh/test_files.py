@@ -6,6 +6,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from scipy.io import savemat
 
 from cembench import MeshError, TriangleMesh
+from cembench.mesh import files
 from cembench.mesh.files import read_mesh, write_mesh
 from tests import gallery
 
@@ -117,7 +118,7 @@ def test_nothing_is_half_written(surface, tmp_path, monkeypatch):
         path.write_text("half")
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setitem(__import__("cembench.mesh.files").mesh.files._WRITERS, ".obj", fail)
+    monkeypatch.setitem(files._WRITERS, ".obj", (fail, files._obj_arrays))
     with pytest.raises(MeshError, match="cannot be written: No space left"):
         write_mesh(tmp_path / "a.obj", surface)
     assert not list(tmp_path.iterdir())

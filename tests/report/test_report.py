@@ -1,3 +1,4 @@
+import hashlib
 import io
 import json
 import re
@@ -110,9 +111,8 @@ def test_the_same_run_gives_the_same_bytes(small_run, tmp_path):
     one, two = (tmp_path / name for name in ("one", "two"))
     for folder in (one, two):
         write_report(small_run, folder, "cembench report run")
-    files = json.loads((one / "contents.json").read_text())
-    assert json.loads((two / "contents.json").read_text()) == files
-    for name in files:
+    files = json.loads((one / "contents.json").read_text())["files"]
+    for name in ("contents.json", *files):
         assert (one / name).read_bytes() == (two / name).read_bytes(), name
 
 
@@ -120,14 +120,20 @@ def test_the_same_run_gives_the_same_bytes(small_run, tmp_path):
 def test_an_older_report_is_replaced_and_other_files_are_left(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     folder = tmp_path / "out"
-    folder.mkdir()
+    write_report(store.folder, folder, "c")
     (folder / "mine.txt").write_text("mine")
+    contents = json.loads((folder / "contents.json").read_text())
+    for name in ("old.png", "changed.png", "../run/plan.json"):
+        hashed = hashlib.sha256((folder / name).read_bytes() if "run" in name else b"old")
+        contents["files"][name] = [hashed.hexdigest()]
+    (folder / "contents.json").write_text(json.dumps(contents))
     (folder / "old.png").write_text("old")
-    (folder / "contents.json").write_text('["old.png", "../run/plan.json"]')
+    (folder / "changed.png").write_text("new")
     # A surface that an older run did not keep, and no plan.
     next((tmp_path / "run" / "meshes").iterdir()).unlink()
     report = write_report(store.folder, folder, "c")
     assert (folder / "mine.txt").read_text() == "mine"
+    assert (folder / "changed.png").read_text() == "new"
     assert not (folder / "old.png").exists()
     assert (tmp_path / "run" / "plan.json").exists()
     gaps = items_of(report, Gap)

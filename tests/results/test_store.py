@@ -1,4 +1,7 @@
 import json
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -127,19 +130,31 @@ def test_samples_that_cannot_be_written_are_said(record, tmp_path):
 def test_a_lock_is_held_by_one_and_what_a_killed_run_left_is_cleared(tmp_path):
     store = Store(tmp_path / "run")
     assert not store.is_locked()
-    (tmp_path / "run/scratch").mkdir(parents=True)
-    (tmp_path / "run/scratch/V.npy").touch()
-    (tmp_path / "run/.draft-x").touch()
     with store.locked() as scratch:
-        assert not list(scratch.iterdir())
         assert store.is_locked()
+    scratch.mkdir()
+    (scratch / "V.npy").touch()
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    left = [f".draft-{'0' * 12}-{ended.pid}-{'0' * 32}.npz", f".draft-{'0' * 32}"]
+    kept = [f".draft-{'0' * 12}-{os.getpid()}-{'0' * 32}", ".draft-thesis"]
+    (tmp_path / "run/maps").mkdir()
+    for name in left + kept:
+        (tmp_path / "run/maps" / name).touch()
+    with store.locked() as again:
+        assert again == scratch
+        assert not list(scratch.iterdir())
     assert not store.is_locked()
-    assert [path.name for path in (tmp_path / "run").iterdir()] in ([], ["lock"])
+    found = {path.name for path in (tmp_path / "run").iterdir()}
+    assert found - {"lock"} == {"cembench.json", "maps"}
+    assert sorted(path.name for path in (tmp_path / "run/maps").iterdir()) == sorted(kept)
 
 
 def test_a_folder_that_cannot_be_locked_is_said(tmp_path):
     (tmp_path / "file").touch()
-    with pytest.raises(RecordError, match="cannot be written"), Store(tmp_path / "file").locked():
+    with pytest.raises(RecordError, match="is a file"), Store(tmp_path / "file").locked():
+        pass
+    with pytest.raises(RecordError, match="cannot be written"), Store(tmp_path / "file/x").locked():
         pass
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import RecordError
+from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.palette import Look, looks
 from cembench.results import paper
@@ -171,11 +171,14 @@ class Evidence:
             name = record.cell.algorithm
             variants.setdefault(name, Counter())[_variant(record.cell)] += 1
             about[name] = record
+        titles = Counter(record.title for record in about.values())
         found = []
         for name in sorted(variants, key=lambda n: (n not in paper.ALGORITHMS, _place(n), n)):
             choices = [choice for choice, _ in variants[name].most_common()]
             for k, choice in enumerate(choices):
                 title, target = about[name].title, about[name].target
+                if titles[title] > 1:
+                    title = f"{title} ({name})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
                 found.append(Series(name, title, target, choice, label, main=k == 0))
         return tuple(found)
@@ -234,9 +237,11 @@ class Evidence:
 
     def name_of(self, surface: SurfaceFacts) -> str:
         """A file name and anchor for a surface, unlike that of any other of the run."""
-        plain = slug(surface.name)
-        alike = [s for s in self.surfaces if slug(s.name) == plain]
-        return plain if len(alike) == 1 else f"{plain}-{surface.mesh_hash[:8]}"
+        return self._names[surface.mesh_hash]
+
+    @cached_property
+    def _names(self) -> dict[str, str]:
+        return distinct_slugs({s.mesh_hash: s.name for s in self.surfaces})
 
     def why_not(self, record: Record | None) -> str:
         """Why is there no figure of this cell?"""
@@ -255,11 +260,6 @@ class Evidence:
         if record is None or record.outcome.status != "ok":
             return None
         return self.store.uv(record.cell)
-
-
-def slug(name: str) -> str:
-    """A name of letters, digits and hyphens alone, which every file system and form can take."""
-    return re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"
 
 
 def model_surface(model: str) -> str:

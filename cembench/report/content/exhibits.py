@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path, PurePosixPath
 
-from cembench.report.content.evidence import Evidence, slug
+from cembench.core.atomic import write_bytes
+from cembench.core.names import digest, distinct_slugs, slug
+from cembench.report.content.evidence import Evidence
 from cembench.report.document import (
     ORIGINS,
     Column,
@@ -19,7 +20,7 @@ from cembench.report.document import (
     Value,
     missing,
 )
-from cembench.results.exhibits import FOLDER, Exhibit
+from cembench.results.exhibits import Exhibit, place_of
 from cembench.results.exhibits import Table as ExhibitTable
 from cembench.results.records import MeshOrigin
 
@@ -52,23 +53,26 @@ def figures_of(exhibit: Exhibit) -> list[str]:
 
 def exhibit_sections(evidence: Evidence, folder: Path) -> list[Section]:
     """A section for each exhibit; its pictures are copied into the report."""
-    return [_section(evidence, exhibit, folder) for exhibit in evidence.exhibits]
+    names = distinct_slugs({digest(exhibit.name): exhibit.name for exhibit in evidence.exhibits})
+    return [
+        _section(evidence, exhibit, f"exhibit-{names[digest(exhibit.name)]}", folder)
+        for exhibit in evidence.exhibits
+    ]
 
 
-def _section(evidence: Evidence, exhibit: Exhibit, folder: Path) -> Section:
-    name = f"exhibit-{slug(exhibit.name)}"
-    source = evidence.store.folder / FOLDER / exhibit.name
+def _section(evidence: Evidence, exhibit: Exhibit, name: str, folder: Path) -> Section:
+    stems = distinct_slugs({digest(p.file): Path(p.file).stem for p in exhibit.pictures})
     items: list[Item] = [Text(part) for part in exhibit.text.split("\n\n") if part.strip()]
     items.append(Text(f"Made on: {ORIGINS[exhibit.origin][0].removeprefix('measured here on ')}."))
     figures, lost = [], []
     for k, picture in enumerate(exhibit.pictures):
-        file = source / picture.file
+        file = place_of(evidence.store.folder, exhibit.name, picture.file)
         if not file.is_file():
             lost.append(Gap(picture.caption, f"the picture {file} is gone.", exhibit.command))
             continue
-        path = PurePosixPath("figures", f"{name}-{slug(file.stem)}{file.suffix.lower()}")
-        (folder / "figures").mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(file, folder / path)
+        stem = stems[digest(picture.file)]
+        path = PurePosixPath("figures", f"{name}-{stem}.{slug(file.suffix, 20)}")
+        write_bytes(folder / path, file.read_bytes())
         figures.append(
             Figure(
                 f"{name}-{k + 1}", picture.caption, (path,), picture.caption,

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from cembench.conformal.curvature import mean_curvature
 from cembench.conformal.metrics import angle_errors
-from cembench.core.atomic import write
+from cembench.core.atomic import write_bytes
+from cembench.core.names import digest, distinct_slugs
 from cembench.drawing import shading
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import (
@@ -21,7 +22,6 @@ from cembench.report.content.evidence import (
     Evidence,
     Series,
     SurfaceFacts,
-    slug,
 )
 from cembench.report.document import Figure
 from cembench.results.records import Record
@@ -120,6 +120,9 @@ class _Drawer:
     ) -> None:
         self.surface, self.mesh, self.folder = surface, mesh, folder
         self.name = evidence.name_of(surface)
+        labels = {digest(s.label): s.label for s in evidence.series}
+        slugs = distinct_slugs(labels)
+        self.labels = {label: slugs[key] for key, label in labels.items()}
         self.space = shading.surface_panel(mesh, SIDE)
 
     def checkerboard(
@@ -135,7 +138,7 @@ class _Drawer:
         words = "" if error is None else f"; angles off by {error:.2f} degrees in the mean"
         caption = f"{self.surface.title}, {series.label}{target}{words}; {folds} folded triangles."
         return self._figure(
-            f"{slug(series.label)}-checkerboard",
+            f"{self.labels[series.label]}-checkerboard",
             f"{series.label}",
             caption,
             f"{self.surface.title} and its image by {series.label} under one checkerboard",
@@ -170,5 +173,5 @@ class _Drawer:
     ) -> Figure:
         path = PurePosixPath("figures", f"{self.name}-{what}.jpg")
         content = shading.jpeg(shading.beside(pictures))
-        write(self.folder / path, lambda file: file.write(content))
+        write_bytes(self.folder / path, content)
         return Figure(f"{self.name}-{what}", title, (path,), caption, alternative=alternative)

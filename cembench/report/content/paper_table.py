@@ -14,7 +14,7 @@ from cembench.report.content.printed_beside_measured import (
     Quantity,
     absent_models,
     in_policy,
-    slug,
+    policy_suffix,
     table_beside,
 )
 from cembench.report.document import Table
@@ -37,7 +37,7 @@ def three_kinds(
     notes: Sequence[str] = (),
 ) -> list[Table]:
     """The paper's table `number`, then other algorithms, then other surfaces, as far as there."""
-    tail = slug(policy, evidence) if policy else ""
+    tail = policy_suffix(policy, evidence) if policy else ""
     add = in_policy(evidence, policy) if policy else ""
     name = f"table-{number}{tail}"
     tables = []

@@ -207,7 +207,7 @@ def in_policy(evidence: Evidence, policy: str) -> str:
     return "" if len(evidence.policies) == 1 else f", solves: {policy}"
 
 
-def slug(policy: str, evidence: Evidence) -> str:
+def policy_suffix(policy: str, evidence: Evidence) -> str:
     """What a name adds where a run solves in several ways: the first has none."""
     return "" if policy == evidence.policies[0] else f"-{policy}"
 

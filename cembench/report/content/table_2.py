@@ -20,7 +20,7 @@ from cembench.report.content.printed_beside_measured import (
     Quantity,
     absent_models,
     in_policy,
-    slug,
+    policy_suffix,
 )
 from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.records import Record
@@ -99,7 +99,7 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
         counts += [Value(str(len(r)), len(r), "derived") for r in sets[algorithm]]
     origins = sorted({s.origin for s in evidence.models})
     return Table(
-        name=f"averages{slug(policy, evidence)}",
+        name=f"averages{policy_suffix(policy, evidence)}",
         title=f"Averages of Table 2, in both readings{in_policy(evidence, policy)}",
         columns=tuple(columns),
         rows=(*rows, tuple(counts)),

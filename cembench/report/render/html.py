@@ -29,7 +29,7 @@ import plotly
 from markupsafe import Markup, escape
 from plotly.io.json import to_json_plotly
 
-from cembench.core.atomic import write
+from cembench.core.atomic import write_text
 from cembench.report.document import (
     ORIGINS,
     Claim,
@@ -83,8 +83,7 @@ def write_html(report: Report, folder: Path) -> Path:
         The page cannot be written.
 
     """
-    page = render(report, folder).encode()
-    write(folder / FILE, lambda file: file.write(page))
+    write_text(folder / FILE, render(report, folder))
     return folder / FILE
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from itertools import groupby
 from pathlib import Path
 
-from cembench.core.atomic import write
+from cembench.core.atomic import write_text
 from cembench.report.document import (
     Claim,
     Column,
@@ -238,5 +238,4 @@ def _row(table: Table, row: Sequence[object]) -> str:
 
 
 def _write(path: Path, lines: Iterable[str]) -> None:
-    content = ("\n".join(line for line in lines if line is not None) + "\n").encode()
-    write(path, lambda file: file.write(content))
+    write_text(path, "\n".join(line for line in lines if line is not None) + "\n")

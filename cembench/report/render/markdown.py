@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from cembench.core.atomic import write
+from cembench.core.atomic import write_text
 from cembench.report.document import (
     Claim,
     Figure,
@@ -171,5 +171,4 @@ def _short(value: Any) -> str:
 
 
 def _write(path: Path, lines: Iterable[str]) -> None:
-    content = ("\n".join(lines).rstrip() + "\n").encode()
-    write(path, lambda file: file.write(content))
+    write_text(path, "\n".join(lines).rstrip() + "\n")

@@ -6,7 +6,7 @@ import csv
 import io
 from pathlib import Path
 
-from cembench.core.atomic import write
+from cembench.core.atomic import write_text
 from cembench.report.document import Column, Report, Table, csv_of, tables_of
 
 
@@ -15,8 +15,7 @@ def write_tables_csv(report: Report, folder: Path) -> list[Path]:
     paths = []
     for table in tables_of(report):
         path = folder / csv_of(table)
-        content = table_csv(table).encode()
-        write(path, lambda file, content=content: file.write(content))  # type: ignore[misc]
+        write_text(path, table_csv(table))
         paths.append(path)
     return paths
 

@@ -118,7 +118,7 @@ def draw_film(
     """
     try:
         return _by_pyvista(film, tell), ""
-    except _PyvistaFailed as reason:
+    except (_PyvistaFailed, OSError) as reason:  # a full temporary disk, for one
         pictures = np.empty(film.shape, dtype=np.uint8)
         for k in range(len(film.times)):
             for view in range(len(film.rotations)):

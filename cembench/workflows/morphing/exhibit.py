@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from cembench.core import atomic
+from cembench.core.atomic import write_bytes
 from cembench.results.exhibits import Exhibit, Picture, Table, exhibit_folder, write_exhibit
 from cembench.results.records import MeshOrigin
 from cembench.workflows.morphing.morph import Morph
@@ -78,7 +78,7 @@ def lay_down(
 
 
 def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> Picture:
-    atomic.write(exhibit_folder(run, name) / file, lambda opened: opened.write(content))
+    write_bytes(exhibit_folder(run, name) / file, content)
     return Picture(file=file, caption=caption, alternative=caption)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+import errno
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core import atomic
-from cembench.core.errors import ParameterError, RecordError
+from cembench.core.errors import ParameterError
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -45,6 +45,13 @@ def check_output(path: Path) -> None:
         raise ParameterError(f"-o {path} is a file, not a folder; name another place.")
 
 
+def files_of(path: Path, frames: int) -> list[Path]:
+    """Which files are written for this output?"""
+    if path.suffix.lower() in (*FILMS, *ARRAYS) and not path.is_dir():
+        return [path]
+    return mesh_files(path, frames)
+
+
 def write_film(path: Path, pictures: Pictures) -> None:
     """Write pictures (frames, rows, columns, 3) as GIF or MP4, 24 frames a second.
 
@@ -57,13 +64,11 @@ def write_film(path: Path, pictures: Pictures) -> None:
     if path.suffix.lower() == ".gif":
         atomic.write(path, lambda file: _save_gif(file, pictures))
         return
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=atomic.DRAFT) as folder:
-            draft = Path(folder) / "film.mp4"
-            _encode_mp4(draft, pictures)
-            draft.replace(path)
-    except OSError as error:  # the encoder's complaints too
-        raise RecordError(f"{path} cannot be written: {error}") from error
+    atomic.write_by(
+        path,
+        lambda draft: _encode_mp4(draft, pictures),
+        check=lambda draft: _check_mp4(draft, len(pictures)),
+    )
 
 
 def _save_gif(file: BinaryIO, pictures: Pictures) -> None:
@@ -102,6 +107,18 @@ def _encode_mp4(path: Path, pictures: Pictures) -> None:
     encoder.close()
 
 
+def _check_mp4(path: Path, frames: int) -> None:
+    """Raise OSError where a film does not hold so many frames: the encoder reports no full disk."""
+    import imageio_ffmpeg
+
+    try:
+        found, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    except RuntimeError:
+        found = 0
+    if found != frames:
+        raise OSError(errno.EIO, f"{found} of {frames} frames arrived; is the disk full?")
+
+
 def mesh_files(path: Path, frames: int) -> list[Path]:
     """What are numbered meshes called? ``a.obj`` gives a_000.obj; a folder f, f/frame_000.ply."""
     digits = max(3, len(str(frames - 1)))
@@ -131,12 +148,12 @@ def write_meshes(
     place = files[0].parent
     try:
         place.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=place, prefix=atomic.DRAFT) as folder:
+        with atomic.draft_folder(files[0]) as folder:
             for k, (file, time) in enumerate(zip(files, times, strict=True)):
-                write_mesh(Path(folder) / file.name, replace(mesh, V=at(time)))
+                write_mesh(folder / file.name, replace(mesh, V=at(time)))
                 tell(k)
             for file in files:
-                (Path(folder) / file.name).replace(file)
+                (folder / file.name).replace(file)
     except OSError as error:
         raise atomic.unwritable(files[0], error) from error
     return files

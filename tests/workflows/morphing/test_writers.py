@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
@@ -14,6 +16,7 @@ from cembench.workflows.morphing.writers import (
     write_film,
     write_meshes,
 )
+from tests.limits import files_of_at_most, tree
 
 MESH = flat_disk(100)
 TIMES = np.linspace(0, 1, 4)
@@ -55,6 +58,18 @@ def test_a_film_that_cannot_be_written_is_an_error(name, pictures, tmp_path):
     with pytest.raises(RecordError, match="cannot be written"):
         write_film(tmp_path / name, pictures)
     assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+@pytest.mark.parametrize("name", ["a.gif", "a.mp4"])
+def test_a_film_on_a_full_disk_leaves_the_older_one(name, pictures, tmp_path):
+    write_film(tmp_path / name, pictures)
+    before = tree(tmp_path)
+    with (
+        files_of_at_most(len(before[Path(name)]) // 2),
+        pytest.raises(RecordError, match="cannot be written"),
+    ):
+        write_film(tmp_path / name, pictures)
+    assert tree(tmp_path) == before
 
 
 def test_meshes_are_numbered(tmp_path):

@@ -1,0 +1,191 @@
+"""Folders that cembench makes, known by a marker: a file that says so.
+
+Nothing is written into a folder with other files in it, unless it has a marker. A marker of a
+report also says, by their hashes, which files are the report's; only those are replaced or deleted.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import uuid
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+from typing import Literal
+
+from pydantic import BaseModel, Field, ValidationError
+
+from cembench.core.atomic import is_draft, unwritable, write_text
+from cembench.core.errors import RecordError
+
+#: What a folder of ours can be.
+Kind = Literal["run", "report", "validation"]
+#: The marker's name.
+MARKERS: dict[Kind, str] = {
+    "run": "cembench.json",
+    "report": "contents.json",
+    "validation": "cembench.json",
+}
+#: So many names of files in the way are told.
+_NAMED = 3
+
+
+class Marker(BaseModel):
+    """What a folder is; the fields that its kind does not need are None."""
+
+    project: Literal["cembench"] = "cembench"
+    kind: Kind
+    schema_version: Literal[1] = 1
+    made_at: str | None = None
+    #: A part of the names of what is only there for a while, so that nobody else has such names.
+    token: str | None = Field(default=None, pattern=r"^[0-9a-f]{32}$")
+    #: SHA-256 of the files that we wrote, by their paths in the folder; while they are being
+    #: replaced, of the old and of the new one.
+    files: dict[str, tuple[str, ...]] | None = None
+
+
+def check(
+    folder: Path, kind: Kind, is_older: Callable[[Path], bool] = lambda folder: False
+) -> Marker | None:
+    """Return the marker of a folder, or None where it may get one; nothing is changed.
+
+    Parameters
+    ----------
+    folder : Path
+        A folder of this kind, an empty one, or one that is not there.
+    kind : str
+        What it is to be.
+    is_older : function of a folder
+        Whether it is of this kind, made before there were markers.
+
+    Raises
+    ------
+    RecordError
+        A file, or a folder that holds other files.
+
+    """
+    if folder.exists() and not folder.is_dir():
+        raise RecordError(f"{folder} is a file; name a folder with -o.")
+    try:
+        names = sorted(path.name for path in folder.iterdir()) if folder.exists() else []
+        if MARKERS[kind] in names:
+            return _read(folder, kind)
+        others = [name for name in names if not _is_passing(folder / name)]
+        if not others or is_older(folder):
+            return None
+    except OSError as error:
+        raise RecordError(f"{folder} cannot be read: {error.strerror or error}.") from error
+    held = ", ".join(others[:_NAMED]) + (", ..." if len(others) > _NAMED else "")
+    raise RecordError(
+        f"{folder} is not a {kind} of cembench, and not empty: it holds {held}. Nothing was "
+        f"changed. Name a new or empty folder with -o, or the folder of an earlier {kind}."
+    )
+
+
+def claim(
+    folder: Path, kind: Kind, is_older: Callable[[Path], bool] = lambda folder: False
+) -> Marker:
+    """Make a folder ours, as :func:`check` allows, and return its marker."""
+    found = check(folder, kind, is_older)
+    if found is not None:
+        return found
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    marker = Marker(kind=kind, made_at=now, token=uuid.uuid4().hex)
+    _write(folder, marker)
+    return marker
+
+
+def publish(draft: Path, folder: Path, kind: Kind) -> None:
+    """Move all files of a draft into a folder of ours; delete those of before that it has not.
+
+    Files that we did not write, or that somebody has changed since, are left alone.
+
+    Raises
+    ------
+    RecordError
+        The folder is not ours, or such a file is where one of the draft belongs: then nothing is
+        changed. Or the folder cannot be written to.
+
+    """
+    marker = check(folder, kind) or Marker(kind=kind)
+    before = marker.files or {}
+    files = sorted(path for path in draft.rglob("*") if path.is_file())
+    made = {path.relative_to(draft).as_posix(): (_sha256(path),) for path in files}
+    in_the_way = [name for name in made if not _may_be_replaced(folder, name, before)]
+    if in_the_way:
+        held = ", ".join(in_the_way[:_NAMED]) + (", ..." if len(in_the_way) > _NAMED else "")
+        raise RecordError(
+            f"{folder} has files that cembench did not write, or that were changed since, where "
+            f"the {kind} has its own: {held}. Nothing was changed. Move them away, or name another "
+            "folder with -o."
+        )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        both = {name: (*made.get(name, ()), *before.get(name, ())) for name in {*made, *before}}
+        _write(folder, marker.model_copy(update={"files": both}))
+        for name in made:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (draft / name).replace(folder / name)
+        for name in before:
+            if name not in made and _is_unchanged(folder, name, before):
+                (folder / name).unlink()
+        _write(folder, marker.model_copy(update={"files": made}))
+    except OSError as error:
+        raise unwritable(folder, error) from error
+
+
+def is_link_or_not_folder(path: Path) -> bool:
+    """Whether something is at a path that is not a folder, or only leads to one."""
+    return path.is_symlink() or (path.exists() and not path.is_dir())
+
+
+def _may_be_replaced(folder: Path, name: str, before: dict[str, tuple[str, ...]]) -> bool:
+    above = [folder / parent for parent in PurePosixPath(name).parents if parent.name]
+    if any(is_link_or_not_folder(parent) for parent in above):
+        return False
+    path = folder / name
+    return not (path.is_symlink() or path.exists()) or _is_unchanged(folder, name, before)
+
+
+def _is_unchanged(folder: Path, name: str, before: dict[str, tuple[str, ...]]) -> bool:
+    """Whether a file is still what we wrote; a name that leads out of the folder never is."""
+    path = folder / name
+    own = path.resolve() == folder.resolve() / name and ".." not in PurePosixPath(name).parts
+    return own and path.is_file() and _sha256(path) in before.get(name, ())
+
+
+def _is_passing(path: Path) -> bool:
+    """Whether a file says nothing of its folder: a draft, or the lock of a run that just began."""
+    return is_draft(path) or (path.name == "lock" and is_empty_file(path))
+
+
+def is_empty_file(path: Path) -> bool:
+    """Whether this is a regular file of no bytes, as the lock of a run is."""
+    return not path.is_symlink() and path.is_file() and path.stat().st_size == 0
+
+
+def _read(folder: Path, kind: Kind) -> Marker:
+    path = folder / MARKERS[kind]
+    try:
+        if path.is_symlink() or not path.is_file():
+            raise RecordError(f"{path} is not a regular file.")
+        marker = Marker.model_validate_json(path.read_bytes())
+    except (RecordError, ValidationError):
+        marker = None
+    if marker is None or marker.kind != kind or (kind != "report" and marker.token is None):
+        what = f"says that this is a {marker.kind}" if marker else "was not written by cembench"
+        raise RecordError(
+            f"{path} {what}, so {folder} is not taken for a {kind}; or an older cembench wrote it. "
+            "Nothing was changed. Name a new or empty folder with -o, or delete this one."
+        )
+    return marker
+
+
+def _write(folder: Path, marker: Marker) -> None:
+    text = marker.model_dump_json(indent=1, exclude_none=True) + "\n"
+    write_text(folder / MARKERS[marker.kind], text)
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()

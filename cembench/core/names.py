@@ -1,0 +1,93 @@
+"""File names out of names that anybody may have chosen: of meshes, algorithms, exhibits, machines.
+
+A name is data: it may hold slashes or bytes that are no text, be longer than a file system allows,
+or be reserved on some system. Every name that becomes a part of a path goes through this module.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+
+#: Bytes of a file name that every common file system allows are 255; two names and a key share it.
+LONGEST = 100
+#: Digits of the hash that stands for what a file name cannot hold.
+DIGITS = 12
+
+_FORBIDDEN = re.compile(r'[<>:"/\\|?*]')
+_RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9¹²³]|lpt[0-9¹²³])(\..*)?", re.IGNORECASE)
+_MADE_HERE = re.compile(rf"~[0-9a-f]{{{DIGITS}}}$")
+
+
+def printable(name: str) -> str:
+    r"""Return a name with what cannot be printed as escapes; bytes that are not UTF-8 too.
+
+    >>> printable("caf\udce9"), printable("one\ntwo"), printable("ß")
+    ('caf\\udce9', 'one\\ntwo', 'ß')
+    """
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+
+
+def file_name(name: str, longest: int = LONGEST) -> str:
+    """Return a name for a file or folder: `name` itself where every system takes it.
+
+    Otherwise what is left of it, with a hash, so that different names give different files. The
+    result never leads out of its folder and has at most `longest` bytes.
+
+    >>> file_name("face (1)"), file_name("../x")
+    ('face (1)', 'x~d6b96a97d147')
+    """
+    if _is_ordinary(name, longest):
+        return name
+    readable = re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("._")
+    return f"{readable[: longest - DIGITS - 1]}~{digest(name)[:DIGITS]}"
+
+
+def slug(name: str, longest: int = LONGEST) -> str:
+    """Return a name of small letters, digits and hyphens alone, of at most `longest` characters.
+
+    Different names may have the same slug: see :func:`distinct_slugs`.
+
+    >>> slug("Liu's Wry Face")
+    'liu-s-wry-face'
+    """
+    plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"
+    if len(plain) <= longest:
+        return plain
+    return f"{plain[: longest - DIGITS - 1].rstrip('-')}-{digest(name)[:DIGITS]}"
+
+
+def distinct_slugs(names: Mapping[str, str]) -> dict[str, str]:
+    """Return a slug for each name, no two the same; keys are hashes that tell equal names apart.
+
+    >>> distinct_slugs({"12ab": "A b", "34cd": "a-b", "56ef": "c"})
+    {'12ab': 'a-b-12ab', '34cd': 'a-b-34cd', '56ef': 'c'}
+    """
+    plain = {key: slug(name) for key, name in names.items()}
+    shared = [one for one in set(plain.values()) if list(plain.values()).count(one) > 1]
+    taken: set[str] = set()
+    found = {}
+    for key, name in plain.items():
+        wanted = f"{name}-{slug(key)[:8]}" if name in shared else name
+        tries = [wanted, *(f"{wanted}-{k}" for k in range(2, len(names) + 2))]
+        found[key] = next(one for one in tries if one not in taken)
+        taken.add(found[key])
+    return found
+
+
+def digest(name: str) -> str:
+    """Return the SHA-256 of a name, in hexadecimal digits."""
+    return hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
+
+
+def _is_ordinary(name: str, longest: int) -> bool:
+    return (
+        0 < len(name.encode("utf-8", "surrogatepass")) <= longest
+        and name.isprintable()
+        and not name.startswith((".", " "))
+        and not name.endswith((".", " "))
+        and not _FORBIDDEN.search(name)
+        and not _RESERVED.fullmatch(name)
+        and not _MADE_HERE.search(name)
+    )

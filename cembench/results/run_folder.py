@@ -1,0 +1,119 @@
+"""The folder of a run: how it is known, what in it is the run's own, and where files pass through.
+
+A run writes to these names alone, and deletes nothing but what stands below them under names that
+it gave: see :mod:`cembench.results.store`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from cembench.core import folders
+from cembench.core.atomic import clear_drafts, is_draft
+from cembench.core.errors import RecordError
+from cembench.results.records import Cell, Record
+
+#: The folders of a run.
+FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits")
+#: The files of a run besides its marker.
+PLAN, LOCK = "plan.json", "lock"
+#: The cells of a plan.
+CELLS = TypeAdapter(list[Cell])
+
+_RECORD = re.compile(r".*--[0-9a-f]{12}\.json")
+
+
+def check(folder: Path) -> None:
+    """Raise :class:`RecordError` where a run must not write to a folder; nothing is changed."""
+    folders.check(folder, "run", is_older_run)
+    _check_names(folder)
+
+
+def claim(folder: Path) -> folders.Marker:
+    """Return the marker of a run's folder, which it gets if it is new or of an older version."""
+    check(folder)
+    return folders.claim(folder, "run", is_older_run)
+
+
+def is_own(folder: Path, path: Path) -> bool:
+    """Whether a path is one that a run in this folder keeps for itself."""
+    try:
+        inside = path.resolve().relative_to(folder.resolve())
+    except ValueError:
+        return False
+    own = (*FOLDERS, PLAN, LOCK, folders.MARKERS["run"])
+    return not inside.parts or inside.parts[0] in own
+
+
+def empty_scratch(folder: Path) -> Path:
+    """Return an empty folder for what passes between processes; what a kill left is cleared.
+
+    Only one run at a time may call this. The name is one that only the marker knows.
+    """
+    scratch = folder / f"scratch-{claim(folder).token}"
+    if scratch.is_dir() and not scratch.is_symlink():
+        shutil.rmtree(scratch)
+    scratch.mkdir()
+    for place in (folder, *(folder / name for name in FOLDERS)):
+        clear_drafts(place)
+    for place in (*folder.glob("samples/*/"), *folder.glob("exhibits/*/")):
+        clear_drafts(place)
+    return scratch
+
+
+def is_older_run(folder: Path) -> bool:
+    """Whether a folder is a run from before runs had markers.
+
+    It has a record, a plan or an exhibit of ours, and nothing of another form where those lie.
+    """
+    if any(folders.is_link_or_not_folder(folder / name) for name in FOLDERS):
+        return False
+    records = [path for path in (folder / "records").glob("*.json") if not is_draft(path)]
+    if not all(_RECORD.fullmatch(path.name) for path in records):
+        return False
+    plan = folder / PLAN
+    if plan.exists() and not _holds(plan, CELLS.validate_json):
+        return False
+    exhibits = folder.glob("exhibits/*/exhibit.json")
+    return (
+        plan.exists()
+        or any(_holds(path, Record.model_validate_json) for path in records)
+        or any(_holds(path, _exhibit) for path in exhibits)
+    )
+
+
+def _exhibit(content: bytes) -> None:
+    """Raise ValueError where this does not describe an exhibit."""
+    found = json.loads(content)
+    if not isinstance(found, dict) or not {"name", "title", "command", "origin"} <= set(found):
+        raise ValueError("not an exhibit")
+
+
+def _holds(path: Path, parse: Callable[[bytes], object]) -> bool:
+    try:
+        parse(path.read_bytes())
+    except (OSError, ValueError, ValidationError):
+        return False
+    return True
+
+
+def _check_names(folder: Path) -> None:
+    """Raise where a name of ours leads elsewhere, or is that of something else."""
+    lock, plan = folder / LOCK, folder / PLAN
+    wrong = [folder / name for name in FOLDERS if folders.is_link_or_not_folder(folder / name)]
+    if (lock.exists() or lock.is_symlink()) and not folders.is_empty_file(lock):
+        wrong.append(lock)
+    if plan.is_symlink() or (plan.exists() and not plan.is_file()):
+        wrong.append(plan)
+    if wrong:
+        raise RecordError(
+            f"{wrong[0]} is in the way: a run keeps its own under that name, and this is not of "
+            "that kind, or a symbolic link. Nothing was changed. Move it away, or name another "
+            "folder with -o."
+        )
