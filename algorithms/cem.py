@@ -24,8 +24,8 @@ Complex = NDArray[np.complex128]
 def cem(
     mesh: DiskMesh,
     *,
-    tolerance: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 1e-5,
-    max_iterations: Annotated[int, Field(ge=0)] = 20,
+    tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-5,
+    max_iterations: Annotated[int, Field(ge=0, le=1_000_000)] = 20,
     inversion: bool = True,
     delaunay: bool = False,
 ) -> Parameterization:

@@ -44,8 +44,8 @@ MIRRORED_SHARE = 1 / 3
 def fdm(
     mesh: DiskMesh,
     *,
-    tolerance: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 1e-5,
-    max_iterations: Annotated[int, Field(ge=1)] = 5,
+    tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-5,
+    max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 5,
 ) -> Parameterization:
     """Which disk map comes from correcting a harmonic one, in the half plane and by reflection?
 

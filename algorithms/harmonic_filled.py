@@ -22,7 +22,7 @@ from cembench.registry import algorithm
     source="Eq. (10) on the filled surface; Floater & Hormann 2005, Sec. 3",
 )
 def harmonic_filled(
-    mesh: HoledMesh, *, outer: Annotated[int, Field(ge=0)] | None = None
+    mesh: HoledMesh, *, outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None
 ) -> Parameterization:
     """What does one Dirichlet solve give when the holes are filled first, and opened again?
 

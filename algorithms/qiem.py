@@ -41,8 +41,8 @@ FIRST, GROWTH, CUT, SHARE, LEAST = 0.1, 1.5, 0.5, 0.9, 1e-6
 def qiem(
     mesh: DiskMesh,
     *,
-    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
-    max_iterations: Annotated[int, Field(ge=1)] = 200,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
+    max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 200,
 ) -> Parameterization:
     """Which disk map is half of the limit of the heat flow of the doubled surface on the sphere?
 

@@ -45,6 +45,8 @@ ExactMap = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 Steps = Callable[..., Iterator[MapStep]]
 
 _MARK = "__cembench__"
+#: Whole numbers of this size fit no array, whatever range a parameter declares.
+LARGEST = 2**63
 C = TypeVar("C", bound=Callable[..., Any])
 
 
@@ -66,7 +68,13 @@ class Parameter:
 
         """
         try:
-            return TypeAdapter(self.annotation).validate_python(value)
+            parsed = TypeAdapter(self.annotation).validate_python(value)
+            if type(parsed) is int and abs(parsed) >= LARGEST:
+                raise ParameterError(
+                    f"{owner}: {self.name}={value!r} is not allowed: beyond 64 bits (default "
+                    f"{self.default!r})."
+                )
+            return parsed
         except ValidationError as error:
             reason = error.errors()[0]["msg"]
             raise ParameterError(

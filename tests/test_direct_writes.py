@@ -15,8 +15,8 @@ PACKAGES = ("algorithms", "benchmarks", "cembench", "examples", "meshes_gen")
 ALLOWED = {
     "cembench/core/atomic.py": "it is the place",
     "cembench/core/folders.py:publish": "moves files that were flushed and checked as drafts",
-    "cembench/workflows/morphing/writers.py:write_meshes": "moves files that were checked as drafts",
-    "cembench/results/samples.py:_append": "a journal grows by a line; one that is cut short is dropped",
+    "cembench/workflows/morphing/writers.py:write_meshes": "moves checked drafts",
+    "cembench/results/samples.py:_append": "a journal grows by a line; a cut one is dropped",
     "cembench/mesh/files.py:_write_obj": "makes a draft for atomic.write_by",
     "cembench/mesh/files.py:_write_ply": "makes a draft for atomic.write_by",
     "cembench/mesh/files.py:_write_off": "makes a draft for atomic.write_by",
@@ -30,7 +30,7 @@ ALLOWED = {
     "cembench/drawing/hand_over.py": "between processes, in a temporary folder",
     "cembench/drawing/draw_pyvista.py": "between processes, in a temporary folder",
     "cembench/drawing/preview.py:_by_pyvista": "between processes, in a temporary folder",
-    "cembench/workflows/morphing/drawing.py:_by_pyvista": "between processes, in a temporary folder",
+    "cembench/workflows/morphing/drawing.py:_by_pyvista": "between processes, temporary",
     "cembench/workflows/morphing/draw_frames.py": "between processes, in a temporary folder",
     "meshes_gen/contact_sheet.py:thumbnail": "between processes, in a temporary folder",
 }

@@ -35,8 +35,8 @@ MOST_COST = 0.01
 def direct_cem(
     mesh: DiskMesh,
     *,
-    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-6,
-    max_iterations: Annotated[int, Field(ge=0)] = 50,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
+    max_iterations: Annotated[int, Field(ge=0, le=1_000_000)] = 50,
     gauge: Gauge = "boundary",
     back: Annotated[float, Field(ge=0, le=1)] = 0.3,
     delaunay: bool = False,

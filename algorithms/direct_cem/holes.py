@@ -32,10 +32,10 @@ from .gauge_walk import STEPS, gauge_walk
 def direct_cem_holes(
     mesh: HoledMesh,
     *,
-    tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1e-7,
-    max_iterations: Annotated[int, Field(ge=0)] = 100,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-7,
+    max_iterations: Annotated[int, Field(ge=0, le=1_000_000)] = 100,
     gauge: Gauge = "boundary",
-    outer: Annotated[int, Field(ge=0)] | None = None,
+    outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None,
     delaunay: bool = False,
 ) -> Parameterization:
     """Which circles, and which places on them, have the least conformal energy?

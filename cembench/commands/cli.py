@@ -1,9 +1,11 @@
-"""The command line. Exit code 0 if every asked cell ended ok, 1 if one did not, 2 on bad usage."""
+"""The command line. Exit code 0 if every asked cell ended ok, 1 if one did not, 2 on bad usage.
+
+Other codes (a closed pipe, a signal, a fault of cembench itself) are in
+:mod:`cembench.commands.ending`.
+"""
 
 from __future__ import annotations
 
-import io
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -12,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from rich.markup import escape
+from rich.text import Text
 
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
@@ -26,12 +28,26 @@ from cembench.commands.console import (
     assignments,
     complain,
     err,
+    note,
     out,
     print_json,
+    print_pair,
     registry_with,
     split,
 )
-from cembench.core.errors import CembenchError, ParameterError
+from cembench.commands.ending import Verbs, ending
+from cembench.commands.options import (
+    Faces,
+    Memory,
+    Parameters,
+    Plugins,
+    Repeats,
+    Seed,
+    Threads,
+    Timeout,
+    memory_bytes,
+)
+from cembench.core.errors import ParameterError
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
 
@@ -46,6 +62,7 @@ if TYPE_CHECKING:
     from cembench.running.plan import Task
 
 app = typer.Typer(
+    cls=Verbs,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -53,20 +70,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
 )
-Plugins = Annotated[
-    list[str],
-    typer.Option("--plugin", help="FILE.py or module:name with more algorithms. Repeatable."),
-]
-Parameters = Annotated[
-    list[str],
-    typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter. Repeatable."),
-]
-Threads = Annotated[int, typer.Option(min=1, help="Threads of the numerical libraries.")]
-Timeout = Annotated[float, typer.Option(min=0.1, help="Seconds that a call may take.")]
-Memory = Annotated[
-    str | None,
-    typer.Option(metavar="SIZE", help="Of a process, as 4GiB; default: 90 % of what is free."),
-]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
 
 
@@ -189,7 +192,7 @@ def map_(
     from cembench.running.local import Options, map_once
     from cembench.running.plan import How, plan_cells, read_mesh_for, standing_of_file
 
-    options = Options(timeout=timeout, memory_bytes=_memory_bytes(memory))
+    options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     registry = registry_with(plugin)
     chosen = registry.algorithm(algorithm)
     if output is not None:
@@ -225,7 +228,7 @@ def map_(
         _print_notices([surface])
         out.print(figures_table(record))
         for what, where in written.items():
-            out.print(f"[bold]{what}[/bold]  {escape(where)}")
+            print_pair(what, where)
         if ok and not written:
             out.print("Nothing was written; add -o FILE.obj to keep the map.", style="dim")
     if not ok:
@@ -254,7 +257,7 @@ def run(
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
     ] = [],  # noqa: B006
-    faces: Annotated[int | None, typer.Option(help="Triangles of the generated surfaces.")] = None,
+    faces: Faces = None,
     algorithms: Annotated[
         list[str],
         typer.Option(
@@ -265,10 +268,8 @@ def run(
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006
     plugin: Plugins = [],  # noqa: B006
-    repeats: Annotated[
-        int, typer.Option(min=1, help="Rounds; fewer than 6 give no interval.")
-    ] = DEFAULT_ROUNDS,
-    seed: Annotated[int, typer.Option(help="Of the random order within a round.")] = 0,
+    repeats: Repeats = DEFAULT_ROUNDS,
+    seed: Seed = 0,
     timeout: Timeout = 600.0,
     memory: Memory = None,
     solves: Annotated[
@@ -277,8 +278,9 @@ def run(
     backend: BackendOption = Backend.cvxopt,
     threads: Threads = 1,
     reference: Annotated[
-        str, typer.Option(help="The algorithm whose speedup over the others is told.")
-    ] = "cem",
+        str | None,
+        typer.Option(help="The algorithm whose speedup over the others is shown; default: cem."),
+    ] = None,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
     ] = Path("results/run"),
@@ -305,10 +307,11 @@ def run(
 
     run_folder.check(output)
     policies = _policies(solves)
-    options = Options(timeout, _memory_bytes(memory), fresh, rerun_failed, seed)
+    options = Options(timeout, memory_bytes(memory), fresh, rerun_failed, seed)
     registry = registry_with(plugin)
     usual = algorithms_of(profile, registry) if profile else list(registry.algorithms)
     chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
+    _check_reference(reference, chosen)
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
     files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
     generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
@@ -357,7 +360,7 @@ def reproduce(
 
     run_folder.check(output)
     folders.check(output / "report", "report")
-    options = Options(memory_bytes=_memory_bytes(None), fresh=fresh)
+    options = Options(memory_bytes=memory_bytes(None), fresh=fresh)
     registry = load_registry()
     surfaces = []
     names = surfaces_of(Profile.quick, registry)
@@ -382,6 +385,10 @@ def reproduce(
         raise typer.Exit(1)
 
 
+#: How `doctor` marks what is not ok, by whether it is required.
+_MARKS = {True: ("bad", "bold red"), False: ("--", "yellow")}
+
+
 @app.command(epilog="Example:  cembench doctor --json")
 def doctor(*, as_json: Json = False) -> None:
     """Is everything there that cembench needs? What is missing, and what brings it?"""
@@ -393,14 +400,11 @@ def doctor(*, as_json: Json = False) -> None:
         print_json([asdict(finding) for finding in findings])
     else:
         for finding in findings:
-            mark = (
-                "[green]ok[/green]  "
-                if finding.ok
-                else ("[bold red]bad[/bold red] " if finding.required else "[yellow]--[/yellow]  ")
-            )
-            out.print(f"{mark}{finding.name:<11}{escape(finding.detail)}", soft_wrap=True)
+            mark = ("ok", "green") if finding.ok else _MARKS[finding.required]
+            line = Text.assemble(mark).append(" " * (4 - len(mark[0])))
+            out.print(line.append(f"{finding.name:<11}{finding.detail}"), soft_wrap=True)
             if not finding.ok:
-                out.print(f"    {'':<11}{escape(finding.remedy)}", style="dim", soft_wrap=True)
+                out.print(f"    {'':<11}{finding.remedy}", style="dim", soft_wrap=True)
     if any(finding.required and not finding.ok for finding in findings):
         raise typer.Exit(1)
 
@@ -435,10 +439,20 @@ def _progress(cells: int) -> Iterator[PlainProgress]:
         yield progress
 
 
-def _present(records: list[Record], *, as_json: bool, where: Path, reference: str = "cem") -> None:
-    from cembench.report.render.terminal import results_table, speedups_table
-    from cembench.results.record_rows import rows
+def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None:
+    names = [algorithm.name for algorithm in chosen]
+    if reference is not None and reference not in names:
+        raise ParameterError(
+            f"--reference {reference!r} is not among the algorithms of this run: "
+            f"{', '.join(names)}."
+        )
 
+
+def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
+    from cembench.report.render.terminal import results_table, speedups_table
+    from cembench.results.record_rows import REFERENCE, rows
+
+    reference = reference or REFERENCE
     if as_json:
         print_json(rows(records, reference))
     else:
@@ -446,7 +460,7 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
         speedups = speedups_table(records, reference)
         if speedups is not None:
             out.print(speedups)
-        out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True, markup=False)
+        out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
     if any(record.outcome.status != "ok" for record in records):
         raise typer.Exit(1)
 
@@ -513,13 +527,13 @@ def _draw(mesh: TriangleMesh, uv: Any, picture: Path, record: Record) -> None:
     title = f"{record.cell.mesh}: {record.title}"
     drawn = write_preview(mesh, uv, picture, title=title, caption=caption)
     if drawn.notice:
-        err.print(f"note: {drawn.notice}", style="dim", markup=False, soft_wrap=True)
+        note(drawn.notice, style="dim")
 
 
 def _print_notices(meshes: Sequence[TriangleMesh]) -> None:
     for mesh in meshes:
         for notice in mesh.notices:
-            err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
+            note(f"{mesh.name}: {notice}")
 
 
 def _policies(given: list[str]) -> list[str]:
@@ -530,21 +544,6 @@ def _policies(given: list[str]) -> list[str]:
                 f"--solves {name!r} is unknown; allowed: reuse, backslash, or both with a comma."
             )
     return names or [Solves.reuse.value]
-
-
-def _memory_bytes(given: str | None) -> int:
-    import psutil
-    from pydantic import ByteSize, TypeAdapter, ValidationError
-
-    if given is None:
-        return int(0.9 * psutil.virtual_memory().available)
-    try:
-        size: int = TypeAdapter(ByteSize).validate_python(given)
-    except ValidationError:
-        raise ParameterError(
-            f"--memory {given!r} is no size; write a number with a unit, as 4GiB or 500MB."
-        ) from None
-    return size
 
 
 def _installed(backend: Backend) -> str:
@@ -564,8 +563,8 @@ def _facts(registry: Registry, *, measure: bool) -> dict[str, SurfaceFacts | Non
     for k, family in enumerate(todo, start=1):
         words = f"[{k}/{len(todo)}] {family.name}"
         if not err.is_terminal:
-            err.print(words, markup=False)
-        with err.status(escape(f"{words}: making, mapping, drawing"), spinner="line"):
+            err.print(words)
+        with err.status(f"{words}: making, mapping, drawing", spinner="line"):
             facts[family.name] = find_facts(registry, family)
     return facts
 
@@ -605,14 +604,9 @@ def _registry_as_json(
 
 
 def main() -> None:
-    """Run the command line; errors meant for the user are one line, without a traceback."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # names of files need not be text
-    try:
+    """Run the command line; :mod:`cembench.commands.ending` decides how it ends."""
+    with ending():
         app()
-    except CembenchError as error:
-        complain(str(error))
-        sys.exit(2)
 
 
 if __name__ == "__main__":

@@ -1,23 +1,70 @@
-"""What every verb of the command line shares: where it writes to, and how it says things."""
+"""What every verb of the command line shares: where it writes to, and how it says things.
+
+Data is shown as it is. A name, a title or a path may hold what looks like markup (``[/fast]``) or
+the control codes of a terminal: no string printed here is read as either. Styles are given as
+arguments or as :class:`rich.text.Text`, never inside a string.
+"""
 
 from __future__ import annotations
 
+import errno
 import json
 import sys
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
-from rich.console import Console
-from rich.markup import escape
+from rich.console import Console, ConsoleOptions, RenderableType
+from rich.segment import Segment
+from rich.status import Status
+from rich.text import Text
 
 from cembench.core.errors import ParameterError
 
 if TYPE_CHECKING:
     from cembench.registry import Registry
 
-out = Console(highlight=False)
-err = Console(stderr=True, highlight=False)
+#: Control codes become pictures of themselves; tabs and line ends stay.
+_VISIBLE = {code: 0x2400 + code for code in range(32) if chr(code) not in "\t\n"}
+_VISIBLE |= {0x7F: 0x2421} | dict.fromkeys(range(0x80, 0xA0), 0xFFFD)
+
+
+class PlainConsole(Console):
+    """A console that reads nothing in a string but its characters."""
+
+    def __init__(self, *, stderr: bool = False) -> None:
+        super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
+
+    def render(
+        self, renderable: RenderableType, options: ConsoleOptions | None = None
+    ) -> Iterable[Segment]:
+        """Yield the segments of what is printed, with control codes made visible."""
+        for segment in super().render(renderable, options):
+            if segment.control:
+                yield segment
+            else:
+                yield Segment(segment.text.translate(_VISIBLE), segment.style)
+
+    def status(self, status: RenderableType, **options: Any) -> Status:
+        """Return a spinner with these words."""
+        return _PlainStatus(_literal(status), console=self, **options)
+
+    def on_broken_pipe(self) -> NoReturn:
+        """Leave it to :func:`cembench.commands.ending.ending` how to end."""
+        raise BrokenPipeError(errno.EPIPE, "nobody reads the output")
+
+
+class _PlainStatus(Status):
+    def update(self, status: RenderableType | None = None, **options: Any) -> None:
+        super().update(None if status is None else _literal(status), **options)
+
+
+def _literal(words: RenderableType) -> RenderableType:
+    return Text(words) if isinstance(words, str) else words
+
+
+out = PlainConsole()
+err = PlainConsole(stderr=True)
 
 Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard output.")]
 
@@ -27,14 +74,24 @@ def print_json(data: Any) -> None:
     sys.stdout.write(json.dumps(data, indent=2) + "\n")
 
 
+def print_pair(name: str, value: object) -> None:
+    """Print a name in bold and what belongs to it, on one line however long."""
+    out.print(Text.assemble((name, "bold"), "  ", str(value)), soft_wrap=True)
+
+
 def complain(message: str) -> None:
     """Say on standard error what is wrong."""
-    err.print(f"error: {message}", style="bold red", markup=False, soft_wrap=True)
+    err.print(f"error: {message}", style="bold red", soft_wrap=True)
 
 
 def warn(message: str) -> None:
     """Say on standard error what the user should know."""
-    err.print(f"warning: {message}", style="yellow", markup=False, soft_wrap=True)
+    err.print(f"warning: {message}", style="yellow", soft_wrap=True)
+
+
+def note(message: str, style: str = "yellow") -> None:
+    """Say on standard error what is good to know."""
+    err.print(f"note: {message}", style=style, soft_wrap=True)
 
 
 def registry_with(plugins: Sequence[str]) -> Registry:
@@ -45,7 +102,7 @@ def registry_with(plugins: Sequence[str]) -> Registry:
         return load_registry()
     from cembench.running.plugins import load_with_plugins
 
-    with err.status(f"importing {escape(', '.join(plugins))}", spinner="line"):
+    with err.status(f"importing {', '.join(plugins)}", spinner="line"):
         return load_with_plugins(plugins)
 
 

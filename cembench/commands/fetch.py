@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.console import Json, complain, err, out, print_json
+from cembench.commands.options import LONGEST, finite
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars
@@ -24,7 +25,10 @@ def fetch(
         list[str] | None, typer.Argument(metavar="NAME", help="Which; none: list them all.")
     ] = None,
     *,
-    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds a server may be silent.")] = 60.0,
+    timeout: Annotated[
+        float,
+        typer.Option(min=0.1, max=LONGEST, callback=finite, help="Seconds a server may be silent."),
+    ] = 60.0,
     as_json: Json = False,
 ) -> None:
     """Fetch public surfaces, check them, and say where they lie.
@@ -123,7 +127,7 @@ def _shown(dataset: Dataset) -> Iterator[Progress | None]:
     from rich.progress import BarColumn, DownloadColumn, TextColumn
     from rich.progress import Progress as Bars
 
-    columns = (TextColumn("{task.description}"), BarColumn(20), DownloadColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(20), DownloadColumn())
     with Bars(*columns, console=err, transient=True) as bars:
         yield _Bar(bars, bars.add_task(f"fetching {dataset.name}", total=dataset.size))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.console import Json, complain, err, out, print_json
+from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
 
 if TYPE_CHECKING:
@@ -29,10 +30,15 @@ def holes(
     ] = [STAND_IN],  # noqa: B006 - typer copies defaults
     *,
     outer: Annotated[
-        int | None, typer.Option(help="A vertex of the outer boundary; default: the longest.")
+        int | None,
+        typer.Option(
+            min=0, max=2**63 - 1, help="A vertex of the outer boundary; default: the longest."
+        ),
     ] = None,
-    sweeps: Annotated[int, typer.Option(min=1, help="The most sweeps that are tried.")] = 8,
-    faces: Annotated[int | None, typer.Option(help="Triangles of a generated surface.")] = None,
+    sweeps: Annotated[
+        int, typer.Option(min=1, max=1000, help="The most sweeps that are tried.")
+    ] = 8,
+    faces: Faces = None,
     run: Annotated[
         Path, typer.Option("--run", "-o", "--output", help="The run that gets the exhibits.")
     ] = DEFAULT_RUN,

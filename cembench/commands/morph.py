@@ -14,11 +14,14 @@ from cembench.commands.console import (
     assignments,
     complain,
     err,
+    note,
     out,
     print_json,
+    print_pair,
     registry_with,
     split,
 )
+from cembench.commands.options import Faces, Parameters, Plugins, Timeout, finite
 from cembench.core.errors import AlgorithmFailed, MeshError, ParameterError
 
 if TYPE_CHECKING:
@@ -59,20 +62,29 @@ def morph(
     algorithm: Annotated[
         str, typer.Option("-a", "--algorithm", help="Any with target disk.")
     ] = "cem",
-    parameter: Annotated[
-        list[str],
-        typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Of the algorithm."),
-    ] = [],  # noqa: B006
+    parameter: Parameters = [],  # noqa: B006
     lam: Annotated[
-        float, typer.Option("--lambda", min=1e-6, help="Weight of the landmarks in (34).")
+        float,
+        typer.Option(
+            "--lambda",
+            min=1e-6,
+            max=1e12,
+            callback=finite,
+            help="Weight of the landmarks in (34).",
+        ),
     ] = 100.0,
     reach: Annotated[
         float,
         typer.Option(
-            min=0, max=1, help="Radius of a landmark, in its distance to the next; 0: a vertex."
+            min=0,
+            max=1,
+            callback=finite,
+            help="Radius of a landmark, in its distance to the next; 0: a vertex.",
         ),
     ] = 0.4,
-    frames: Annotated[int, typer.Option(min=2, help="Of the whole path; 24 a second.")] = 48,
+    frames: Annotated[
+        int, typer.Option(min=2, max=100_000, help="Of the whole path; 24 a second.")
+    ] = 48,
     views: Annotated[
         str, typer.Option(help="Of a film, with commas.")
     ] = "front,side,three-quarter",
@@ -80,14 +92,12 @@ def morph(
     pose: Annotated[
         Pose, typer.Option(help="Turn, move and scale the later surfaces to the first; or not.")
     ] = Pose.similarity,
-    faces: Annotated[int | None, typer.Option(help="Triangles of generated surfaces.")] = None,
+    faces: Faces = None,
     run: Annotated[
         Path | None, typer.Option("--run", help="Lay pictures and figures into this run's folder.")
     ] = None,
-    plugin: Annotated[
-        list[str], typer.Option("--plugin", help="FILE.py or module:name with more algorithms.")
-    ] = [],  # noqa: B006
-    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds that a map may take.")] = 600.0,
+    plugin: Plugins = [],  # noqa: B006
+    timeout: Timeout = 600.0,
     force: Annotated[bool, typer.Option("--force", help="Write over the surfaces read.")] = False,
     as_json: Json = False,
 ) -> None:
@@ -122,7 +132,7 @@ def morph(
         with err.status(f"reading {name}", spinner="line"):
             mesh, named = _surface(registry, name, faces)
         for notice in mesh.notices:
-            err.print(f"note: {mesh.name}: {notice}", style="yellow", markup=False, soft_wrap=True)
+            note(f"{mesh.name}: {notice}")
         meshes.append(mesh)
         known.append(named)
     if landmarks is None or str(landmarks) == "none":
@@ -172,7 +182,7 @@ def morph(
         return
     _print(figures, places.names)
     for path in written:
-        out.print(f"[bold]written[/bold]  {path}", soft_wrap=True)
+        print_pair("written", path)
     if not written:
         out.print("Nothing was written; add -o FILM.gif to see it.", style="dim")
 
@@ -267,7 +277,7 @@ def _write(
             film = Film.of(first, found.stops, times, views, size)
             pictures, notice = draw_film(film, tell)
             if notice:
-                err.print(f"note: {notice}", style="dim", markup=False, soft_wrap=True)
+                note(notice, style="dim")
             for path in films:
                 writers.write_film(path, pictures)
             seconds["film"] = perf_counter() - started
@@ -294,9 +304,9 @@ def _lay_down(
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """The figures in words."""
-    out.print(f"[bold]landmarks[/bold]  {', '.join(landmarks) or 'none: aligned by curvature'}")
+    print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     for row in figures["registrations"]:
-        out.print(f"\n[bold]{row['surface']}[/bold]")
+        out.print(f"\n{row['surface']}", style="bold")
         steps = len(row["lambdas"])
         lines = {
             "lambda": f"{figures['lambda']:g}"
@@ -316,7 +326,7 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
         }
         for name, words in lines.items():
             out.print(f"  {name:<17} {words}", markup=False)
-    out.print("\n[bold]path[/bold]")
+    out.print("\npath", style="bold")
     out.print(f"  acceleration      {figures['largest_acceleration_share']:.3f} sizes at most")
     out.print(
         f"  step              {figures['largest_step_share']:.4f} sizes at most "

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.console import Json, err, out, print_json
+from cembench.commands.options import Verify
 from cembench.commands.run import DEFAULT_RUN, Run
 
 if TYPE_CHECKING:
@@ -20,25 +21,32 @@ Output = Annotated[
 ]
 
 
-def report(run: Run = DEFAULT_RUN, *, output: Output = None, as_json: Json = False) -> None:
+def report(
+    run: Run = DEFAULT_RUN, *, output: Output = None, verify: Verify = False, as_json: Json = False
+) -> None:
     """Write the paper's tables, figures and claims as a run measured them.
 
     The folder holds index.html (one file that works offline), report.md, report.tex, and every
     table, figure and its data as files of their own. The four tables are shown here.
     """
-    written, folder = make_report(run, output)
+    written, folder = make_report(run, output, verify=verify)
     if as_json:
         print_json(summary(written, folder))
     else:
         show_report(written, folder)
 
 
-def make_report(run: Path, output: Path | None, command: str = "") -> tuple[Report, Path]:
+def make_report(
+    run: Path, output: Path | None, command: str = "", *, verify: bool = False
+) -> tuple[Report, Path]:
     """Write a report, telling how far it is on standard error; the report and its folder."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from cembench.report.write_report import write_report
+    from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records
 
+    sound_records(Store(run), Depth.everything if verify else Depth.sample)
     folder = output or run / "report"
     told = f"cembench report {run}" + (f" -o {output}" if output else "")
     bar = Progress(

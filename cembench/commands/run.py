@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cembench.commands.console import Json, out, print_json, warn
+from cembench.commands.console import Json, complain, note, out, print_json, print_pair, warn
+from cembench.commands.options import Verify
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.outputs import refuse_inputs
 from cembench.report.export import Format
@@ -21,15 +22,23 @@ Run = Annotated[Path, typer.Argument(help="A run's folder.")]
 DEFAULT_RUN = Path("results/run")
 
 
-def status(run: Run = DEFAULT_RUN, *, as_json: Json = False) -> None:
-    """How far is a run, and what did not end ok?"""
-    from cembench.report.render.terminal import status_style
+def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = False) -> None:
+    """How far is a run, what did not end ok, and what was changed since it was measured?
+
+    The exit code is 1 if a record or a map no longer agrees with what was written down of it.
+    """
     from cembench.results.store import Store
+    from cembench.results.verify import Depth, Kind
+    from cembench.results.verify import verify as verify_run
 
     store = _existing(Store(run))
-    held = {record.cell.label: record for record in store.finished()}
+    verified = verify_run(store, Depth.everything if verify else Depth.sample)
+    held = {record.cell.label: record for record in verified.records}
+    damaged = {f.file.stem for f in verified.findings if f.kind is Kind.damaged} - held.keys()
     asked = store.plan() or [record.cell for record in held.values()]
     states = {cell.label: _state(store, held.get(cell.label), cell) for cell in asked}
+    states |= dict.fromkeys(damaged & states.keys(), "damaged")
+    shown = verified.findings if verify else verified.disagreements
     others = [record for label, record in held.items() if label not in states]
     about: dict[str, Any] = {
         "run": str(run),
@@ -41,19 +50,46 @@ def status(run: Run = DEFAULT_RUN, *, as_json: Json = False) -> None:
             {"key": c.key, "mesh": c.mesh, "algorithm": c.algorithm, "state": states[c.label]}
             for c in asked
         ],
+        "findings": [
+            {"record": f.file.name, "kind": f.kind, "disagrees": f.disagrees, "detail": f.detail}
+            for f in shown
+        ],
     }
     if as_json:
         print_json(about)
-        return
-    out.print("a run measures into it now" if about["measuring"] else "no run measures into it")
+    else:
+        _show_status(about, others, [(cell, states[cell.label]) for cell in asked])
+    if verified.disagreements:
+        for finding in verified.disagreements:
+            complain(str(finding))
+        raise typer.Exit(1)
+
+
+def _show_status(
+    about: dict[str, Any], others: list[Record], cells: list[tuple[Cell, str]]
+) -> None:
+    from cembench.report.render.terminal import status_style
+
+    out.print(_MEASURING[about["measuring"]])
     for state, count in sorted(about["states"].items(), key=lambda item: -item[1]):
         out.print(f"{count:>6}  {state}", style=status_style(state) if state == "ok" else "")
     if others:
         out.print(f"{len(others):>6}  recorded besides, not asked for last")
-    for cell in asked:
-        if states[cell.label] not in ("ok", "waiting"):
-            line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {states[cell.label]}"
-            out.print(line, markup=False, soft_wrap=True)
+    for cell, state in cells:
+        if state not in ("ok", "waiting"):
+            line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {state}"
+            out.print(line, soft_wrap=True)
+    for finding in about["findings"]:
+        if not finding["disagrees"]:
+            note(f"{finding['record']}: {finding['detail']}")
+
+
+#: Whether a run is writing to the folder, in words; None where the lock cannot be opened.
+_MEASURING = {
+    True: "a run is writing to this folder",
+    False: "no run is writing to this folder",
+    None: "whether a run is writing to this folder cannot be told: it is read-only",
+}
 
 
 def show(
@@ -63,27 +99,40 @@ def show(
     as_json: Json = False,
 ) -> None:
     """All that is recorded of a cell."""
-    from cembench.report.render.terminal import figures_table
     from cembench.results.record_rows import row
     from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records, verify_map
 
-    found = _chosen(Store(run).records(), cell)
+    store = Store(run)
+    found = _chosen(sound_records(store, Depth.records), cell)
+    findings = [f for record in found for f in verify_map(store, store.record_file(record), record)]
     if as_json:
         print_json([row(record) for record in found])
-        return
+    else:
+        _show_records(found)
+    wrong = [finding for finding in findings if finding.disagrees]
+    for finding in wrong:
+        complain(str(finding))
+    if wrong:
+        raise typer.Exit(1)
+
+
+def _show_records(found: list[Record]) -> None:
+    from cembench.report.render.terminal import figures_table
+
     for record in found:
         outcome = record.outcome
-        out.print(f"[bold]{outcome.status}[/bold]  {record.cell.solves}  {record.cell.key[:12]}")
+        print_pair(outcome.status, f"{record.cell.solves}  {record.cell.key[:12]}")
         out.print(figures_table(record))
         for number, r in enumerate(outcome.rounds, start=1):
             calls = " ".join(f"{seconds:.4f}" for seconds in r.calls)
-            out.print(f"round {number:<3} {r.started_at}  {calls}", markup=False)
+            out.print(f"round {number:<3} {r.started_at}  {calls}")
         for words in (outcome.cause, outcome.traceback):
             if words:
-                out.print(words, markup=False, soft_wrap=True)
+                out.print(words, soft_wrap=True)
 
 
-def compare(before: Run, after: Run, *, as_json: Json = False) -> None:
+def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = False) -> None:
     """What became faster or slower from one run to another?
 
     The interval holds what each run's rounds show; that the machine was in another state in the
@@ -94,9 +143,11 @@ def compare(before: Run, after: Run, *, as_json: Json = False) -> None:
     from cembench.report.render.terminal import changes_table
     from cembench.results.comparison import compare_runs, machine_differences
     from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records
 
     old, new = Store(before), Store(after)
-    changes = compare_runs(old.records(), new.records())
+    depth = Depth.everything if verify else Depth.records
+    changes = compare_runs(sound_records(old, depth), sound_records(new, depth))
     if not changes:
         raise RecordError(
             f"{before} and {after} have no timed cell in common: the same algorithm with the same "
@@ -135,6 +186,7 @@ def merge(
     force: Annotated[
         bool, typer.Option("--force", help="Also if the output is one of the runs.")
     ] = False,
+    verify: Verify = False,
     as_json: Json = False,
 ) -> None:
     """Bring the records of several runs together in one folder.
@@ -143,15 +195,22 @@ def merge(
     """
     from cembench.results.store import Store
     from cembench.results.store import merge as merged
+    from cembench.results.verify import Depth, sound_records
 
     refuse_inputs(output, runs, force=force)
     into = Store(output)
-    count = merged([Store(run) for run in runs], into)
+    depth = Depth.everything if verify else Depth.sample
+    for run in runs:
+        sound_records(Store(run), depth)
+    if (output / "records").is_dir():
+        sound_records(into, depth)
+    with into.locked():
+        count = merged([Store(run) for run in runs], into)
     machines = sorted({record.environment for record in into.records()})
     if as_json:
         print_json({"output": str(output), "cells": count, "environments": machines})
     else:
-        out.print(f"{count} cells in {output}", markup=False, soft_wrap=True)
+        out.print(f"{count} cells in {output}", soft_wrap=True)
     if len(machines) > 1:
         warn(f"measured in {len(machines)} environments; only ratios of one sitting compare")
 
@@ -163,6 +222,7 @@ def export(
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="The file; default: RUN/rows.FORMAT.")
     ] = None,
+    verify: Verify = False,
     as_json: Json = False,
 ) -> None:
     """Write all records of a run as one table, a row a cell."""
@@ -170,16 +230,17 @@ def export(
     from cembench.results.record_rows import rows
     from cembench.results.run_folder import is_own
     from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records
 
     path = output or run / f"rows.{form.value}"
     if is_own(run, path):
         raise ParameterError(f"-o {path} is a part of the run itself; name another file.")
-    found = rows(Store(run).records())
+    found = rows(sound_records(Store(run), Depth.everything if verify else Depth.records))
     export_rows(found, path, form)
     if as_json:
         print_json({"output": str(path), "rows": len(found)})
     else:
-        out.print(f"{len(found)} rows in {path}", markup=False, soft_wrap=True)
+        out.print(f"{len(found)} rows in {path}", soft_wrap=True)
 
 
 def _existing(store: Store) -> Store:

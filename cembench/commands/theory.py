@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.console import Json, err, out, print_json
+from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
 
 if TYPE_CHECKING:
@@ -30,9 +31,9 @@ def theory(
     ],
     *,
     iterations: Annotated[
-        int, typer.Option(min=20, help="Of the bare iterations (23) and (30).")
+        int, typer.Option(min=20, max=1_000_000, help="Of the bare iterations (23) and (30).")
     ] = 200,
-    faces: Annotated[int | None, typer.Option(help="Triangles of a generated surface.")] = None,
+    faces: Faces = None,
     run: Annotated[
         Path, typer.Option("--run", "-o", "--output", help="The run that gets the exhibits.")
     ] = DEFAULT_RUN,
@@ -81,6 +82,8 @@ def _examine(
     )
     from cembench.workflows.theory_plot import write_theory_plot
 
+    name = f"theory-{mesh.name}"
+    folder = exhibit_folder(run, name)  # complains now of what it could not write in the end
     K = BoundaryOperator(mesh)
     dense = K.size <= DENSE
     paths = {
@@ -110,8 +113,6 @@ def _examine(
         "rises_30": _rises(inverse),
         "energies": _energies(paths, others),
     }
-    name = f"theory-{mesh.name}"
-    folder = exhibit_folder(run, name)
     write_theory_plot(
         folder / "theory.png",
         f"{mesh.name}: {mesh.n:,} vertices, {K.size} on the boundary",
@@ -225,6 +226,7 @@ def _tables(given: list[Check], said: list[Check], energies: list[dict[str, Any]
 
 def _show(facts: dict[str, Any], exhibit: Exhibit, run: Path) -> None:
     from rich.table import Table as Grid
+    from rich.text import Text
 
     from cembench.results.exhibits import place_of
 
@@ -236,10 +238,10 @@ def _show(facts: dict[str, Any], exhibit: Exhibit, run: Path) -> None:
         grid.add_column("")
         grid.add_column("figure", justify="right", no_wrap=True)
         for check in facts[part]:
-            mark = "[green]ok[/green]" if check["holds"] else "[bold red]NO[/bold red]"
+            mark = Text("ok", style="green") if check["holds"] else Text("NO", style="bold red")
             figure = check["figure"]
             grid.add_row(
-                f"{check['name']}  [dim]{check['source']}[/dim]",
+                Text.assemble(check["name"], "  ", (check["source"], "dim")),
                 mark,
                 str(figure) if isinstance(figure, int) else f"{figure:.3g}",
             )

@@ -14,6 +14,7 @@ import typer
 from rich.markup import escape
 
 from cembench.commands.console import Json, assignments, err, out, print_json, split
+from cembench.commands.options import MOST_FACES, Parameters, Repeats, Timeout
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
 from cembench.validation.verdict import Requirement
@@ -45,16 +46,18 @@ def validate(
     mesh_dir: Annotated[list[Path], typer.Option(help="Compare on a folder's files.")] = [],  # noqa: B006
     faces: Annotated[
         int | None,
-        typer.Option(min=24, help="Triangles of a named surface; unnamed ones have 5,000."),
+        typer.Option(
+            min=24, max=MOST_FACES, help="Triangles of a named surface; unnamed ones have 5,000."
+        ),
     ] = None,
-    repeats: Annotated[int, typer.Option(min=1, help="Rounds of timing.")] = DEFAULT_ROUNDS,
+    repeats: Repeats = DEFAULT_ROUNDS,
     up_to: Annotated[
-        int, typer.Option(min=0, help="Triangles up to which growth is measured; 0: not.")
+        int,
+        typer.Option(
+            min=0, max=MOST_FACES, help="Triangles up to which growth is measured; 0: not."
+        ),
     ] = 30_000,
-    parameter: Annotated[
-        Names,
-        typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set one. Repeatable."),
-    ] = [],  # noqa: B006
+    parameter: Parameters = [],  # noqa: B006
     require: Annotated[
         list[Requirement],
         typer.Option(
@@ -66,7 +69,7 @@ def validate(
     checks_only: Annotated[
         bool, typer.Option("--checks-only", help="Contract and correctness, no timing.")
     ] = False,
-    timeout: Annotated[float, typer.Option(min=0.1, help="Seconds that a call may take.")] = 120.0,
+    timeout: Timeout = 120.0,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", help="Keep JSON, HTML and the runs in this folder."),

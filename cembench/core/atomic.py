@@ -18,9 +18,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, TypeVar, cast
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, TypeAdapter
 
 from cembench.core.errors import CembenchError, RecordError
+from cembench.core.loading import read_json
 from cembench.core.names import digest
 
 M = TypeVar("M", bound=BaseModel)
@@ -34,13 +35,8 @@ _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 def read_model(path: Path, model: type[M]) -> M:
     """Read what :func:`write_model` wrote; :class:`RecordError` says which file is damaged."""
-    try:
-        return model.model_validate_json(path.read_bytes())
-    except ValidationError as error:
-        raise RecordError(
-            f"{path} is not a {model.__name__.lower()}: {error.errors()[0]['msg']}. "
-            "Delete it and run again."
-        ) from error
+    noun = model.__name__.lower()
+    return read_json(path, TypeAdapter(model), f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}")
 
 
 def write_model(path: Path, model: BaseModel) -> None:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict
 
 from cembench.core.atomic import read_model, unwritable, write_model
 from cembench.core.errors import RecordError
+from cembench.core.loading import files_in, is_there
 from cembench.core.names import file_name
 from cembench.results import run_folder
 from cembench.results.records import MeshOrigin, Printable
@@ -115,5 +116,5 @@ def read_exhibits(run: Path) -> list[Exhibit]:
         A description that cannot be read.
 
     """
-    paths = sorted((run / FOLDER).glob(f"*/{_DESCRIPTION}"))
-    return [read_model(path, Exhibit) for path in paths]
+    described = [folder / _DESCRIPTION for folder in files_in(run / FOLDER, "*")]
+    return [read_model(path, Exhibit) for path in described if is_there(path)]

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from math import inf
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -36,6 +37,21 @@ Printable = Annotated[str, BeforeValidator(_escaped)]
 
 Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
 
+#: A number that a file may hold: larger ones are no counts, and no float holds them.
+Count = Annotated[int, Field(ge=0, lt=2**63)]
+Positive = Annotated[int, Field(ge=1, lt=2**63)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+#: A timed call: no clock shows that it took no time, and no ratio can be formed with one that did.
+CallSeconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Whole = Annotated[int, Field(gt=-(2**63), lt=2**63)]
+#: Infinity is null.
+Figure = Annotated[
+    Whole | Finite | None, BeforeValidator(lambda v: None if v in (inf, -inf) else v)
+]
+#: Part of the name of a file in the run's folder: never a way out of it.
+NamePart = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=128)]
+
 
 class Cell(BaseModel):
     """One thing to measure; cells with equal content have equal keys and are measured once."""
@@ -48,12 +64,12 @@ class Cell(BaseModel):
     #: (see :mod:`cembench.running.sources`): an edited plug-in is a new cell.
     code_hash: str
     mesh: Printable
-    mesh_hash: str
+    mesh_hash: NamePart
     solves: str = "reuse"
     backend: str = "cvxopt"
-    threads: int = 1
+    threads: Positive = 1
     #: Rounds, each a fresh process; see docs/measuring.md.
-    repeats: int = DEFAULT_ROUNDS
+    repeats: Positive = DEFAULT_ROUNDS
 
     @property
     def key(self) -> str:
@@ -114,10 +130,10 @@ class Fault(BaseModel):
 class MeshFacts(BaseModel):
     """What a table says of a surface beside its name."""
 
-    vertices: int
-    faces: int
-    boundary_vertices: int
-    non_delaunay_share: float
+    vertices: Count
+    faces: Count
+    boundary_vertices: Count
+    non_delaunay_share: Annotated[float, Field(ge=0, le=1)]
     notices: tuple[str, ...] = ()
     #: The model of the paper's Table 1 that it is ("model") or stands for ("stand-in"), if any.
     paper_row: str = ""
@@ -131,9 +147,9 @@ class Round(BaseModel):
     sitting: str = ""
     started_at: str = ""
     #: Wall-clock seconds of each timed call after the warm-up, in order.
-    calls: tuple[float, ...]
+    calls: Annotated[tuple[CallSeconds, ...], Field(min_length=1)]
     #: Seconds by phase of the call that is the round's figure; they add up to it.
-    phases: dict[str, float] = Field(default_factory=dict)
+    phases: dict[str, Seconds] = Field(default_factory=dict)
     #: SHA-256 of the last call's map.
     uv_hash: str | None = None
     #: Of each timed call, whether its map has the same bits as the checked one.
@@ -176,17 +192,17 @@ class Outcome(BaseModel):
     #: In order; empty where no call was timed.
     rounds: tuple[Round, ...] = ()
     #: Figures computed by the harness (cembench.conformal.metrics); null where infinite.
-    metrics: dict[str, float | int | None] = Field(default_factory=dict)
+    metrics: dict[str, Figure] = Field(default_factory=dict)
     #: Of a surface with holes: the circles of its boundaries, the outer one first.
     boundaries: tuple[Boundary, ...] = ()
-    iterations: int | None = None
+    iterations: Count | None = None
     energy_history: tuple[float, ...] = ()
     extras: dict[str, Any] = Field(default_factory=dict)
     uv_hash: str | None = None
     #: Largest resident set up to the end of one call, mesh and libraries included.
-    peak_memory_bytes: int | None = None
+    peak_memory_bytes: Count | None = None
     #: The same, less the resident set before the call.
-    memory_increase_bytes: int | None = None
+    memory_increase_bytes: Whole | None = None
     #: What the user should know of the measurement.
     notes: tuple[str, ...] = ()
 
@@ -229,8 +245,41 @@ class Record(BaseModel):
     target: str
     mesh: MeshFacts
     outcome: Outcome
-    environment: str
+    environment: NamePart
     started_at: str
     #: SHA-256 of the files that `cell.code_hash` is made of, by their paths relative to the folder
     #: or package of the file that declares the algorithm; empty in records older than this field.
     sources: dict[str, str] = Field(default_factory=dict)
+
+
+class Environment(BaseModel):
+    """What a report uses of the facts about a machine; there may be others, and none need be."""
+
+    model_config = ConfigDict(extra="allow")
+
+    cpu: str | None = None
+    cores: Count | None = None
+    memory_bytes: Count | None = None
+    libraries: dict[str, str | None] = Field(default_factory=dict)
+    git: dict[str, Any] | None = None
+
+
+def signed(record: Record) -> bytes:
+    """Return a record as JSON that also holds the digest of the rest of itself."""
+    content = json.loads(record.model_dump_json())
+    text = json.dumps(content | {"digest": digest(content)}, indent=2, ensure_ascii=False)
+    return text.encode()
+
+
+def is_as_written(content: Mapping[str, Any]) -> bool | None:
+    """Whether a record's JSON still has its digest; None for one that never had any."""
+    return content["digest"] == digest(content) if "digest" in content else None
+
+
+def digest(content: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of a record's content, a "digest" in it left out.
+
+    It is taken of the JSON, not of the model: a later schema with more fields finds it unchanged.
+    """
+    rest = {name: value for name, value in content.items() if name != "digest"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True).encode()).hexdigest()

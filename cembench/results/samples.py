@@ -17,6 +17,7 @@ from pydantic import BaseModel, ValidationError
 
 from cembench.core.atomic import unwritable, write
 from cembench.core.errors import RecordError
+from cembench.core.loading import damaged, is_there, read_arrays, read_bytes
 from cembench.results.records import Outcome, Round
 
 
@@ -62,9 +63,9 @@ class Samples:
         return self.journal.with_suffix(".npz")
 
     def _entries(self) -> list[Entry]:
-        if not self.journal.exists():
+        if not is_there(self.journal):
             return []
-        lines = _whole_lines(self.journal.read_bytes()).splitlines()
+        lines = _whole_lines(read_bytes(self.journal)).splitlines()
         try:
             return [Entry.model_validate_json(line) for line in lines]
         except ValidationError as error:
@@ -89,7 +90,9 @@ def _whole_lines(text: bytes) -> bytes:
 
 def read_map(path: Path) -> NDArray[np.complex128] | None:
     """A map (n,) that was kept as ``uv`` in an archive; None where there is none."""
-    if not path.exists():
+    if not is_there(path):
         return None
-    with np.load(path) as archive:
-        return np.asarray(archive["uv"])
+    uv = read_arrays(path, ["uv"])["uv"]
+    if uv.ndim != 1 or uv.dtype != np.complex128:
+        raise damaged(path, "a map", f"its uv is {uv.dtype} {uv.shape}, not complex128 (n,)")
+    return uv

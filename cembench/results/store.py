@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -39,15 +38,22 @@ from cembench.core.atomic import (
     unwritable,
     write,
     write_bytes,
-    write_model,
     write_text,
 )
 from cembench.core.errors import RecordError
 from cembench.core.folders import is_empty_file
+from cembench.core.loading import damaged, files_in, is_there, read_arrays, read_bytes, read_json
 from cembench.core.names import file_name
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results import run_folder
-from cembench.results.records import SCHEMA_VERSION, Cell, Record
+from cembench.results.records import (
+    SCHEMA_VERSION,
+    Cell,
+    Environment,
+    Record,
+    is_as_written,
+    signed,
+)
 from cembench.results.samples import Samples, read_map
 
 
@@ -58,9 +64,24 @@ class Store:
         self.folder = folder
 
     def find(self, cell: Cell) -> Record | None:
-        """What was recorded of this cell, if anything, under whatever name its mesh had?"""
+        """Return what was recorded of this cell, if anything, under whatever name its mesh had.
+
+        Raises
+        ------
+        RecordError
+            The record is damaged, or was changed since: a run would go on from it, and sign it.
+
+        """
         path = self._found(self._record_path(cell), cell)
-        return None if path is None else _read_record(path)
+        if path is None:
+            return None
+        record = read_record(path)
+        if is_as_written(json.loads(read_bytes(path))) is False:
+            raise RecordError(
+                f"{path} was changed after it was written: its digest differs. Delete it and run "
+                "again."
+            )
+        return record
 
     def rename(self, record: Record, cell: Cell, *, keep: bool) -> Record:
         """Record the same under the name that the cell's mesh has now; with `keep` also as it was.
@@ -87,16 +108,24 @@ class Store:
             The folder holds no run, or a record is damaged or of another schema.
 
         """
-        if not (self.folder / "records").is_dir():
+        self.check_is_run()
+        return self.finished()
+
+    def check_is_run(self) -> None:
+        """Raise :class:`RecordError` where the folder holds no run."""
+        if not is_there(self.folder / "records"):
             raise RecordError(
                 f"{self.folder} holds no run: there is no folder {self.folder / 'records'}. "
                 "Make one with `cembench run`."
             )
-        return self.finished()
 
     def finished(self) -> list[Record]:
         """As :meth:`records`, but none where no cell is finished yet."""
-        return [_read_record(path) for path in sorted((self.folder / "records").glob("*.json"))]
+        return [read_record(path) for path in self.record_files()]
+
+    def record_files(self) -> list[Path]:
+        """Return the files of all records, by name."""
+        return files_in(self.folder / "records", "*.json")
 
     def save(
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
@@ -110,7 +139,8 @@ class Store:
         else:
             self._map_path(record.cell).unlink(missing_ok=True)
         path = self._record_path(record.cell)
-        write_model(path, record)
+        text = signed(record)
+        write(path, lambda file: file.write(text))
         for folder in (self._map_path(record.cell).parent, path.parent):
             if folder.exists():
                 flush_folder(folder)
@@ -137,16 +167,17 @@ class Store:
             The file is damaged, or holds another surface.
 
         """
-        path = self._mesh_path(cell.mesh_hash)
-        if not path.exists():
+        path = self.mesh_file(cell)
+        if not is_there(path):
             return None
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                mesh = TriangleMesh(data["V"], data["F"].astype(np.int64), str(data["name"]))
-        except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise RecordError(
-                f"{path} cannot be read ({error}). Delete it and run again."
-            ) from error
+        data = read_arrays(path, ("V", "F", "name"))
+        V, F = data["V"], data["F"]
+        if V.dtype != np.float64 or F.dtype.kind not in "iu" or V.shape[1:] + F.shape[1:] != (3, 3):
+            why = f"V is {V.dtype} {V.shape}, F {F.dtype} {F.shape}; both have three columns"
+            raise damaged(path, "a surface", why)
+        if not np.isfinite(V).all() or not len(F) or F.min() < 0 or F.max() >= len(V):
+            raise damaged(path, "a surface", "a coordinate or a corner is out of range")
+        mesh = TriangleMesh(V, F.astype(np.int64), str(data["name"]))
         if mesh.hash != cell.mesh_hash:
             raise RecordError(f"{path} holds another surface than its name says; delete it.")
         return mesh
@@ -158,7 +189,7 @@ class Store:
 
     def rounds_done(self, cell: Cell) -> int | None:
         """How many rounds of an unfinished cell are kept? None where it was not begun."""
-        journals = (self.folder / "samples" / cell.label).glob("*.jsonl")
+        journals = files_in(self.folder / "samples" / cell.label, "*.jsonl")
         return max((len(Samples(journal).rounds()) for journal in journals), default=None)
 
     def forget_samples(self, cell: Cell) -> None:
@@ -173,12 +204,15 @@ class Store:
     def plan(self) -> list[Cell]:
         """The cells that were last asked for; none where no plan was kept."""
         path = self.folder / run_folder.PLAN
-        return run_folder.CELLS.validate_json(path.read_bytes()) if path.exists() else []
+        return read_json(path, run_folder.CELLS, "a plan") if is_there(path) else []
 
     def environments(self) -> dict[str, dict[str, Any]]:
         """What is known of the machines, by id."""
-        paths = sorted((self.folder / "environments").glob("*.json"))
-        return {path.stem: json.loads(path.read_bytes()) for path in paths}
+        paths = files_in(self.folder / "environments", "*.json")
+        return {
+            path.stem: read_model(path, Environment).model_dump(exclude_unset=True)
+            for path in paths
+        }
 
     @contextmanager
     def locked(self, waiting: Callable[[], None] = lambda: None) -> Iterator[Path]:
@@ -218,8 +252,8 @@ class Store:
         finally:
             lock.release()
 
-    def is_locked(self) -> bool:
-        """Is somebody measuring into this folder now?"""
+    def is_locked(self) -> bool | None:
+        """Whether somebody is measuring into this folder now; None if it is read-only for us."""
         if not is_empty_file(lock_path(self.folder)):
             return False  # opening it would empty it
         try:
@@ -227,6 +261,8 @@ class Store:
                 return False
         except Timeout:
             return True
+        except OSError:
+            return None
 
     def _lock(self) -> FileLock:
         return FileLock(lock_path(self.folder))
@@ -239,6 +275,18 @@ class Store:
         if path.exists():
             return path
         return min(path.parent.glob(f"*--{cell.key[:12]}{path.suffix}"), default=None)
+
+    def record_file(self, record: Record) -> Path:
+        """Return where a record lies."""
+        return self._record_path(record.cell)
+
+    def map_file(self, cell: Cell) -> Path:
+        """Return where a cell's map lies, if one was kept."""
+        return self._map_path(cell)
+
+    def mesh_file(self, cell: Cell) -> Path:
+        """Return where a cell's surface lies, if it was kept."""
+        return self._mesh_path(cell.mesh_hash)
 
     def _record_path(self, cell: Cell) -> Path:
         return self.folder / "records" / f"{cell.label}.json"
@@ -279,7 +327,8 @@ def lock_path(folder: Path) -> Path:
     return folder / run_folder.LOCK
 
 
-def _read_record(path: Path) -> Record:
+def read_record(path: Path) -> Record:
+    """Return the record that a file holds; :class:`RecordError` says what is wrong with it."""
     record = read_model(path, Record)
     if record.schema_version != SCHEMA_VERSION:
         raise RecordError(

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from cembench.core.errors import RecordError
 from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, not_ok
 from cembench.results.samples import Samples
 from cembench.results.store import Store
@@ -113,10 +114,22 @@ def map_once(
     """Call once in a process of its own, without warm-up, and keep nothing on disk.
 
     The map is given if it has the right shape and is finite.
+
+    Raises
+    ------
+    RecordError
+        The temporary folder is full, or cannot be written to.
+
     """
     started = _now()
-    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
-        outcome, uv = Launcher(Path(folder), options or Options()).check(task)
+    try:
+        with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
+            outcome, uv = Launcher(Path(folder), options or Options()).check(task)
+    except OSError as error:
+        raise RecordError(
+            f"the temporary folder cannot be used: {error.strerror or error}. Make room in it, or "
+            "set TMPDIR to another."
+        ) from error
     return _record(task, outcome, describe_environment()["id"], started), uv
 
 

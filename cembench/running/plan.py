@@ -230,7 +230,7 @@ def surface_named(registry: Registry, name: str, kind: type[M], faces: int | Non
         return made if isinstance(made, kind) else kind.from_arrays(made.V, made.F, name=made.name)
     if not Path(name).suffix and not Path(name).exists():
         raise MeshError(
-            f"{name!r} is no file and no registered surface; known surfaces: "
+            f"{name!r} is neither a file nor a registered surface; known surfaces: "
             f"{', '.join(sorted(registry.surfaces)) or 'none'}."
         )
     return read_mesh(Path(name), kind)

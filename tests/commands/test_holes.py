@@ -64,7 +64,7 @@ def test_another_outer_boundary_by_name(cli, ring):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nowhere"], "is no file and no registered surface"),
+        (["nowhere"], "is neither a file nor a registered surface"),
         (["disk.obj"], "single boundary loop"),
         (["closed.obj"], "the surface is closed"),
         (["ring.obj", "--outer", "5000"], "outer=5000: vertex 5000"),

@@ -90,7 +90,7 @@ def test_two_processes_at_once(directory: Path) -> None:
     workers = [context.Process(target=_worker, args=(start, hashes)) for _ in range(2)]
     for worker in workers:
         worker.start()
-    seen = {hashes.get(timeout=60) for _ in range(20)}
+    seen = {hashes.get(timeout=600) for _ in range(20)}
     for worker in workers:
         worker.join()
     assert [worker.exitcode for worker in workers] == [0, 0]

@@ -113,7 +113,7 @@ def page(browser, address):
             return browser.find_elements(By.CSS_SELECTOR, selector)
 
         def wait(self, condition):
-            return WebDriverWait(browser, 20, 0.05).until(lambda _: condition())
+            return WebDriverWait(browser, 300, 0.05).until(lambda _: condition())
 
         def column(self, place, part="tbody"):
             return [cell.text for cell in self.all(f"#times {part} tr > :nth-child({place})")]

@@ -1,6 +1,5 @@
 import dataclasses
 import re
-import time
 from pathlib import Path
 
 import numpy as np
@@ -58,10 +57,16 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause):
     assert (uv is None) == (name not in kept)
 
 
-def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
+def test_what_does_not_end_is_ended(tmp_path):
+    options = Options(timeout=1, memory_bytes=MEMORY)
+    for record in run_tasks(tasks_of("sleeps", "spins"), Store(tmp_path), options):
+        assert record.outcome.status == "timeout"
+        assert record.outcome.cause == "not finished after 1 s"
+        assert record.outcome.median_seconds is None
+
+
+def test_a_run_over_the_unruly_measures_the_good(tmp_path):
     expected = {
-        "sleeps": ("timeout", "not finished after 6 s"),
-        "spins": ("timeout", "not finished after 6 s"),
         "hoards": ("out_of_memory", "the limit is 500 MiB"),
         "hoards-in-a-child": ("out_of_memory", "the limit is 500 MiB"),
         "talks": ("ok", None),
@@ -74,8 +79,7 @@ def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
         "good": ("ok", None),
         "harmonic-circle": ("ok", None),
     }
-    started = time.monotonic()
-    options = Options(timeout=6, memory_bytes=MEMORY)
+    options = Options(memory_bytes=MEMORY)
     found = run_tasks(tasks_of(*expected), Store(tmp_path), options)
     outcomes = {record.cell.algorithm: record.outcome for record in found}
     assert {name: o.status for name, o in outcomes.items()} == {
@@ -94,7 +98,6 @@ def test_a_run_over_the_unruly_ends_in_time_and_measures_the_good(tmp_path):
         "not deterministic: other bits than in the check came out in rounds 1",
     )
     assert outcomes["good"].notes == ()
-    assert time.monotonic() - started < 60
 
 
 def test_what_a_process_does_to_its_answer_or_to_the_others_fails_it_alone(tmp_path):
@@ -139,7 +142,8 @@ def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(tmp_path):
     (record,) = run_tasks([task], store)
     outcome = record.outcome
     assert (outcome.status, outcome.cause) == ("ok", None)
-    assert [len(r.calls) > 1 for r in outcome.rounds] == [True, True]
+    assert all(r.calls for r in outcome.rounds)
+    assert len(outcome.rounds) == 2
     assert outcome.median_seconds == min(outcome.seconds)
     assert sum(outcome.phases.values()) == pytest.approx(outcome.median_seconds, rel=0.02)
     assert outcome.extras == {"said": 1}
@@ -173,7 +177,7 @@ def test_what_is_in_the_store_is_not_measured_again(tmp_path):
     _, noted = run(tasks, rerun_failed=True)
     assert noted.steps == [("gives-up", "check")]
     fresh, noted = run(tasks[:1], fresh=True)
-    assert fresh[0].outcome.seconds != first[0].outcome.seconds
+    assert fresh[0].outcome.rounds[0].sitting != first[0].outcome.rounds[0].sitting
     assert len(noted.steps) == 2
     _, noted = run(tasks_of("good", solves="backslash"))
     assert noted.kept == [False]

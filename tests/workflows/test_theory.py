@@ -132,7 +132,7 @@ def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["nowhere"], "is no file and no registered surface"),
+        (["nowhere"], "is neither a file nor a registered surface"),
         (["nowhere.obj"], "there is no such file"),
         (["tube.obj"], "2 boundary loops"),
     ],

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import RecordError
+from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.palette import Look, looks
@@ -253,13 +254,22 @@ class Evidence:
     def mesh(self, surface: SurfaceFacts) -> TriangleMesh | None:
         """The surface itself, or None where the run did not keep it."""
         record = next(r for r in self.records if r.cell.mesh_hash == surface.mesh_hash)
-        return self.store.mesh(record.cell)
+        mesh = self.store.mesh(record.cell)
+        if mesh is not None and (mesh.n, mesh.m) != (surface.vertices, surface.faces):
+            file = self.store.mesh_file(record.cell)
+            raise damaged(file, f"the surface {surface.name}", "other counts than recorded")
+        return mesh
 
     def uv(self, record: Record | None) -> NDArray[np.complex128] | None:
         """The map of a record that ended ok, or None."""
         if record is None or record.outcome.status != "ok":
             return None
-        return self.store.uv(record.cell)
+        uv = self.store.uv(record.cell)
+        if uv is not None and len(uv) != record.mesh.vertices:
+            file = self.store.map_file(record.cell)
+            why = f"it has {len(uv)} vertices, the record {record.mesh.vertices}"
+            raise damaged(file, f"the map of {record.cell.label}", why)
+        return uv
 
 
 def model_surface(model: str) -> str:

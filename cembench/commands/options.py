@@ -1,0 +1,90 @@
+"""The options that several verbs share, each with its range.
+
+What is outside a range is refused before anything is read: the upper bounds are far above what any
+machine can do, and keep sums, clocks and the system's own limits from overflowing.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+import typer
+
+from cembench.core.errors import ParameterError
+
+#: A process that has loaded the libraries holds more than a hundred MiB before any call.
+LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
+LONGEST = 10_000_000.0
+MOST_FACES = 1_000_000_000
+
+
+def finite(value: float) -> float:
+    """Refuse NaN, which is neither below nor above a bound."""
+    if math.isnan(value):
+        raise typer.BadParameter("nan is not a number; write one within the range.")
+    return value
+
+
+Plugins = Annotated[
+    list[str],
+    typer.Option("--plugin", help="FILE.py or module:name with more algorithms. Repeatable."),
+]
+Parameters = Annotated[
+    list[str],
+    typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter. Repeatable."),
+]
+Threads = Annotated[int, typer.Option(min=1, max=1024, help="Threads of the numerical libraries.")]
+Timeout = Annotated[
+    float,
+    typer.Option(min=0.1, max=LONGEST, callback=finite, help="Seconds that a call may take."),
+]
+Memory = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SIZE",
+        help="Memory limit of a process, from 256MiB on, as 4GiB; default: 90 % of what is free.",
+    ),
+]
+#: Each surface has bounds of its own within these.
+Faces = Annotated[
+    int | None, typer.Option(min=1, max=MOST_FACES, help="Triangles of generated surfaces.")
+]
+Repeats = Annotated[
+    int, typer.Option(min=1, max=10_000, help="Rounds; fewer than 6 give no interval.")
+]
+Seed = Annotated[
+    int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random order within a round.")
+]
+Verify = Annotated[
+    bool,
+    typer.Option("--verify", help="Recompute the figures of all maps, not only of a sample."),
+]
+
+
+def memory_bytes(given: str | None) -> int:
+    """Return the bytes that ``--memory`` names; 90 % of what is free where it is not given.
+
+    Raises
+    ------
+    ParameterError
+        It is not a size, or outside the range.
+
+    """
+    import psutil
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
+    if given is None:
+        return int(0.9 * psutil.virtual_memory().available)
+    try:
+        size: int = TypeAdapter(ByteSize).validate_python(given)
+    except (ValidationError, OverflowError):
+        raise ParameterError(
+            f"--memory {given!r} is not a size; write a number with a unit, as 4GiB or 500MB."
+        ) from None
+    if not LEAST_MEMORY <= size <= MOST_MEMORY:
+        raise ParameterError(
+            f"--memory {given!r} is {size:,} bytes; allowed: 256MiB (a process needs more than "
+            "half of that to load the libraries) to 1024TiB."
+        )
+    return size

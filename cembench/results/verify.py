@@ -1,0 +1,232 @@
+"""Whether a run's records still say what was measured, and their maps still give their figures.
+
+Whoever measured wrote hashes down: a record's digest of itself, the cell's key in the file's name,
+SHA-256 of map and mesh. A figure can also be computed again from the map. Every record is compared
+with its digest, its name and its own status; maps of all records (``--verify``) or of a sample,
+since a large one takes seconds. The sample is the same as long as the records are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import random
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from cembench.conformal.metrics import all_metrics
+from cembench.core.errors import RecordError
+from cembench.core.loading import read_bytes
+from cembench.results.records import Record, is_as_written
+from cembench.results.store import Store, read_record
+
+#: A sample's maps have this many triangles together at most; one map is always in it.
+SAMPLE_TRIANGLES = 200_000
+#: Errors of rounding, relative to the size of what is added up.
+ROUNDING = 1e-9
+#: How many disagreements an error names.
+_NAMED = 10
+
+
+class Depth(StrEnum):
+    """How much is verified."""
+
+    records = "records"
+    sample = "sample"
+    everything = "everything"
+
+
+class Kind(StrEnum):
+    """What a finding is about."""
+
+    damaged = "damaged"
+    file_name = "file name"
+    digest = "digest"
+    status = "status"
+    map = "map"
+    mesh = "mesh"
+    metrics = "metrics"
+    #: Nothing disagrees, but nothing can be compared either.
+    not_signed = "not signed"
+    not_kept = "not kept"
+
+
+_ONLY_REMARKS = (Kind.not_signed, Kind.not_kept)
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that does not agree, or cannot be compared, and the file in which it was found."""
+
+    file: Path
+    kind: Kind
+    detail: str
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether something is wrong, rather than merely not comparable."""
+        return self.kind not in _ONLY_REMARKS
+
+    def __str__(self) -> str:
+        return f"{self.file.name}: {self.detail}"
+
+
+@dataclass(frozen=True)
+class Verified:
+    """The records that could be read, and what was found."""
+
+    records: tuple[Record, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def disagreements(self) -> tuple[Finding, ...]:
+        """The findings that say that something is wrong."""
+        return tuple(finding for finding in self.findings if finding.disagrees)
+
+
+def verify(store: Store, depth: Depth) -> Verified:
+    """Read all records of a run and compare them with what was written down beside them."""
+    records: dict[Path, Record] = {}
+    findings: list[Finding] = []
+    for file in store.record_files():
+        try:
+            records[file] = read_record(file)
+        except RecordError as error:
+            findings.append(Finding(file, Kind.damaged, str(error)))
+        else:
+            findings += verify_record(file, records[file])
+    for file, record in _chosen(records, depth):
+        findings += verify_map(store, file, record)
+    return Verified(tuple(records.values()), tuple(findings))
+
+
+def sound_records(store: Store, depth: Depth) -> list[Record]:
+    """Return all records of a run.
+
+    Raises
+    ------
+    RecordError
+        There is no run, or something in it does not agree.
+
+    """
+    store.check_is_run()
+    verified = verify(store, depth)
+    if verified.disagreements:
+        raise RecordError(_refusal(store, verified.disagreements))
+    return list(verified.records)
+
+
+def _refusal(store: Store, found: Sequence[Finding]) -> str:
+    named = "\n".join(f"  {finding}" for finding in found[:_NAMED])
+    more = f"\n  and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
+    return (
+        f"{store.folder} cannot be used: its records or maps are not what was measured.\n"
+        f"{named}{more}\nDelete these files and run again, or restore them. "
+        f"`cembench status {store.folder} --verify` compares everything."
+    )
+
+
+def verify_record(file: Path, record: Record) -> Iterator[Finding]:
+    """Compare a record with its digest, its file's name and its own status."""
+    as_written = is_as_written(json.loads(read_bytes(file)))
+    if as_written is None:
+        yield Finding(file, Kind.not_signed, "has no digest: written by an earlier version")
+    elif not as_written:
+        yield Finding(file, Kind.digest, "was changed after it was written: its digest differs")
+    if not file.stem.endswith(f"--{record.cell.key[:12]}"):
+        yield Finding(
+            file, Kind.file_name, f"its content has the key {record.cell.key[:12]}, not its name's"
+        )
+    outcome = record.outcome
+    folds = outcome.metrics.get("flipped_triangles")
+    if outcome.status == "ok" and folds:
+        yield Finding(file, Kind.status, f"its status is ok although {folds} triangles are folded")
+
+
+def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
+    """Compare a record's figures with those of its map, and both with their hashes."""
+    cell, outcome = record.cell, record.outcome
+    kept, surface = store.map_file(cell), store.mesh_file(cell)
+    try:
+        uv, mesh = store.uv(cell), store.mesh(cell)
+    except RecordError as error:
+        yield Finding(file, Kind.damaged, str(error))
+        return
+    if uv is None or mesh is None:
+        if outcome.metrics:
+            missing = kept if uv is None else surface
+            yield Finding(
+                file, Kind.not_kept, f"cannot be computed again: there is no {missing.name}"
+            )
+        return
+    if outcome.uv_hash is not None and outcome.uv_hash != hashlib.sha256(uv.tobytes()).hexdigest():
+        yield Finding(file, Kind.map, f"{kept.name} holds another map than was measured")
+        return
+    counts = (mesh.n, mesh.m, sum(len(loop) for loop in mesh.loops))
+    facts = record.mesh
+    if counts != (facts.vertices, facts.faces, facts.boundary_vertices):
+        written = (facts.vertices, facts.faces, facts.boundary_vertices)
+        yield Finding(
+            file,
+            Kind.mesh,
+            f"tells of {written} vertices, triangles and boundary vertices; {surface.name} has "
+            f"{counts}",
+        )
+    if len(uv) != mesh.n or not np.isfinite(uv).all():
+        detail = f"{kept.name} is not a finite map of the {mesh.n} vertices of {surface.name}"
+        yield Finding(file, Kind.map, detail)
+        return
+    differing = different_metrics(outcome.metrics, all_metrics(mesh, uv))
+    if differing:
+        yield Finding(file, Kind.metrics, f"the map gives other figures: {'; '.join(differing)}")
+
+
+def different_metrics(
+    recorded: Mapping[str, float | None], computed: Mapping[str, float]
+) -> list[str]:
+    """Return in words which figures differ by more than rounding; null stands for infinity."""
+    size = abs(computed["dirichlet_energy"]) + abs(computed["image_area"])
+    worst = computed["dilatation_max"]
+    bounds = {
+        "dirichlet_energy": ROUNDING * size,
+        "image_area": ROUNDING * size,
+        "conformal_energy": ROUNDING * size,  # a small difference of those two
+        "angle_error_mean_deg": ROUNDING * 180,
+        "angle_error_sd_deg": ROUNDING * 180,
+        "flipped_triangles": 0.0,
+        # From 1 - |mu|, of which a dilatation of 1e8 leaves eight digits.
+        "dilatation_mean": ROUNDING * worst * worst,
+        "dilatation_max": ROUNDING * worst * worst,
+        "boundary_circularity": ROUNDING,
+    }
+    differing = []
+    for name, found in computed.items():
+        if name not in recorded:
+            continue
+        held = inf if (value := recorded[name]) is None else value
+        if held != found and not abs(held - found) <= max(bounds[name], ROUNDING * abs(found)):
+            differing.append(f"{name} {found:.10g}, recorded {held:.10g}")
+    return differing
+
+
+def _chosen(records: Mapping[Path, Record], depth: Depth) -> list[tuple[Path, Record]]:
+    """Return whose maps are verified."""
+    if depth is Depth.records:
+        return []
+    if depth is Depth.everything:
+        return list(records.items())
+    chosen: list[tuple[Path, Record]] = []
+    shuffled = random.Random("".join(file.name for file in records)).sample(
+        list(records.items()), len(records)
+    )
+    room = SAMPLE_TRIANGLES
+    for file, record in shuffled:
+        if record.outcome.metrics and (record.mesh.faces <= room or not chosen):
+            chosen.append((file, record))
+            room -= record.mesh.faces
+    return chosen

@@ -1,0 +1,108 @@
+"""Every option that takes a number, or names something, has a range that is told."""
+
+import inspect
+
+import pytest
+import typer
+
+from cembench.commands.cli import app
+
+SMALL = ("--surfaces", "flat-disk", "--faces", 100, "-a", "cem", "--dry-run")
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--faces", -1),
+        ("--faces", 0),
+        ("--faces", "1e12"),
+        ("--faces", 10**12),
+        ("--threads", 0),
+        ("--threads", 10**9),
+        ("--repeats", 0),
+        ("--repeats", 10**9),
+        ("--seed", -1),
+        ("--seed", 10**30),
+        ("--timeout", 0),
+        ("--timeout", -1),
+        ("--timeout", "nan"),
+        ("--timeout", "inf"),
+        ("--timeout", "1e300"),
+        ("--memory", "1"),
+        ("--memory", "0"),
+        ("--memory", "-4GiB"),
+        ("--memory", "much"),
+        ("--memory", "1e400GiB"),
+        ("--memory", "nan"),
+        ("--memory", "9999999TiB"),
+        ("-p", "max_iterations=1e22"),
+        ("-p", f"max_iterations={10**22}"),
+        ("-p", "tolerance=nan"),
+        ("--reference", "nope"),
+        ("--reference", "lscm"),
+        ("--solves", "twice"),
+        ("--backend", "none"),
+        ("--profile", "none"),
+        ("-a", "none"),
+        ("--surfaces", "none"),
+        ("--dataset", "none"),
+    ],
+)
+def test_what_is_out_of_range_is_refused(cli, option):
+    code, out, err = cli("run", *SMALL, *option)
+    assert (code, out) == (2, "")
+    assert str(option[1]).partition("=")[0] in err or option[0] in err
+    assert not list(cli.folder.iterdir())
+
+
+@pytest.mark.parametrize(
+    "option", [("--memory", "256MiB"), ("--memory", "64TB"), ("--timeout", 0.1), ("--seed", 2**40)]
+)
+def test_what_is_in_range_is_taken(cli, option):
+    assert cli("run", *SMALL, *option)[0] == 0
+
+
+@pytest.mark.parametrize(
+    "verb",
+    [
+        ("morph", "flat-disk", "flat-disk", "--lambda", "nan"),
+        ("morph", "flat-disk", "flat-disk", "--reach", "nan"),
+        ("morph", "flat-disk", "flat-disk", "--frames", 10**9),
+        ("morph", "flat-disk", "flat-disk", "--views", "nowhere"),
+        ("morph", "flat-disk", "flat-disk", "-a", "none"),
+        ("holes", "--sweeps", 0),
+        ("holes", "--sweeps", 10**9),
+        ("holes", "--outer", -1),
+        ("theory", "flat-disk", "--iterations", 10**9),
+        ("theory", "flat-disk", "--faces", -5),
+        ("validate", "lscm", "--faces", 10**12),
+        ("validate", "lscm", "--up-to", 10**12),
+        ("fetch", "--timeout", "nan"),
+    ],
+)
+def test_so_it_is_in_the_other_verbs(cli, verb):
+    code, _, err = cli(*verb)
+    assert code == 2
+    assert "Traceback" not in err
+
+
+def test_every_number_of_every_verb_has_both_bounds():
+    for command in app.registered_commands:
+        hints = inspect.get_annotations(command.callback, eval_str=True)
+        for name, hint in hints.items():
+            kinds = {hint, *getattr(hint, "__args__", ())}
+            declared = [o for o in getattr(hint, "__metadata__", ()) if hasattr(o, "min")]
+            inner = kinds | set(getattr(getattr(hint, "__origin__", None), "__args__", ()))
+            inner.add(getattr(hint, "__origin__", None))
+            if not inner & {int, float}:
+                continue
+            (option,) = declared
+            where = f"{command.callback.__name__}: {name}"
+            assert option.min is not None, where
+            assert option.max is not None, where
+            if float in inner:
+                assert option.callback is not None, f"{where}: nan passes any bound"
+
+
+def test_the_bounds_of_a_typer_option_are_called_min_and_max():
+    assert {"min", "max"} <= set(inspect.signature(typer.Option).parameters)
