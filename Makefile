@@ -6,7 +6,7 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
 
-.PHONY: reproduce test test-slow lint types tests bench bench-kernels clean
+.PHONY: reproduce test test-slow lint types tests bench bench-kernels fuzz clean
 
 reproduce: $(READY)
 	$(BIN)/cembench reproduce
@@ -31,6 +31,10 @@ bench: $(READY)
 
 bench-kernels: $(READY)
 	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
+
+# Hours where nothing limits it; goes on where it was ended. FUZZ="--seconds 600 --seed 2" and the like.
+fuzz: $(READY)
+	$(BIN)/python -m fuzz $(FUZZ)
 
 # Stale when the requirements change; the environment's own Python must still start.
 $(READY): pyproject.toml

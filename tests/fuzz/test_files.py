@@ -1,0 +1,136 @@
+"""The oracle for files: it knows every legal file, and sees what is planted."""
+
+import random
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from cembench import MeshError, TriangleMesh
+from cembench.mesh.files import read_mesh, write_mesh
+from fuzz.files import judge_file
+from fuzz.mutations import MUTATIONS, mutate
+from fuzz.reading import READERS, Damaged
+from fuzz.seed_files import FAMILIES, seed_file
+from tests import gallery
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_independent_reader_reads_every_legal_file(family):
+    for number in range(40):
+        file = seed_file(family, random.Random(number))
+        content = READERS[file.suffix](file.data)
+        assert content.triangles >= 2
+        assert len(content.points) >= 4
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".ply", ".stl"])
+def test_the_independent_reader_agrees_on_files_that_the_package_writes(suffix, tmp_path):
+    mesh = TriangleMesh.from_arrays(*gallery.annulus())
+    path = tmp_path / f"a{suffix}"
+    write_mesh(path, mesh)
+    content = READERS[suffix](path.read_bytes())
+    assert (len(content.points), content.triangles) == (mesh.n, mesh.m)
+
+
+@pytest.mark.parametrize("mutation", MUTATIONS)
+def test_each_mutation_takes_any_bytes_and_repeats_itself(mutation):
+    inputs = [b"", b"x", b"\n", bytes(range(256)), SQUARE.encode()]
+    inputs += [seed_file(family, random.Random(1)).data for family in FAMILIES]
+    made = [MUTATIONS[mutation](data, random.Random(k)) for k, data in enumerate(inputs)]
+    again = [MUTATIONS[mutation](data, random.Random(k)) for k, data in enumerate(inputs)]
+    assert made == again
+    assert any(new != old for new, old in zip(made, inputs, strict=True))
+
+
+def test_mutations_are_named():
+    data, names = mutate(SQUARE.encode(), random.Random(3))
+    assert names
+    assert set(names) <= set(MUTATIONS)
+    assert isinstance(data, bytes)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text"),
+    [
+        (".obj", SQUARE.replace("f 1 3 4", "f 1 3")),
+        (".obj", SQUARE.replace("f 1 3 4", "f 1 3 9")),
+        (".obj", SQUARE.replace("v 1 0 0", "v 1 nan 0")),
+        (".obj", SQUARE.replace("v 1 0 0", "v 1 1e999 0")),
+        (".off", "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"),
+        (".off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n3 0 1 2\n"),
+        (".ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\n"),
+        (".stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n"),
+        (".mat", "hello"),
+    ],
+)
+def test_the_independent_reader_knows_damage(suffix, text):
+    with pytest.raises(Damaged):
+        READERS[suffix](text.encode())
+
+
+def reading(change=lambda V, F: (V, F)):
+    """A reader that is right but for a change."""
+
+    def read(path):
+        content = READERS[path.suffix](path.read_bytes())
+        V, F = change(np.array(content.points), np.array(content.polygons))
+        return SimpleNamespace(V=V, F=F)
+
+    return read
+
+
+def planted(path, exception):
+    def read(path):
+        raise exception
+
+    return judge_file(path, read, legal=False)
+
+
+@pytest.fixture
+def square(tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text(SQUARE)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (lambda V, F: (V, F), None),
+        (lambda V, F: (V, F[:, [1, 2, 0]][::-1]), None),
+        (lambda V, F: (V, F[:-1]), "silent loss"),
+        (lambda V, F: (V[:-1], F[:-1]), "silent loss"),
+        (lambda V, F: (V, np.concatenate([F, F[:1]])), "silent loss"),
+        (lambda V, F: (V[::-1], F), "other triangles"),
+        (lambda V, F: (V + np.array([0, 0, 1]), F), "other triangles"),
+        (lambda V, F: (V, np.array([[0, 1, 2], [0, 1, 3]])), "other triangles"),
+    ],
+)
+def test_a_reader_that_loses_or_changes_something_is_found(change, fault, square):
+    assert judge_file(square, reading(change), legal=True).fault == fault
+
+
+def test_a_reader_that_takes_a_damaged_file_is_found(square):
+    square.write_text(SQUARE + "f 2 3\n")
+    verdict = judge_file(square, lambda path: SimpleNamespace(V=np.eye(3), F=[[0, 1, 2]]), legal=0)
+    assert verdict.fault == "silent loss"
+    assert "2 corners" in verdict.detail
+
+
+def test_refusals_need_a_message_and_a_reason(square):
+    assert planted(square, MeshError("it is damaged")).fault is None
+    assert planted(square, MeshError("")).fault == "no message"
+    assert planted(square, KeyError("f")).fault == "traceback"
+
+    def refuse(path):
+        raise MeshError("a tab")
+
+    assert judge_file(square, refuse, legal=True).fault == "legal file refused"
+
+
+def test_the_package_reads_what_the_oracle_takes(square):
+    verdict = judge_file(square, lambda path: read_mesh(path, TriangleMesh), legal=True)
+    assert (verdict.outcome, verdict.fault) == ("mesh", None)
