@@ -37,9 +37,9 @@ def read_mat(path: Path) -> Soup:
     present: list[str] = []
     found: dict[str, NDArray[Any]] = {}
     for kind, element in _elements(content[_HEADER_BYTES:], order):
-        begin = _inflated(element, _BEGINNING) if kind == _COMPRESSED else element
-        size = len(begin)
+        begin, size = element, 0
         if kind == _COMPRESSED:
+            begin = _inflated(element, _BEGINNING)
             kind, size = _two_numbers(begin, 0, order)
             begin = begin[8:]
         if kind != _ARRAY:
