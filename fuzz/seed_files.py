@@ -256,5 +256,4 @@ FAMILIES: dict[str, Callable[[Points, Polygons, random.Random], SeedFile]] = {
     "STL, binary": _stl_binary,
     "MAT 5": _mat("5", compressed=False),
     "MAT 5, compressed": _mat("5", compressed=True),
-    "MAT 4": _mat("4", compressed=False),
 }

@@ -30,9 +30,7 @@ def install(site: Path, content: bytes) -> None:
     checksum = hashlib.sha256(content).hexdigest()
     (site / "fuzz_dataset.py").write_text(_MODULE.format(name=NAME, file=FILE, sha256=checksum))
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: fuzz-dataset\nVersion: 1.0\n")
-    (about / "entry_points.txt").write_text(
-        f"[cembench.datasets]\n{NAME} = fuzz_dataset:tiny\n"
-    )
+    (about / "entry_points.txt").write_text(f"[cembench.datasets]\n{NAME} = fuzz_dataset:tiny\n")
 
 
 @contextmanager

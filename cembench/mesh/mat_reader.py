@@ -49,6 +49,8 @@ def read_mat(path: Path) -> Soup:
         if name in ("v", "f") and name not in found:
             whole = element if begin is element else _inflated_whole(element, size + 8)[8:]
             found[name] = _matrix(whole, order)
+        elif begin is not element:
+            _check_compressed(element, size + 8)
     missing = [name for name in ("v", "f") if name not in found]
     if missing:
         raise MeshError(
@@ -104,6 +106,19 @@ def _inflated(element: bytes, most: int) -> bytes:
         return zlib.decompressobj().decompress(element, most)
     except zlib.error as error:
         raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+
+
+def _check_compressed(element: bytes, size: int) -> None:
+    """Raise where an element that is not wanted is damaged: so is the file, perhaps elsewhere."""
+    stream, rest, length = zlib.decompressobj(), element, 0
+    while rest and length <= size:
+        try:
+            length += len(stream.decompress(rest, 2**20))
+        except zlib.error as error:
+            raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+        rest = stream.unconsumed_tail
+    if length != size or not stream.eof:
+        raise damaged("it cannot be read as MAT: a compressed element was cut short")
 
 
 def _inflated_whole(element: bytes, size: int) -> bytes:

@@ -11,7 +11,7 @@ from array import array
 from collections.abc import Iterator
 from pathlib import Path
 
-from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown
+from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown, words_of
 
 #: Statements that hold no polygon and are skipped; any other word is reported.
 _SKIPPED = frozenset(
@@ -30,7 +30,7 @@ def read_obj(path: Path) -> Soup:
     with path.open(encoding="latin-1") as file:
         lines = enumerate(file, 1)
         for number, line in lines:
-            words = line.split()
+            words = words_of(line)
             if not words or words[0] in _NAMED:
                 continue
             if "#" in line or "\\" in line or number == 1:
@@ -58,7 +58,7 @@ def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
     """
     words: list[str] = []
     while True:
-        words += line.removeprefix(BYTE_ORDER_MARK).split("#", 1)[0].split()
+        words += words_of(line.removeprefix(BYTE_ORDER_MARK).split("#", 1)[0])
         if not words or not words[-1].endswith("\\"):
             return words or [""]
         words[-1:] = words[-1].removesuffix("\\").split()

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TypeVar
 
 from cembench.core.errors import MeshError
-from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown
+from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown, words_of
 
 M = TypeVar("M", int, float)
 _Lines = Iterator[tuple[int, list[str]]]
@@ -44,7 +44,7 @@ def read_off(path: Path) -> Soup:
 def _statements(file: Iterator[str]) -> _Lines:
     """The numbers and the words of the lines that hold more than a comment."""
     for number, line in enumerate(file, 1):
-        words = (line.split("#", 1)[0] if "#" in line else line).split()
+        words = words_of(line.split("#", 1)[0] if "#" in line else line)
         if words:
             yield number, words
 

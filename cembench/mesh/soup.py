@@ -15,6 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError
 
+#: What `str.split` takes for space though no mesh format does.
+_NOT_SPACES = dict.fromkeys(map(ord, "\x1c\x1d\x1e\x1f\x85\xa0"), "\0")
+
 #: How UTF-8 text may begin, read as Latin-1.
 BYTE_ORDER_MARK = b"\xef\xbb\xbf".decode("latin-1")
 
@@ -102,6 +105,11 @@ class Soup:
         first = np.repeat(np.cumsum(self.sizes) - self.sizes, counts)
         step = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
         return self.corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+
+
+def words_of(line: str) -> list[str]:
+    """Split a line at ASCII spaces; `str.split` also splits at separators of other alphabets."""
+    return line.translate(_NOT_SPACES).split()
 
 
 def shown(text: str, most: int = 60) -> str:

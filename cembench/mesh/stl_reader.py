@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown
+from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown, words_of
 
 _HEADER_BYTES = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -49,7 +49,7 @@ def _read_ascii(path: Path) -> Soup:
     in_solid, step = False, 0
     with path.open(encoding="latin-1") as file:
         for number, line in enumerate(file, 1):
-            words = line.lower().split()
+            words = words_of(line.lower())
             if not words:
                 continue
             expected = _FACET[step] if in_solid else "solid"

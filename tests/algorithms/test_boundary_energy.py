@@ -92,7 +92,7 @@ def test_energy_falls_at_every_step_down_to_a_stationary_point(ring):
     assert found.gradient**2 <= 2e-14 * found.energies[-1]
     rng = np.random.default_rng(6)
     for _ in range(10):  # nowhere near is it lower
-        model = EnergyModel(S, found.domain, weights)
+        model = EnergyModel(S, found.model.domain, weights)
         x = model.precondition(rng.standard_normal(len(model.gradient)))
         near = in_gauge(model.moved(1e-3 * x / np.linalg.norm(x)), weights)
         assert EnergyModel(S, near, weights).energy > found.energies[-1]

@@ -424,3 +424,11 @@ def test_mutated_files_raise_nothing_else_and_lose_no_face_in_silence(seed, tmp_
         assert (soup.sizes >= 3).all()
         assert len(soup.corners) == soup.sizes.sum()
         assert soup.notices or counts(path)[1] == len(soup.sizes), path.read_bytes()
+
+
+@pytest.mark.parametrize("odd", ["\x1d", "\x85", "\xa0"])
+def test_only_ascii_spaces_part_numbers(tmp_path, odd):
+    file = tmp_path / "a.off"
+    file.write_bytes(f"OFF\n3 1 0\n0 0 0\n1 0 0\n0{odd}1 0\n3 0 1 2\n".encode("latin-1"))
+    with pytest.raises(MeshError, match="line 5"):
+        read_soup(file)
