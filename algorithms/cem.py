@@ -27,14 +27,17 @@ def cem(
     tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-5,
     max_iterations: Annotated[int, Field(ge=0, le=1_000_000)] = 20,
     inversion: bool = True,
+    best: bool = False,
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which boundary makes the harmonic map to the disk conformal? Algorithm 1 of the paper.
+    """Map a disk by Algorithm 1 of the paper.
 
     Faithful to Algorithm 1: start (14), (18), (15), (16); iteration (30), (24), (25), (22), or (23)
     for (30) with ``inversion=False``. Decided here, where the paper is silent: the start's triangle
     is the one whose barycentre is nearest to the mean vertex; iteration ends after the first one
-    that lowers E_C by less than `tolerance`, or after `max_iterations`; a vertex at the origin,
+    that changes E_C by less than `tolerance`, or after `max_iterations`, and the last iterate is
+    the map, also where E_C rose on the way; `best` returns the iterate of least E_C instead, where
+    the history then ends (`iterations_dropped` counts those after it); a vertex at the origin,
     which has no inverse, counts as zero in (30); where (30) would make boundary vertices change
     places, which folds the map, that step is (23), and iteration ends where (23) would do so too
     (`order_kept` counts these steps; 0 on most surfaces); where negative cotangent weights still
@@ -58,7 +61,13 @@ def cem(
         tolerance=tolerance,
         max_iterations=max_iterations,
         inversion=inversion,
+        best=best,
     )
+    iterations = int(np.argmin(history)) if best else len(history) - 1
     uv, repairs = without_folds(mesh, L, bordered.in_order(f_i, f_b))
-    extras = {"order_kept": order_kept, "fold_repairs": repairs}
-    return Parameterization(uv, len(history) - 1, tuple(history), extras)
+    extras = {
+        "order_kept": order_kept,
+        "iterations_dropped": len(history) - 1 - iterations,
+        "fold_repairs": repairs,
+    }
+    return Parameterization(uv, iterations, tuple(history[: iterations + 1]), extras)

@@ -27,7 +27,7 @@ def harmonic_filled(
     """What does one Dirichlet solve give when the holes are filled first, and opened again?
 
     What one does without Koebe's method, and the yardstick for it: every hole gets a fan to its
-    centroid, the outer boundary (that of the vertex `outer`, or the longest) keeps its arc length
+    centroid, the outer boundary (that of the vertex `outer`, or the widest) keeps its arc length
     on the unit circle. Nothing makes the holes round: the record's circularity says how far from
     circles they are. Folds are mended on the filled surface (`fold_repairs`).
     """

@@ -114,3 +114,23 @@ def hill_in_a_corner(rows=8, columns=14):
     V, F = flat_rectangle(rows, columns)
     V[:, 2] = 8 * np.exp(-((V[:, 0] - 3) ** 2 + (V[:, 1] - 3) ** 2) / 4)
     return V, F
+
+
+def eared_hole(rows=8, columns=8):
+    """A flat rectangle with a hole of two triangles, one of whose vertices has no way inside.
+
+    Returns the mesh, and that vertex.
+    """
+    V, F = flat_rectangle(rows, columns)
+    middle = V[F].mean(axis=1)
+    hole = (abs(middle[:, 0] - 4) < 1) & (abs(middle[:, 1] - 4) < 1)
+    kept = F[~hole]
+    used, kept = np.unique(kept, return_inverse=True)
+    V, F = V[used], kept.reshape(-1, 3)
+    mesh = HoledMesh.from_arrays(V, F)
+    hole = min(mesh.loops, key=len)
+    ear = len(V)
+    a, b = hole[0], hole[1]
+    tip = (V[a] + V[b]) / 2 + (V[hole].mean(axis=0) - (V[a] + V[b]) / 2) / 2
+    eared = HoledMesh.from_arrays(np.vstack([V, tip]), np.vstack([F, [b, a, ear]]))
+    return eared, ear

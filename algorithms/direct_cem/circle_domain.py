@@ -22,6 +22,9 @@ Indices = NDArray[np.int64]
 
 #: What share of its length at the start every arc keeps, so that no two vertices come together.
 LEAST_SHARE = 0.1
+#: Arcs below this share of the mean arc crowd: the energy hardly sees them, and the steps of a
+#: minimiser, which are not exact, leave them to chance.
+RESOLVED = 1e-2
 #: A half chord below this may belong to a vanishing arc, or to all but the whole circle: that only
 #: where the arc was longer than a radian before.
 _ROUNDING, _WIDE = 1e-9, 1.0
@@ -136,8 +139,13 @@ class CircleDomain:
 
     @property
     def shortest(self) -> NDArray[np.bool_]:
-        """Which arcs are as short as they may be? Shape (B,)."""
-        return self.arcs <= 1.01 * self.least
+        """Whether each arc is as short as it may be, and long enough to count; (B,)."""
+        return (self.arcs <= 1.01 * self.least) & (self.arcs > self._resolved)
+
+    @property
+    def _resolved(self) -> Real:
+        """The shortest arc that counts, for each vertex's circle."""
+        return (2 * np.pi * RESOLVED / np.array(self.rims.sizes))[self.rims.loop]
 
     @cached_property
     def radius(self) -> Real:
@@ -185,6 +193,20 @@ class CircleDomain:
     def towards(self, other: CircleDomain, share: float) -> CircleDomain:
         """The domain on this share of the way to the arcs of another one, on the same circles."""
         return replace(self, arcs=(1 - share) * self.arcs + share * other.arcs)
+
+    def settled(self, like: CircleDomain) -> CircleDomain:
+        """Return the domain with the proportions of another one where its arcs crowd.
+
+        Arcs that begin within one `RESOLVED` of the mean arc keep their sum. Where no two do, it is
+        this domain itself.
+        """
+        rims = self.rims
+        cell = np.floor(rims.along(like.arcs) / self._resolved)
+        first = np.flatnonzero(np.append(True, (np.diff(cell) != 0) | (np.diff(rims.loop) != 0)))
+        if len(first) == len(cell):
+            return self
+        factors = np.add.reduceat(self.arcs, first) / np.add.reduceat(like.arcs, first)
+        return replace(self, arcs=like.arcs * np.repeat(factors, np.diff([*first, len(cell)])))
 
     def through(self, a: complex) -> CircleDomain:
         """Where does the Moebius map (z - a) / (1 - conj(a) z) of the disk take this domain?"""

@@ -1,7 +1,9 @@
 """A start for maps to the disk with circular holes: the holes are filled, then circles are fitted.
 
-A hole is filled with a round disk, its vertices on the rim in proportion to edge length. That adds
-a small dense block, no mesh.
+A hole is filled with a round disk, its vertices on the rim by its own equilibrium measure: the flux
+through it of the potential that is 1 on it and 0 on all other boundaries. On a round hole of a
+circle domain that is nearly even, on a lone concentric one exactly; and it follows a boundary that
+crowds, where lengths say nothing. The disk adds a small dense block, no mesh.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.patches import disk_patch
 from cembench.conformal.planar import backward_arcs, polygon_area
 
+from .boundary_energy import EnergyModel
 from .circle_domain import LEAST_SHARE, CircleDomain, Rims
 
 Real = NDArray[np.float64]
@@ -24,10 +27,13 @@ Complex = NDArray[np.complex128]
 ROOM = 0.45
 #: With circles smaller than this, other loops are tried as the outer one.
 CROWDED = 1e-3
+#: What share of the mean arc all arcs of a disk that fills a hole have: with shorter ones
+#: differences of its energy cancel, and a start does not depend on them.
+PATCH_SHARE = 1e-4
 
 
 def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> CircleDomain:
-    """Which start has loop 0 outside or, where its circles are too small, is the least crowded?
+    """Return a start with loop 0 outside or, where its circles are too small, the least crowded.
 
     Along a tube circles shrink by a constant factor with every radius of the tube. What happens at
     circles of radius r adds r^2 to the energy: a loop that leaves the smallest ones larger is then
@@ -43,51 +49,87 @@ def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> 
 def filled_start(
     S: DirichletToNeumann, seen: Real, lengths: Sequence[Real], outer: int
 ) -> CircleDomain:
-    """Where do the boundaries go when the holes are filled?
+    """Return where the boundaries go when the holes are filled.
+
+    The origin goes near to what `seen` is the harmonic measure of, or among the holes, whichever
+    start has the lower E_C: a triangle may lie where the surface crowds.
 
     Parameters
     ----------
     S : DirichletToNeumann
         Of the surface with its holes open.
     seen : float (B,)
-        Harmonic measure of the boundary vertices from what should go near the origin.
+        Harmonic measure of the boundary vertices from what may go near the origin.
     lengths : sequence of float arrays
         Edge lengths along each boundary loop.
     outer : int
         Which loop goes to the unit circle.
 
     """
-    sizes = tuple(len(along) for along in lengths)
-    loop = np.repeat(np.arange(len(sizes)), sizes)
-    rim, inner = np.flatnonzero(loop == outer), np.flatnonzero(loop != outer)
-    unit = np.zeros((len(loop), len(inner)))
+    rims = Rims(tuple(len(along) for along in lengths), outer)
+    own = equilibrium_measures(S, rims)
+    arcs = np.empty(len(own))
+    for k, part in enumerate(_parts(rims)):
+        arcs[part] = _of_circle(arcs_of_measure(own[part], lengths[k]))
+    rim, inner = np.flatnonzero(rims.on_outer), np.flatnonzero(~rims.on_outer)
+    unit = np.zeros((len(own), len(inner)))
     unit[inner, np.arange(len(inner))] = 1
     columns = S(unit)
     filled = columns[inner]
-    for k in np.unique(loop[inner]):
-        here = np.flatnonzero(loop[inner] == k)
-        arcs_here = lengths[k] * (2 * np.pi / lengths[k].sum())
-        filled[np.ix_(here, here)] += disk_patch(np.cumsum(arcs_here) - arcs_here)
+    for k in rims.holes:
+        here = np.flatnonzero(rims.loop[inner] == k)
+        even = np.maximum(arcs[inner][here], PATCH_SHARE * 2 * np.pi / len(here))
+        even = _of_circle(even)
+        filled[np.ix_(here, here)] += disk_patch(np.cumsum(even) - even)
     to_holes = np.linalg.solve(filled, columns[rim].T)  # minus the harmonic extension
-    # What the open holes would swallow goes on to the outer boundary.
-    measure = seen[rim] - seen[inner] @ to_holes
-    z = np.empty(len(loop), dtype=np.complex128)
-    arcs = np.empty(len(loop))
-    arcs[rim] = CircleDomain.of_arcs(arcs_of_measure(measure, lengths[outer])).arcs
-    z[rim] = np.exp(1j * (np.cumsum(arcs[rim]) - arcs[rim]))
-    z[inner] = -(to_holes @ z[rim])
-    centres = np.array([z[loop == k].mean() for k in range(len(sizes))])
-    radii = np.array([np.sqrt(abs(polygon_area(z[loop == k])) / np.pi) for k in range(len(sizes))])
-    turns = np.zeros(len(sizes))
-    for k in np.unique(loop[inner]):
-        here = loop == k
-        about = z[here] - centres[k]
-        arcs[here] = _arcs_about(about, lengths[k])
-        turns[k] = np.angle(np.sum(about * np.exp(1j * (np.cumsum(arcs[here]) - arcs[here]))))
-    holes = np.delete(np.arange(len(sizes)), outer)
-    radii[holes] = _with_room(centres[holes], radii[holes])
-    centres[outer], radii[outer] = 0, 1
-    return CircleDomain(Rims(sizes, outer), arcs, turns, centres, radii, LEAST_SHARE * arcs)
+    domains = []
+    for measure in (seen, np.where(rims.on_outer, 0.0, own) / len(rims.holes)):
+        # What the open holes would swallow goes on to the outer boundary.
+        outside = arcs_of_measure(measure[rim] - measure[inner] @ to_holes, lengths[outer])
+        domains.append(_fitted(rims, arcs, _of_circle(outside), -to_holes))
+    return min(domains, key=lambda domain: EnergyModel(S, domain, domain.outer_measure).energy)
+
+
+def equilibrium_measures(S: DirichletToNeumann, rims: Rims) -> Real:
+    """Return the equilibrium measure of each loop, the others held at 0; (B,), each 1 in sum."""
+    potentials = (rims.loop[:, None] == np.arange(len(rims.sizes))).astype(np.float64)
+    fluxes = S(potentials)[np.arange(len(rims.loop)), rims.loop]
+    return fluxes / rims.sums(fluxes)[rims.loop]
+
+
+def _parts(rims: Rims) -> list[slice]:
+    """Return where each loop lies in the boundary."""
+    return [slice(a, a + size) for a, size in zip(rims.starts, rims.sizes, strict=True)]
+
+
+def _of_circle(arcs: Real) -> Real:
+    """Return arcs in proportion, 2 pi in sum."""
+    return arcs * (2 * np.pi / arcs.sum())
+
+
+def _fitted(rims: Rims, arcs: Real, outside: Real, to_holes: Real) -> CircleDomain:
+    """Return the domain with arcs `outside` on the outer circle, and the holes where they then go.
+
+    `to_holes` takes values on the outer boundary to the holes' vertices. The centre of a circle is
+    the mean of its image by the hole's equilibrium measure; its arcs are those of the image about
+    it where that is in order, else those of the measure; radius and turn are the nearest ones.
+    """
+    arcs, z = arcs.copy(), np.empty(len(arcs), dtype=np.complex128)
+    arcs[rims.on_outer] = outside
+    z[rims.on_outer] = np.exp(1j * (np.cumsum(outside) - outside))
+    z[~rims.on_outer] = to_holes @ z[rims.on_outer]
+    centres, similarities = np.zeros(len(rims.sizes), complex), np.ones(len(rims.sizes), complex)
+    for k in rims.holes:
+        here = _parts(rims)[k]
+        image, along = z[here], arcs[here]
+        centres[k] = (along + np.roll(along, 1)) @ image / (4 * np.pi)
+        along = arcs[here] = _arcs_about(image - centres[k], along)
+        circle = np.exp(-1j * (np.cumsum(along) - along))
+        similarities[k] = (along + np.roll(along, 1)) @ ((image - centres[k]) * circle.conj())
+    radii = np.abs(similarities) / (4 * np.pi)
+    radii[rims.outer] = 1
+    radii[rims.holes] = _with_room(centres[rims.holes], radii[rims.holes])
+    return CircleDomain(rims, arcs, np.angle(similarities), centres, radii, LEAST_SHARE * arcs)
 
 
 #: Harmonic measure per length is taken for at least this share of its largest value.
@@ -105,12 +147,11 @@ def arcs_of_measure(measure: Real, lengths: Real) -> Real:
     return lengths * (density + np.roll(density, -1))
 
 
-def _arcs_about(loop: Complex, lengths: Real) -> Real:
-    """The arcs of a hole's clockwise image about its centre, or those in proportion to length."""
+def _arcs_about(loop: Complex, otherwise: Real) -> Real:
+    """Return the arcs of a hole's clockwise image about its centre, if that is in order."""
     if (loop == 0).any() or backward_arcs(np.conj(loop)) or polygon_area(loop) >= 0:
-        return lengths * (2 * np.pi / lengths.sum())
-    arcs = np.angle(loop / np.roll(loop, -1))
-    return arcs * (2 * np.pi / arcs.sum())
+        return otherwise
+    return _of_circle(np.angle(loop / np.roll(loop, -1)))
 
 
 def _with_room(centres: Complex, radii: Real) -> Real:

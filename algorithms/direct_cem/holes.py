@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
@@ -18,9 +20,15 @@ from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import algorithm
 
-from .boundary_energy import in_gauge, minimise
+from .boundary_energy import EnergyModel, in_gauge, minimise
+from .circle_domain import CircleDomain
 from .filled_start import widest_start
 from .gauge_walk import STEPS, gauge_walk
+
+Complex = NDArray[np.complex128]
+
+#: What share of E_C it may cost that crowded arcs take the proportions of the start.
+MOST_COST = 0.01
 
 
 @algorithm(
@@ -38,38 +46,43 @@ def direct_cem_holes(
     outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None,
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which circles, and which places on them, have the least conformal energy?
+    """Map a surface with holes to the circle domain of least conformal energy.
 
     As `direct-cem`, without its way back, with the centre and the radius of every hole as further
     unknowns; the holes are open in every step, and their circles exact. The outer boundary is that
-    of the vertex `outer`, or the longest. Decided here: the start fills the holes with disks and
-    takes circles of the images' centroids and areas; where one of these has a radius below 1e-3,
-    each boundary is tried as the outer one, the one that leaves the smallest circle largest is
-    outside while E_C is minimised (`outside_while_minimised`; the energy history is that of this
-    domain), and a Moebius map brings the outer one out; folds are mended with the boundary kept
-    (`fold_repairs`).
+    of the vertex `outer`, or the widest. Decided here: the start fills the holes with disks, their
+    vertices on the rim by the hole's equilibrium measure, and fits circles to their images; the
+    origin is near the middle triangle or among the holes, whichever has the lower energy, and then
+    in the `gauge`. Where a circle has a radius below 1e-3, each boundary is tried as the outer one,
+    the one that leaves the smallest circle largest is outside while E_C is minimised
+    (`outside_while_minimised`; the energy history is that of this domain), and a Moebius map brings
+    the outer one out. Arcs below a hundredth of the mean one, which the energy hardly sees, take
+    the proportions of the start's where that has better angles and costs at most 1 % of E_C
+    (`settled`). Folds are mended with the boundary kept (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
-        longest, holes = mesh.outer_and_holes(outer)
-    bordered = BorderedLaplacian(mesh, L, (longest, *holes))
+        widest, holes = mesh.outer_and_holes(outer)
+    bordered = BorderedLaplacian(mesh, L, (widest, *holes))
     S = bordered.dirichlet_to_neumann()
     with phase("start"):
-        measures = [gauge_measure(mesh, name, longest) for name in ("triangle", gauge)]
+        measures = [gauge_measure(mesh, name, widest) for name in ("triangle", gauge)]
     seen, weights = bordered.swept_to_boundary(np.stack(measures, axis=1)).T
     with phase("start"):
-        lengths = [edge_lengths(mesh, loop) for loop in (longest, *holes)]
+        lengths = [edge_lengths(mesh, loop) for loop in (widest, *holes)]
         start = widest_start(S, seen, lengths)
     chart = start.rims.outer
     start = start if chart else in_gauge(start, weights)
     held = weights if gauge == "triangle" and not chart else start.outer_measure
     found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
-    here = found.model
+    angle_error = SampledAngleError(mesh)
+    here, settled = _settled(found.model, start, bordered.harmonic_extension, angle_error)
+    energies = found.energies + ((here.energy,) if settled else ())
     if chart:
         here = here.at(in_gauge(here.domain.inside_out(0), weights))
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
-    energies = found.energies if chart else found.energies + walked
+    uv, walked = gauge_walk(here, bordered.harmonic_extension, angle_error, steps)
+    energies += () if chart else walked
     folded = flipped_triangles(mesh, uv)
     uv, repairs = interior_without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
     extras = {
@@ -78,8 +91,26 @@ def direct_cem_holes(
         "gauge_steps": len(walked),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
-        "outside_while_minimised": int(longest[0] if not chart else holes[chart - 1][0]),
+        "settled": settled,
+        "outside_while_minimised": int(widest[0] if not chart else holes[chart - 1][0]),
         "folded_before_repair": folded,
         "fold_repairs": repairs,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
+
+
+def _settled(
+    here: EnergyModel,
+    start: CircleDomain,
+    extended: Callable[[Complex], Complex],
+    angle_error: SampledAngleError,
+) -> tuple[EnergyModel, bool]:
+    """Return the minimum with the start's proportions where arcs crowd, if its angles gain."""
+    domain = here.domain.settled(start)
+    if domain is here.domain:
+        return here, False
+    there = here.at(in_gauge(domain, here.weights))
+    if there.energy > (1 + MOST_COST) * here.energy:
+        return here, False
+    errors = [angle_error(extended(model.domain.points)) for model in (here, there)]
+    return (there, True) if errors[1] < errors[0] else (here, False)

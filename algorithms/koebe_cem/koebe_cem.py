@@ -36,7 +36,7 @@ def koebe_cem(
     """Which map takes a surface with holes to a disk with round holes? Algorithm 2 of the paper.
 
     One sweep is Algorithm 2: each boundary in turn is left open, the others are filled, and CEM
-    makes it a circle; the outer one (that of the vertex `outer`, or the longest) comes last. More
+    makes it a circle; the outer one (that of the vertex `outer`, or the widest) comes last. More
     sweeps go on from there. Decided here: the surface's own triangles keep the surface's cotangent
     weights in every step (`weights="plane"` takes those of the last image, as the paper's text
     reads); a hole that has an image is filled by a round disk with its vertices where the image

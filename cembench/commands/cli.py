@@ -73,6 +73,10 @@ app = typer.Typer(
 Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
 
 
+#: What `map` takes where the user names no algorithm: the first that takes the surface.
+USUAL = ("direct-cem", "direct-cem-holes")
+
+
 class Solves(StrEnum):
     """Keep a factor while its matrix stands, or factor at every solve like MATLAB's backslash."""
 
@@ -160,13 +164,26 @@ def map_(
         Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`.")
     ],
     *,
-    algorithm: Annotated[str, typer.Option("-a", "--algorithm", help="See `list`.")] = "cem",
+    algorithm: Annotated[
+        str | None,
+        typer.Option(
+            "-a",
+            "--algorithm",
+            help="See `list`; default: direct-cem, or direct-cem-holes for a surface with holes.",
+        ),
+    ] = None,
     parameter: Parameters = [],  # noqa: B006
     output: Annotated[
         Path | None, typer.Option("-o", "--output", help="Surface with UVs: OBJ or PLY.")
     ] = None,
     preview: Annotated[
-        bool, typer.Option("--preview", help="Draw a PNG, beside the output.")
+        bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
+    ] = False,
+    keep_invalid: Annotated[
+        bool,
+        typer.Option(
+            "--keep-invalid", help="Write a map that is not valid too; the exit code stays 1."
+        ),
     ] = False,
     force: Annotated[
         bool, typer.Option("--force", help="Write over the input, or a picture not made here.")
@@ -194,19 +211,20 @@ def map_(
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     registry = registry_with(plugin)
-    chosen = registry.algorithm(algorithm)
+    candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
     if output is not None:
         check_writable_format(output, with_uv=True)
     if not mesh.exists() and str(mesh) in registry.datasets:
         mesh = fetch_verbs.fetched(registry.dataset(str(mesh)))
-    usual = Path(f"{file_name(f'{mesh.stem}_{algorithm}')}.png")
-    picture = usual if output is None else output.with_suffix(".png")
     if output is not None:
         refuse_inputs(output, [mesh], force=force)
-    if preview and not force:
-        check_replaceable(picture)
     with err.status("reading", spinner="line"):
-        surface = read_mesh_for(mesh, [chosen])
+        surface = read_mesh_for(mesh, candidates)
+        chosen = next(a for a in candidates if isinstance(surface, a.mesh_type))
+        usual = Path(f"{file_name(f'{mesh.stem}_{chosen.name}')}.png")
+        picture = usual if output is None else output.with_suffix(".png")
+        if preview and not force:
+            check_replaceable(picture)
         standing = {surface.name: standing_of_file(registry, mesh, surface)}
     how = How(solves.value, _installed(backend), threads, repeats=1)
     tasks = plan_cells([chosen], [surface], assignments(parameter), how, plugin, standing)
@@ -214,7 +232,7 @@ def map_(
         record, uv = map_once(tasks[0], options)
     ok = record.outcome.status == "ok"
     written: dict[str, str] = {}
-    if ok and uv is not None:
+    if uv is not None and (ok or keep_invalid):
         if output is not None:
             write_mesh(output, surface, uv)
             written["output"] = str(output)
@@ -229,10 +247,12 @@ def map_(
         out.print(figures_table(record))
         for what, where in written.items():
             print_pair(what, where)
-        if ok and not written:
-            out.print("Nothing was written; add -o FILE.obj to keep the map.", style="dim")
+        if uv is not None and not written:
+            more = "" if ok or keep_invalid else " --keep-invalid"
+            out.print(f"Nothing was written; add{more} -o FILE.obj to keep the map.", style="dim")
     if not ok:
-        complain(f"{record.outcome.status}: {record.outcome.cause}")
+        kept = " (this map was written all the same: --keep-invalid)" if written else ""
+        complain(f"{record.outcome.status}: {record.outcome.cause}{kept}")
         raise typer.Exit(1)
 
 

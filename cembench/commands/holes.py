@@ -32,7 +32,7 @@ def holes(
     outer: Annotated[
         int | None,
         typer.Option(
-            min=0, max=2**63 - 1, help="A vertex of the outer boundary; default: the longest."
+            min=0, max=2**63 - 1, help="A vertex of the outer boundary; default: the widest one's."
         ),
     ] = None,
     sweeps: Annotated[

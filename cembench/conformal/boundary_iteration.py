@@ -84,8 +84,9 @@ def iterate_boundary(
     tolerance: float,
     max_iterations: int,
     inversion: bool = True,
+    best: bool = False,
 ) -> tuple[Complex, Complex, list[float], int]:
-    """Which boundary values does CEM's iteration (30), (24), (25), (22) end with?
+    """Return the boundary values that CEM's iteration (30), (24), (25), (22) ends with.
 
     Parameters
     ----------
@@ -98,15 +99,18 @@ def iterate_boundary(
     energy : function
         E_C (Eq. 7) of f_i and f_b.
     tolerance, max_iterations
-        It ends after the first step that lowers E_C by less, or after so many.
+        It ends after the first step that changes E_C by less, or after so many. A rise at first is
+        not an end: Remark 3 says that E_C "would become" decreasing.
     inversion : bool
         Step (30); else (23). A step that would make boundary vertices change places is (23), and
         iteration ends where (23) would do so too.
+    best : bool
+        Return the values of least E_C, the start's included, instead of the last ones.
 
     Returns
     -------
     f_b, f_i : complex
-        The last values.
+        The last values, or those of least E_C.
     history : list of float
         E_C of the start and after each step.
     order_kept : int
@@ -120,6 +124,7 @@ def iterate_boundary(
 
     f_i = dirichlet(f_b)
     history = [energy(f_i, f_b)]
+    least = f_b, f_i
     order_kept = 0
     for _ in range(max_iterations):
         following = step(inverted(f_i) if inversion else f_i)
@@ -131,6 +136,8 @@ def iterate_boundary(
         f_b = following
         f_i = dirichlet(f_b)
         history.append(energy(f_i, f_b))
-        if history[-2] - history[-1] < tolerance:
+        if history[-1] < min(history[:-1]):
+            least = f_b, f_i
+        if abs(history[-2] - history[-1]) < tolerance:
             break
-    return f_b, f_i, history, order_kept
+    return *(least if best else (f_b, f_i)), history, order_kept

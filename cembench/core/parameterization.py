@@ -24,7 +24,9 @@ class Parameterization:
         E_C (Eq. 7) of the start and after each iteration; empty for a direct method.
     extras : dict
         Whatever else the algorithm has to tell; values that JSON can hold. Where the energies are
-        of another kind, ``energy_of`` says of which.
+        of another kind, ``energy_of`` says of which; ``stopped: "crowded"`` says that an iteration
+        ended early because the boundary is too crowded, and ``fold_repairs`` counts the solves that
+        laid folds flat: the harness then names this where the angles are bad.
 
     """
 

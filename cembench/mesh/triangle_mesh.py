@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Self
@@ -140,7 +141,7 @@ class DiskMesh(TriangleMesh):
                 "(see `cembench list algorithms`)."
             )
         _check_genus(F, len(V), 1)
-        return _definition_1_notices(F, len(V), loops[0])
+        return definition_1_notices(F, len(V), loops)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,9 +151,11 @@ class HoledMesh(TriangleMesh):
     def outer_and_holes(
         self, outer: int | None = None
     ) -> tuple[NDArray[np.int64], tuple[NDArray[np.int64], ...]]:
-        """Which boundary loop is the outer one, and which are holes?
+        """Return the outer boundary loop, and the holes.
 
-        The outer one is that of the vertex `outer`, or the longest; the holes come longest first.
+        The outer one is that of the vertex `outer`, or the widest, by the mean square distance of
+        its points from their centroid: a hole with many fingers can be longer than the boundary
+        round it. The holes come longest first.
         Each has the surface on its left, so the outer one runs counter-clockwise in a map.
 
         Raises
@@ -167,7 +170,8 @@ class HoledMesh(TriangleMesh):
         ]
         loops = [self.loops[k] for k in np.argsort(lengths, kind="stable")[::-1]]
         if outer is None:
-            return loops[0], tuple(loops[1:])
+            widest = int(np.argmax([_width(self.V[loop]) for loop in loops]))
+            return loops.pop(widest), tuple(loops)
         chosen = [k for k, loop in enumerate(loops) if (loop == outer).any()]
         if not chosen:
             where = "is no vertex" if not 0 <= outer < self.n else "lies on no boundary loop"
@@ -188,7 +192,15 @@ class HoledMesh(TriangleMesh):
                 "one hole. Use an algorithm for disks (see `cembench list algorithms`)."
             )
         _check_genus(F, len(V), len(loops))
-        return ()
+        return definition_1_notices(F, len(V), loops)
+
+
+def _width(loop: NDArray[np.float64]) -> float:
+    """Return the mean square distance of a closed polygon's points (k, 3) from their centroid."""
+    after, middle = np.roll(loop, -1, axis=0), (loop + np.roll(loop, -1, axis=0)) / 2
+    lengths = np.linalg.norm(after - loop, axis=1)
+    away = middle - np.average(middle, axis=0, weights=lengths)
+    return float(np.average((away**2).sum(axis=1), weights=lengths))
 
 
 def _as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -350,12 +362,12 @@ def _check_genus(F: NDArray[np.int64], n: int, loops: int) -> None:
         )
 
 
-def _definition_1_notices(
-    F: NDArray[np.int64], n: int, boundary: NDArray[np.int64]
+def definition_1_notices(
+    F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
 ) -> tuple[str, ...]:
-    """Where does the mesh break the paper's Definition 1 (a well-conditioned mesh)?"""
+    """Return where the mesh breaks the paper's Definition 1 (a well-conditioned mesh)."""
     inside = np.ones(n, dtype=bool)
-    inside[boundary] = False
+    inside[np.concatenate(loops)] = False
     graph = topology.vertex_graph(F, n)
     notices: tuple[str, ...] = ()
     if not inside.any():
@@ -366,10 +378,19 @@ def _definition_1_notices(
         notices += (
             f"Definition 1 (ii) broken: the interior vertices form {pieces} pieces, not one",
         )
-    ears = boundary[(graph[boundary][:, interior].sum(axis=1) == 0)]
-    if len(ears):
-        notices += (
-            f"Definition 1 (iv) broken: boundary vertices without an interior neighbour: "
-            f"{_some(ears)}",
-        )
+    for loop in loops:
+        ears = loop[graph[loop][:, interior].sum(axis=1) == 0]
+        if len(ears) and len(loops) == 1:
+            notices += (
+                "Definition 1 (iv) broken: boundary vertices without an interior neighbour: "
+                f"{_some(ears)}",
+            )
+        elif len(ears):
+            notices += (
+                f"Definition 1 (iv) broken: on the boundary of vertex {loop.min()} ({len(loop)} "
+                f"vertices), vertices without an interior neighbour: {_some(ears)}. If this is a "
+                "hole, their triangles fold in every map to a disk with round holes: a triangle "
+                "with all corners on a circle lies inside it. Remove these vertices, or divide "
+                "their triangles",
+            )
     return notices

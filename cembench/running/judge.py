@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns
-from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.registry import Algorithm
 from cembench.results.records import Fault, FaultKind
 
@@ -60,7 +60,7 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]
 
 def broken_premises(mesh: TriangleMesh) -> list[str]:
     """Return what to say of a mesh that breaks a premise of the paper; nothing of another."""
-    broken = [notice for notice in mesh.notices if notice.startswith("Definition 1")]
+    broken = definition_1_notices(mesh.F, mesh.n, mesh.loops) if mesh.loops else ()
     return [f"the mesh breaks a premise of the paper: {'; '.join(broken)}"] if broken else []
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import gc
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -33,6 +33,7 @@ from cembench.registry import Algorithm
 from cembench.results.records import Boundary, Cell, Fault, FaultKind, Outcome, Round, not_ok
 from cembench.running.judge import faults, remarks
 from cembench.running.memory import Memory, memory_of_call
+from cembench.running.quality import quality_notes
 from cembench.running.returned import (
     hash_of,
     map_of,
@@ -94,7 +95,7 @@ def check_cell(
     seconds = phases_fault(timing)
     problems += [seconds] if seconds else []
     try:
-        about, more = _judged(algorithm, mesh, uv)
+        about, more = _judged(algorithm, mesh, uv, report.get("extras", {}))
     except MemoryError as error:
         return outcome_of_error(error, mesh), None
     except Exception as error:
@@ -186,17 +187,19 @@ def _other_energy(mesh: TriangleMesh, uv: Complex, checked: Checked) -> list[Fau
 
 
 def _judged(
-    algorithm: Algorithm, mesh: TriangleMesh, uv: Complex
+    algorithm: Algorithm, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
     """Return what an outcome says of a map, and the faults."""
     with _unruffled():
         problems = faults(algorithm, mesh, uv)
         metrics = all_metrics(mesh, uv)
-        told = () if problems else (*remarks(algorithm, mesh, uv), *lost_in_rounding(metrics))
+        told = [] if problems else [*remarks(algorithm, mesh, uv), *lost_in_rounding(metrics)]
+        if not problems:
+            told += quality_notes(algorithm.target, mesh, uv, extras)
         about = {
             "metrics": {name: _finite(v) for name, v in metrics.items()},
             "boundaries": _boundaries(mesh, uv),
-            "notes": told,
+            "notes": tuple(told),
         }
     return about, problems
 

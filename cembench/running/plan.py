@@ -145,25 +145,24 @@ def mesh_facts(mesh: TriangleMesh, standing: Standing = Standing()) -> MeshFacts
 
 
 def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
-    """Read a file as the kind of surface that the algorithms take; the first kind's error counts.
+    """Read a file as the kind of surface that the algorithms take, the narrowest that it is.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or is of no kind that any of the algorithms takes.
+        The file cannot be read, or is of no kind that any of the algorithms takes: why it is not
+        of the first one's kind.
 
     """
-    kinds = list(dict.fromkeys(a.mesh_type for a in algorithms))
     soup = read_soup(path)
-    for kind in kinds[1:]:
+    kinds = dict.fromkeys(a.mesh_type for a in algorithms)
+    refused: dict[type[TriangleMesh], MeshError] = {}
+    for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
         try:
             return checked(soup, kind)
-        except MeshError:
-            continue
-    try:
-        return checked(soup, kinds[0])
-    except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
+        except MeshError as error:
+            refused[kind] = error
+    raise MeshError(f"{path}: {refused[next(iter(kinds))]}")
 
 
 def gather_surfaces(

@@ -43,6 +43,26 @@ def test_arcs_far_below_rounding_stay_exact_under_a_moebius_map():
     np.testing.assert_allclose(image[2] / image[1], 3, rtol=1e-10)
 
 
+def test_settled_arcs_have_the_other_ones_proportions_where_they_crowd_and_keep_their_sum():
+    start = CircleDomain.of_arcs(np.array([2.105, 1e-9, 3e-9, 2e-9, 2.0, 1.895]))
+    domain = CircleDomain.of_arcs(np.array([2.105, 5e-9, 1e-9, 1e-12, 2.5, 1.395]))
+    found = domain.settled(start).arcs
+    np.testing.assert_allclose(found[2:4] / found[1], [3, 2])
+    np.testing.assert_allclose(found[[0, 5]], domain.arcs[[0, 5]])
+    assert found.sum() == pytest.approx(2 * np.pi)
+    even = CircleDomain.of_arcs(np.ones(6))
+    assert even.settled(even) is even
+
+
+def test_an_arc_too_short_to_count_is_not_held():
+    domain = CircleDomain.of_arcs(np.array([2.0, 1e-9, 1.0, 2.0]))
+    there = domain.moved(np.array([0.0, 0.0, 2.0, -2.0]), np.zeros(1), np.zeros(1, complex))
+    shrunk = CircleDomain(
+        there.rims, there.least, there.turns, there.centres, there.radii, there.least
+    )
+    assert shrunk.shortest.tolist() == [True, False, True, True]
+
+
 @pytest.mark.parametrize("k", [1, 2])
 def test_turned_inside_out_a_hole_is_outside_and_back_again_all_is_as_it_was(k):
     domain = ring_and_two_holes()

@@ -1,7 +1,10 @@
 import numpy as np
+import pytest
+from cembench.algorithms.direct_cem.circle_domain import Rims
 from cembench.algorithms.direct_cem.filled_start import (
     CROWDED,
     arcs_of_measure,
+    equilibrium_measures,
     filled_start,
     widest_start,
 )
@@ -55,6 +58,22 @@ def test_down_a_tube_another_loop_is_outside_at_first():
     assert chosen.rims.outer != 0
     assert chosen.radii.min() > 10 * first.radii.min()
     assert chosen.apart
+
+
+def test_on_a_concentric_ring_each_loop_has_an_even_equilibrium_measure():
+    S, _, lengths = pieces(HoledMesh.from_arrays(*gallery.annulus()))
+    rims = Rims(tuple(map(len, lengths)))
+    own = equilibrium_measures(S, rims)
+    np.testing.assert_allclose(own * np.array(rims.sizes)[rims.loop], 1, rtol=0.2)
+    np.testing.assert_allclose(rims.sums(own), 1)
+
+
+def test_a_start_does_not_depend_on_what_is_seen_where_that_crowds_it():
+    S, seen, lengths = pieces(HoledMesh.from_arrays(*gallery.annulus()))
+    corner = np.zeros_like(seen)
+    corner[0] = 1  # the origin would go to the boundary
+    (circle,) = filled_start(S, corner, lengths, 0).radii[1:]
+    assert circle == pytest.approx(0.5, rel=0.02)
 
 
 def test_even_harmonic_measure_gives_arcs_in_proportion_to_length():

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from tests import gallery
 from tests.real_meshes import DISKS, real_mesh
 from tests.running.test_local import FAULTY
 
@@ -51,11 +52,46 @@ def test_map_writes_uvs_and_a_picture(cli, cap):
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_map_takes_the_algorithm_that_fits_the_surface(cli, cap, tmp_path):
+    from cembench.mesh.files import write_mesh
+
+    write_mesh(tmp_path / "holes.obj", gallery.three_holes())
+    taken = [
+        json.loads(cli("map", file, "--json")[1])["algorithm"]
+        for file in (cap, tmp_path / "holes.obj")
+    ]
+    assert taken == ["direct-cem", "direct-cem-holes"]
+
+
 def test_map_of_an_invalid_result_writes_nothing_and_exits_with_1(cli, cap):
     code, _, err = cli("map", cap, "-a", "mirrored", "--plugin", FAULTY, "-o", "uv.obj")
     assert code == 1
     assert "invalid: the map reverses the surface's orientation" in err
     assert not list(cli.folder.iterdir())
+
+
+def test_an_invalid_map_is_written_on_request_and_called_invalid(cli, cap):
+    arguments = ("map", cap, "-a", "mirrored", "--plugin", FAULTY, "-o", "uv.obj", "--preview")
+    code, _, err = cli(*arguments, "--keep-invalid")
+    assert code == 1
+    assert "invalid: the map reverses the surface's orientation" in err
+    assert "written all the same" in err
+    assert (cli.folder / "uv.obj").read_text().count("\nvt ") == 331
+    assert (cli.folder / "uv.png").exists()
+    assert json.loads(cli(*arguments, "--keep-invalid", "--json")[1])["status"] == "invalid"
+
+
+def test_map_tells_of_a_map_that_is_far_from_conformal(cli, tmp_path):
+    from cembench.surfaces.flat_disk import flat_disk
+
+    from cembench.mesh.files import write_mesh
+
+    write_mesh(tmp_path / "long.obj", flat_disk(600, stretch=4.0))
+    code, out, _ = cli("map", tmp_path / "long.obj", "-a", "harmonic-circle", "--json")
+    assert code == 0
+    (note,) = json.loads(out)["notes"]
+    assert "far from conformal" in note
+    assert json.loads(cli("map", tmp_path / "long.obj", "--json")[1])["notes"] == []
 
 
 def test_run_records_shows_and_resumes(cli, cap):

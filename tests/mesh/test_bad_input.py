@@ -50,8 +50,8 @@ def test_each_bad_file_has_its_own_message(name, verb, cli, tmp_path):
     text, message = FILES[name]
     (tmp_path / name).write_text(text)
     where = [tmp_path / name] if verb == "map" else ["--mesh", tmp_path / name]
-    more = ["-o", "out.obj", "--preview"] if verb == "map" else ["-a", "cem", "-o", "out"]
-    code, out, err = cli(verb, *where, *more)
+    more = ["-o", "out.obj", "--preview"] if verb == "map" else ["-o", "out"]
+    code, out, err = cli(verb, *where, "-a", "cem", *more)
     assert code == 2
     assert out == ""
     assert str(tmp_path / name) in err

@@ -116,7 +116,7 @@ def test_what_is_no_disk_is_refused(surface, message):
         DiskMesh.from_arrays(mesh.V, mesh.F)
 
 
-def test_the_longest_loop_is_the_outer_one_unless_a_vertex_names_another():
+def test_the_widest_loop_is_the_outer_one_unless_a_vertex_names_another():
     mesh = gallery.three_holes()
     outer, holes = mesh.outer_and_holes()
     assert abs(mesh.V[outer]).max() == pytest.approx(1)
@@ -125,6 +125,18 @@ def test_the_longest_loop_is_the_outer_one_unless_a_vertex_names_another():
     assert (named == holes[1]).all()
     assert (others[0] == outer).all()
     assert len(others) == 3
+
+
+def test_a_hole_with_fingers_is_not_the_outer_one_though_it_is_the_longest():
+    angle = np.linspace(0, 2 * np.pi, 200, endpoint=False)
+    star = (0.5 + 0.3 * np.cos(12 * angle)) * np.exp(1j * angle)
+    z = np.concatenate([star, np.exp(1j * angle)])
+    j, k = np.arange(200), np.roll(np.arange(200), -1)
+    F = np.concatenate([np.stack([j, j + 200, k + 200], 1), np.stack([j, k + 200, k], 1)])
+    mesh = HoledMesh.from_arrays(np.stack([z.real, z.imag, 0 * z.real], 1), F)
+    outer, (hole,) = mesh.outer_and_holes()
+    assert np.abs(np.diff(z[hole])).sum() > np.abs(np.diff(z[outer])).sum()
+    assert set(outer) == set(range(200, 400))
 
 
 @pytest.mark.parametrize(
@@ -166,3 +178,10 @@ def test_slivers_are_reported():
     (notice,) = TriangleMesh.from_arrays(V * [1, 1e-7, 1], F).notices
     assert notice.startswith("slivers, with less area than 1e-06 of their longest edge squared: ")
     assert not TriangleMesh.from_arrays(V * [1, 1e-5, 1], F).notices
+
+
+def test_an_ear_on_a_hole_is_told_with_its_loop_and_vertex():
+    mesh, ear = gallery.eared_hole()
+    hole = min(mesh.loops, key=len)
+    (notice,) = [n for n in mesh.notices if f"boundary of vertex {hole.min()} " in n]
+    assert f"without an interior neighbour: {ear}." in notice

@@ -55,6 +55,20 @@ def test_where_cem_is_always_faster_the_claim_holds(tmp_path):
     assert "this project's implementations" in claim.remark
 
 
+@pytest.mark.parametrize(
+    ("history", "becomes"),
+    [
+        ((3.0, 2.0, 1.0), True),
+        ((1.0, 3.0, 2.0), True),  # a rise at first
+        ((3.0, 1.0, 2.0), False),  # a rise at last
+        ((3.0, 1.0, 2.0, 1.5), False),
+        ((1.0, 2.0), False),
+    ],
+)
+def test_becoming_monotonically_decreasing_allows_a_rise_at_first_alone(history, becomes):
+    assert iteration.becomes_decreasing(history) is becomes
+
+
 def test_the_printed_tables_agree_but_for_the_misprint(evidence):
     claim = efficiency.table_2_follows(evidence, {})
     assert claim.verdict == "holds in part"

@@ -20,17 +20,32 @@ ROUNDING = 1e-12
 
 
 def rises(history: Sequence[float]) -> int:
-    """In how many steps does the energy rise?"""
-    return sum(b > a * (1 + ROUNDING) for a, b in pairwise(history))
+    """Return in how many steps the energy rises."""
+    return sum(_rising(history))
+
+
+def becomes_decreasing(history: Sequence[float]) -> bool:
+    """Whether the energy, once it falls, falls in every further step, and falls in the last one."""
+    rising = _rising(history)
+    return not rising[-1] and sorted(rising, reverse=True) == rising
+
+
+def _rising(history: Sequence[float]) -> list[bool]:
+    return [b > a * (1 + ROUNDING) for a, b in pairwise(history)]
 
 
 def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does every iteration lower E_C?"""
-    found = [(s, r) for s, r in cem_records(evidence) if len(r.outcome.energy_history) > 1]
-    falling = [s for s, r in found if not rises(r.outcome.energy_history)]
+    """Judge whether E_C becomes monotonically decreasing."""
+    histories = {
+        s: r.outcome.energy_history
+        for s, r in cem_records(evidence)
+        if len(r.outcome.energy_history) > 1
+    }
+    falling = [s for s, history in histories.items() if not rises(history)]
+    become = [s for s, history in histories.items() if becomes_decreasing(history)]
     rising = [
-        f"{s.title} ({rises(r.outcome.energy_history)} of {len(r.outcome.energy_history) - 1})"
-        for s, r in found
+        f"{s.title} ({rises(history)} of {len(history) - 1})"
+        for s, history in histories.items()
         if s not in falling
     ]
     return Claim(
@@ -38,13 +53,13 @@ def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections)
         "the conformal energy of the map in the iterations (22), (30), (24) (25) would become "
         "monotonically decreasing",
         "Remark 3",
-        "E_C does not rise in any step of CEM's iteration. ('Become' allows a rise at first; the "
-        "test is the stricter reading.)",
-        f"falls in every step on {len(falling)} of {len(found)} surfaces"
+        "Once E_C falls in a step of CEM's iteration, it falls in all further ones. ('Become' "
+        "allows a rise at first.)",
+        f"so on {len(become)} of {len(histories)} surfaces, on {len(falling)} of them in every step"
         + (f"; steps that rise: {'; '.join(rising)}" if rising else ""),
-        verdict_of(len(falling), len(found)),
-        f"{tested_on([s for s, _ in found])} The stopping rule ends iteration after the first step "
-        "that does not lower E_C by the tolerance, so at most the last step can rise.",
+        verdict_of(len(become), len(histories)),
+        f"{tested_on(list(histories))} Iteration ends after the first step that changes E_C by "
+        "less than the tolerance, or after 20.",
     )
 
 
@@ -122,7 +137,8 @@ def at_most_20_iterations(evidence: Evidence, inspections: Inspections) -> Claim
         if pairs
         else "No model of the paper in this run.",
         verdict_of(within, len(pairs)),
-        f"{tested_on([s for s, _, _ in pairs])} The paper does not state its stopping rule; the "
-        "one here reproduces three of four counts on models that could be checked. On a stand-in "
-        "another count is to be expected.",
+        f"{tested_on([s for s, _, _ in pairs])} The paper does not state its stopping rule. "
+        "Here iteration ends after the first step that changes E_C by less than 1e-5, or after 20: "
+        "on the four models that could be checked this gives 20, 18, 19 and 2 iterations, printed "
+        "are 19, 13, 19 and 2. On a stand-in another count is to be expected.",
     )

@@ -1,0 +1,137 @@
+"""Judge whether a valid map is far from conformal for its mesh, and say why.
+
+How small angle errors can be depends on the mesh: on its edges, on how strongly a disk makes the
+conformal factor vary. So a map is compared with another one of the same mesh to the same kind of
+domain, made without iterating: the harmonic map whose boundary lies by harmonic measure. In the
+continuum that is the conformal map itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.algorithms.direct_cem.boundary_energy import EnergyModel, in_gauge
+from cembench.algorithms.direct_cem.circle_domain import CircleDomain
+from cembench.algorithms.direct_cem.filled_start import arcs_of_measure, widest_start
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.gauge import gauge_measure
+from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.laplacian import by_rows, laplacian
+from cembench.conformal.metrics import angle_errors, corner_angles
+from cembench.conformal.planar import polygon_area, signed_areas
+from cembench.core.errors import AlgorithmFailed
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh, definition_1_notices
+
+Complex = NDArray[np.complex128]
+
+#: A map whose mean angle error is this many times the yardstick's is far from conformal.
+FAR = 2.0
+#: So is one whose mean angle error is this share of that of triangles collapsed to segments:
+#: there the yardstick may be as bad.
+COLLAPSED = 0.25
+#: A triangle is crowded when its image has this share of the mean image area; so many of them, as a
+#: share of all, are named as a cause.
+CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
+
+
+def quality_notes(
+    target: str, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
+) -> list[str]:
+    """Return what a reader should know of how conformal a valid map is; empty where it is."""
+    notes = []
+    if extras.get("stopped") == "crowded":
+        notes.append(
+            "the iteration ended early, because the boundary is too crowded for it: this is not "
+            "the map of least energy"
+        )
+    known = yardstick(target, mesh, uv)
+    if known is None:
+        return notes
+    error, reachable = (float(angle_errors(mesh, z).mean()) for z in (uv, known))
+    causes = likely_causes(mesh, uv, extras)
+    if error > FAR * reachable:
+        notes.append(
+            f"far from conformal: angles are off by {error:.2f} degrees in the mean, where a "
+            f"harmonic map of this mesh by harmonic measure has {reachable:.2f}. Likely cause: "
+            f"{'; '.join(causes) or 'the method, not the mesh'}"
+        )
+    elif error > COLLAPSED * collapsed_error(mesh):
+        notes.append(
+            f"far from conformal: angles are off by {error:.2f} degrees in the mean, and a "
+            f"harmonic map of this mesh by harmonic measure is no better ({reachable:.2f}). "
+            f"Likely cause: {'; '.join(causes) or 'the mesh is too coarse for this domain'}"
+        )
+    return notes
+
+
+def collapsed_error(mesh: TriangleMesh) -> float:
+    """Return the mean angle error of a map that collapses all triangles, in degrees.
+
+    A collapsed triangle has angles 0, 0 and 180: two thirds of what its largest one lacks.
+    """
+    largest = corner_angles(mesh.V, mesh.F).max(axis=1)
+    return float((180 - largest).mean()) * 2 / 3
+
+
+def likely_causes(mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]) -> list[str]:
+    """Return what of the mesh, or of the map's making, can explain large angle errors."""
+    causes = []
+    if definition_1_notices(mesh.F, mesh.n, mesh.loops):
+        causes.append("ears or pinches of the mesh (it breaks Definition 1)")
+    repairs = extras.get("fold_repairs")
+    if repairs:
+        causes.append(f"folds were repaired ({repairs} solves)")
+    areas = np.abs(signed_areas(uv, mesh.F))
+    crowded = float((areas < CROWDED_AREA * areas.mean()).mean())
+    if crowded > CROWDED_SHARE:
+        causes.append(f"crowding ({crowded:.0%} of the triangles have hardly any area left)")
+    return causes
+
+
+def yardstick(target: str, mesh: TriangleMesh, uv: Complex) -> Complex | None:
+    """Return the map (n,) to compare with, of the same target; None where there is none.
+
+    With holes the boundary that is the outer one in `uv` is the outer one here.
+    """
+    try:
+        if target == "disk" and isinstance(mesh, DiskMesh):
+            return _by_harmonic_measure(mesh)
+        if target == "circular holes" and isinstance(mesh, HoledMesh):
+            return _by_filled_start(mesh, max(mesh.loops, key=lambda loop: polygon_area(uv[loop])))
+    except AlgorithmFailed:
+        return None
+    return None
+
+
+def _by_harmonic_measure(mesh: DiskMesh) -> Complex:
+    L, i, b = by_rows(laplacian(mesh)), mesh.interior, mesh.boundary
+    if not len(i):
+        raise AlgorithmFailed("the mesh has no interior vertex")
+    L_bi, inside = L[b][:, i], Cholesky(L[i][:, i].tocsc())
+    measure = gauge_measure(mesh, "triangle", b)
+    seen = measure[b] - L_bi @ inside.solve(measure[i])
+    arcs = CircleDomain.of_arcs(arcs_of_measure(seen, edge_lengths(mesh, b))).arcs
+    uv = np.empty(mesh.n, dtype=np.complex128)
+    uv[b] = np.exp(1j * (np.cumsum(arcs) - arcs))
+    uv[i] = inside.solve(-(L_bi.T @ uv[b]))
+    return uv
+
+
+def _by_filled_start(mesh: HoledMesh, outer: NDArray[np.int64]) -> Complex:
+    outer, holes = mesh.outer_and_holes(int(outer[0]))
+    loops = (outer, *holes)
+    bordered = BorderedLaplacian(mesh, laplacian(mesh), loops)
+    S = bordered.dirichlet_to_neumann()
+    measures = [gauge_measure(mesh, name, outer) for name in ("triangle", "boundary")]
+    seen, weights = bordered.swept_to_boundary(np.stack(measures, axis=1)).T
+    start = widest_start(S, seen, [edge_lengths(mesh, loop) for loop in loops])
+    if start.rims.outer:
+        start = start.inside_out(0)
+    domains = (start, in_gauge(start, weights))
+    best = min(domains, key=lambda domain: EnergyModel(S, domain, weights).energy)
+    return bordered.harmonic_extension(best.points)

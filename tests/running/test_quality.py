@@ -1,0 +1,95 @@
+"""How far from conformal is a valid map, judged on its own mesh?"""
+
+import numpy as np
+import pytest
+from cembench.algorithms.cem import cem
+from cembench.algorithms.direct_cem.disk import direct_cem
+from cembench.algorithms.direct_cem.holes import direct_cem_holes
+from cembench.algorithms.harmonic_circle import harmonic_circle
+from cembench.algorithms.harmonic_filled import harmonic_filled
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from cembench.surfaces.spherical_cap import spherical_cap
+
+from cembench import DiskMesh
+from cembench.conformal.metrics import angle_errors
+from cembench.mesh.triangle_mesh import HoledMesh
+from cembench.running.quality import collapsed_error, likely_causes, quality_notes, yardstick
+from tests import gallery
+
+
+def warped():
+    mesh = gallery.three_holes()
+    z = np.exp(0.8 * (mesh.V[:, 0] + 1j * mesh.V[:, 1]))
+    return HoledMesh.from_arrays(np.stack([z.real, z.imag, 0 * z.real], axis=1), mesh.F)
+
+
+def eared_disk(count=15):
+    """A flat disk with long ears: triangles that hang on one boundary edge."""
+    mesh = flat_disk(200)
+    V, F = [*mesh.V], [*mesh.F]
+    for k in range(count):
+        a, b = mesh.boundary[2 * k], mesh.boundary[2 * k + 1]
+        F.append([b, a, len(V)])
+        V.append(8 * (mesh.V[a] + mesh.V[b]) / 2)
+    return DiskMesh.from_arrays(np.array(V), np.array(F))
+
+
+@pytest.mark.parametrize("mesh", [hemi_ellipsoid(800, x=2.0), flat_disk(600, stretch=4.0)])
+def test_the_yardstick_is_about_as_good_as_the_best_method(mesh):
+    best = angle_errors(mesh, direct_cem(mesh).uv).mean()
+    assert angle_errors(mesh, yardstick("disk", mesh, direct_cem(mesh).uv)).mean() < 1.3 * best
+
+
+@pytest.mark.parametrize("algorithm", [cem, direct_cem])
+def test_conformal_maps_get_no_note(algorithm):
+    mesh = hemi_ellipsoid(800, x=2.0)
+    found = algorithm(mesh)
+    assert quality_notes("disk", mesh, found.uv, found.extras) == []
+
+
+def test_a_map_by_arc_length_of_a_long_surface_is_far_from_conformal():
+    mesh = flat_disk(600, stretch=4.0)
+    (note,) = quality_notes("disk", mesh, harmonic_circle(mesh).uv, {})
+    assert "far from conformal" in note
+    assert "the method, not the mesh" in note
+
+
+def test_with_holes_the_yardstick_has_the_same_boundary_outside():
+    mesh = warped()
+    found = direct_cem_holes(mesh)
+    assert quality_notes("circular holes", mesh, found.uv, found.extras) == []
+    hole = mesh.outer_and_holes()[1][0]
+    turned = harmonic_filled(mesh, outer=int(hole[0])).uv
+    known = yardstick("circular holes", mesh, turned)
+    assert abs(abs(known[hole]) - 1).max() < 1e-12
+
+
+def test_a_crowded_end_is_never_passed_over():
+    mesh = spherical_cap(300)
+    uv = direct_cem(mesh).uv
+    assert "crowded" in quality_notes("disk", mesh, uv, {"stopped": "crowded"})[0]
+
+
+def test_causes_are_those_of_the_mesh_and_of_the_map():
+    mesh = eared_disk()
+    causes = likely_causes(mesh, direct_cem(mesh).uv, {"fold_repairs": 3})
+    assert "Definition 1" in causes[0]
+    assert "3 solves" in causes[1]
+    sound = flat_disk(200)
+    assert likely_causes(sound, sound.V[:, 0] + 1j * sound.V[:, 1], {}) == []
+
+
+def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_better(monkeypatch):
+    mesh = flat_disk(200)
+    flat = mesh.V[:, 0] + 1e-3j * mesh.V[:, 1]
+    assert angle_errors(mesh, flat).mean() == pytest.approx(collapsed_error(mesh), rel=0.3)
+    monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
+    (note,) = quality_notes("disk", mesh, flat, {})
+    assert "no better" in note
+    assert "too coarse" in note
+
+
+def test_a_free_boundary_has_no_yardstick():
+    mesh = flat_disk(200)
+    assert yardstick("free boundary", mesh, mesh.V[:, 0] + 0j) is None
