@@ -10,6 +10,7 @@ from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import iterate_boundary, on_circle, pole_start
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
@@ -41,7 +42,7 @@ def cem(
     which has no inverse, counts as zero in (30); where (30) would make boundary vertices change
     places, which folds the map, that step is (23), and iteration ends where (23) would do so too
     (`order_kept` counts these steps; 0 on most surfaces); where negative cotangent weights still
-    fold the final map, they are raised around the folds and it is solved again (`fold_repairs`).
+    fold the final map, patches around the folds are laid out anew (`fold_repairs`).
     With the vertices ordered interior first, boundary last, and the last one pinned, a single
     Cholesky factor serves the start, and its leading block all Dirichlet solves. `delaunay` takes
     the weights of the intrinsic Delaunay triangulation.
@@ -64,10 +65,11 @@ def cem(
         best=best,
     )
     iterations = int(np.argmin(history)) if best else len(history) - 1
-    uv, repairs = without_folds(mesh, L, bordered.in_order(f_i, f_b))
+    uv = bordered.in_order(f_i, f_b)
+    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
     extras = {
         "order_kept": order_kept,
         "iterations_dropped": len(history) - 1 - iterations,
-        "fold_repairs": repairs,
+        **repair,
     }
     return Parameterization(uv, iterations, tuple(history[: iterations + 1]), extras)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -17,6 +18,7 @@ from cembench.conformal.beltrami import (
     weights_of_map,
 )
 from cembench.conformal.doubling import DoubledSurface, doubled
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
@@ -46,6 +48,7 @@ def fdm(
     *,
     tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-5,
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 5,
+    delaunay: bool = False,
 ) -> Parameterization:
     """Which disk map comes from correcting a harmonic one, in the half plane and by reflection?
 
@@ -64,25 +67,28 @@ def fdm(
     folds gives way to uniform weights; triangles that have collapsed in the plane take the
     surface's cotangents, the limit of what their coefficients give; a vertex at the centre is
     reflected to a modulus of 1e8. Where the last map folds, boundary vertices that changed places
-    are put in order, negative cotangent weights around the folds are raised, and it is solved again
-    (`fold_repairs` counts these solves). On meshes of a few hundred triangles, where the vertices
-    held are a large share of all, the iteration can diverge: the map returned is the iterate of the
-    least mean |mu|, and `iterations_dropped` counts those after it, 0 elsewhere.
+    are put in order, and patches around the folds are laid out anew (`fold_repairs` counts the
+    rounds). On meshes of a few hundred triangles, where the vertices held are a large share of all,
+    the iteration can diverge: the map returned is the iterate of the least mean |mu|, and
+    `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes the weights of the
+    intrinsic Delaunay triangulation where a solver's matrix is the surface's own
+    Laplacian: in all solves but that of the reflected map.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so there is nothing to correct")
-    L = laplacian(mesh)
+    L = laplacian(mesh, delaunay=delaunay)
+    own = L if delaunay else None
     double = doubled(mesh)
 
     def energy(z: Complex) -> float:
         return 0.5 * float(np.vdot(z, L @ z).real) - polygon_area(z[mesh.boundary])
 
-    z = _corrected_in_half_plane(mesh, _start(mesh, L))
+    z = _corrected_in_half_plane(mesh, _start(mesh, L), own)
     mu = _coefficients(mesh, z)
     distortion, history = _mean_modulus(mu), [energy(z)]
     best, least, dropped = z, distortion, 0
     for _ in range(max_iterations):
-        z = _corrected_by_reflection(mesh, double, z, mu)
+        z = _corrected_by_reflection(mesh, double, z, mu, own)
         mu = _coefficients(mesh, z)
         before, distortion = distortion, _mean_modulus(mu)
         history.append(energy(z))
@@ -91,9 +97,9 @@ def fdm(
             best, least, dropped = z, min(distortion, least), 0
         if abs(before - distortion) < tolerance:
             break
-    z, repairs = without_folds(mesh, L, best)
+    z, repair = accepted_repair(mesh, best, without_folds(mesh, L, best))
     kept = history[: len(history) - dropped]
-    told = {"fold_repairs": repairs, "iterations_dropped": dropped}
+    told = {**repair, "iterations_dropped": dropped}
     return Parameterization(z, len(kept) - 1, tuple(kept), told)
 
 
@@ -119,19 +125,26 @@ def _start(mesh: DiskMesh, L: sparse.csc_array) -> Complex:
     return harmonic_extension(uniform, mesh.boundary, circle)
 
 
-def _corrected_in_half_plane(mesh: DiskMesh, z: Complex) -> Complex:
-    """Make the map conformal but for what lies near z = 1, where it is kept ("north pole")."""
+def _corrected_in_half_plane(mesh: DiskMesh, z: Complex, L: sparse.csc_array | None) -> Complex:
+    """Make the map conformal but for what lies near z = 1, where it is kept ("north pole").
+
+    L is the surface's Laplacian where that is to be solved with.
+    """
     b = mesh.boundary
     z = z / _middle_of_best_edge(mesh, z)
     w = 1j * (1 + z) / (1 - z)
     w[b] = w[b].real
-    with phase("assembly"):
-        weights = weights_of_map(w, mesh.F, _coefficients(mesh, w), mesh.V)
+    if L is None:
+        with phase("assembly"):
+            weights = weights_of_map(w, mesh.F, _coefficients(mesh, w), mesh.V)
+        solve = partial(linear_beltrami_solver, mesh.F, weights)
+    else:
+        solve = partial(harmonic_extension, L)
     kept = np.setdiff1d(_largest(z.real, max(round(mesh.n / 5), 100)), b)
     kept = np.union1d(kept, [np.argmin(w.real), np.argmax(w.real)])
-    x = linear_beltrami_solver(mesh.F, weights, kept, w.real[kept])
+    x = solve(kept, w.real[kept])
     kept = np.union1d(kept, b)
-    y = linear_beltrami_solver(mesh.F, weights, kept, w.imag[kept])
+    y = solve(kept, w.imag[kept])
     w = x + 1j * y
     return (w - 1j) / (w + 1j)
 
@@ -148,7 +161,11 @@ def _middle_of_best_edge(mesh: DiskMesh, z: Complex) -> complex:
 
 
 def _corrected_by_reflection(
-    mesh: DiskMesh, double: DoubledSurface, z: Complex, mu: Complex
+    mesh: DiskMesh,
+    double: DoubledSurface,
+    z: Complex,
+    mu: Complex,
+    L: sparse.csc_array | None,
 ) -> Complex:
     """Solve on the map and its mirror image at once, then lay the boundary on the circle."""
     b = mesh.boundary
@@ -170,6 +187,8 @@ def _corrected_by_reflection(
     modulus = np.abs(z[b])
     if not modulus.min() > 0:
         raise AlgorithmFailed("a boundary vertex came to lie at the centre of the map")
+    if L is not None:
+        return harmonic_extension(L, b, z[b] / modulus)
     with phase("assembly"):
         weights = weights_of_map(z, mesh.F, _coefficients(mesh, z), mesh.V)
     return linear_beltrami_solver(mesh.F, weights, b, z[b] / modulus)

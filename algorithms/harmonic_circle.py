@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
@@ -22,9 +23,9 @@ def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterizati
     The cheapest map to the disk and the yardstick for all others: nothing adapts the boundary, so
     it is conformal only where the arc lengths happen to be right. `delaunay` takes the weights of
     the intrinsic Delaunay triangulation. Decided here: where cotangent weights are negative and the
-    map folds, they are raised around the folds and it is solved again (`fold_repairs`).
+    map folds, patches around the folds are laid out anew (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     z = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))
-    z, repairs = without_folds(mesh, L, z)
-    return Parameterization(z, extras={"fold_repairs": repairs})
+    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
+    return Parameterization(z, extras=repair)

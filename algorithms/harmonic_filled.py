@@ -6,6 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
@@ -35,5 +36,5 @@ def harmonic_filled(
     disk = filled(mesh, holes)
     L = laplacian(disk)
     z = harmonic_extension(L, disk.boundary, arc_length_circle(disk))
-    z, repairs = without_folds(disk, L, z)
-    return Parameterization(z[: mesh.n].copy(), extras={"fold_repairs": repairs})
+    z, repair = accepted_repair(disk, z, without_folds(disk, L, z))
+    return Parameterization(z[: mesh.n].copy(), extras=repair)

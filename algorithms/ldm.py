@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from cembench.conformal.beltrami import (
     beltrami_coefficients,
@@ -11,7 +12,9 @@ from cembench.conformal.beltrami import (
     weights_of_map,
 )
 from cembench.conformal.doubling import DoubledSurface, doubled, doubled_laplacian
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
+from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.moebius import three_point_map
 from cembench.conformal.planar import polygon_area
@@ -37,7 +40,7 @@ NEAREST = 1e-8
     target="disk",
     source="Choi & Lui, A linear formulation for disk conformal parameterization (2015)",
 )
-def ldm(mesh: DiskMesh) -> Parameterization:
+def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     """Which disk map is half of a conformal map from the doubled surface to the sphere?
 
     Faithful to the published method and to the program its authors made public: the doubled
@@ -52,24 +55,28 @@ def ldm(mesh: DiskMesh) -> Parameterization:
     Lion 242 of the 245 choices give the published digits, this one among them); the disk's width
     is that of its boundary; a vertex at the very south pole is moved by 1e-8; triangles that have
     collapsed in the plane take the surface's cotangents, the limit of what their coefficients
-    give. Where the last map folds, boundary vertices that changed places are put in order, negative
-    cotangent weights around the folds are raised, and it is solved again (`fold_repairs` counts
-    these solves).
+    give. Where the last map folds, boundary vertices that changed places are put in order, and
+    patches around the folds are laid out anew (`fold_repairs` counts the rounds).
+    `delaunay` takes the weights of the intrinsic Delaunay triangulation in every solve: both linear
+    Beltrami solvers have the surface's own Laplacian as their matrix.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
-    L = laplacian(mesh)
+    L = laplacian(mesh, delaunay=delaunay)
     double = doubled(mesh)
     with phase("assembly"):
         L_double = doubled_laplacian(L, double)
         V = double.on_both(mesh.V)
     z = balanced_planar_map(L_double, V, double.F)
-    w = _corrected_at_north(double, V, z)
+    w = _corrected_at_north(double, V, z, L_double if delaunay else None)
     z = _laid_on_disk(mesh, w[: mesh.n])
     b = mesh.boundary
-    z = linear_beltrami_solver(mesh.F, _weights(z, mesh.F, mesh.V), b, z[b])
-    z, repairs = without_folds(mesh, L, z)
-    return Parameterization(z, extras={"fold_repairs": repairs})
+    if delaunay:
+        z = harmonic_extension(L, b, z[b])
+    else:
+        z = linear_beltrami_solver(mesh.F, _weights(z, mesh.F, mesh.V), b, z[b])
+    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
+    return Parameterization(z, extras=repair)
 
 
 def _weights(z: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -79,12 +86,19 @@ def _weights(z: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArra
         return weights_of_map(z, F, mu, V)
 
 
-def _corrected_at_north(double: DoubledSurface, V: NDArray[np.float64], z: Complex) -> Complex:
-    """Make the map conformal at the north pole too; the result is seen from the south pole."""
+def _corrected_at_north(
+    double: DoubledSurface, V: NDArray[np.float64], z: Complex, L: sparse.csc_array | None
+) -> Complex:
+    """Make the map conformal at the north pole too; the result is seen from the south pole.
+
+    L is the doubled surface's Laplacian where that is to be solved with.
+    """
     near = np.abs(z)
     held = np.argsort(near, kind="stable")[: min(HELD, len(z) - 1)]
     z = np.where(near < NEAREST, NEAREST, z)
     w: Complex = 1 / z.conj()
+    if L is not None:
+        return harmonic_extension(L, held, w[held])
     return linear_beltrami_solver(double.F, _weights(w, double.F, V), held, w[held])
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import interior_without_folds
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import polygon_area
@@ -33,8 +34,8 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     farthest from the mean vertex and the boundary vertex farthest from that one, laid at -1 and 1;
     the image is then scaled to area pi, so that its energies stand beside those of a disk, though
     its angles are lower for want of a boundary condition. Where negative cotangent weights fold the
-    interior they are raised around the folds and it is solved again (`fold_repairs`); where that
-    does not help, as with a boundary that crosses itself, the map stays as it was.
+    interior, patches around the folds are laid out anew (`fold_repairs`); where that does not help,
+    as with a boundary that crosses itself, folds stay.
     """
     L = laplacian(mesh, delaunay=delaunay)
     n, pins = mesh.n, _far_apart(mesh)
@@ -54,15 +55,9 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
             f"the image of the boundary encloses an area of {area:.3g}, which is not positive: "
             "the map has collapsed between its two pins"
         )
-    uv, repairs = _repaired(mesh, L, uv * np.sqrt(np.pi / area))
-    return Parameterization(uv, extras={"pins": pins.tolist(), "fold_repairs": repairs})
-
-
-def _repaired(mesh: DiskMesh, L: sparse.csc_array, uv: Complex) -> tuple[Complex, int]:
-    try:
-        return interior_without_folds(mesh, L, uv)
-    except AlgorithmFailed:  # no theorem promises it for a boundary that is not convex
-        return uv, 0
+    uv *= np.sqrt(np.pi / area)
+    uv, repair = accepted_repair(mesh, uv, interior_without_folds(mesh, uv))
+    return Parameterization(uv, extras={"pins": pins.tolist(), **repair})
 
 
 def _far_apart(mesh: DiskMesh) -> NDArray[np.int64]:

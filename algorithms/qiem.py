@@ -11,6 +11,7 @@ from scipy import sparse
 
 from cembench.conformal.balancing import moebius_centred
 from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
@@ -43,6 +44,7 @@ def qiem(
     *,
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 200,
+    delaunay: bool = False,
 ) -> Parameterization:
     """Which disk map is half of the limit of the heat flow of the doubled surface on the sphere?
 
@@ -62,11 +64,12 @@ def qiem(
     half projected from the far pole and scaled to the unit disk, the boundary laid on the circle
     and the interior solved for once more, which settles the crowded regions that the flow is slow
     to reach. Folds that remain are repaired as in FDM (`fold_repairs`). The energies recorded are
-    half of the sphere's, less 2 pi.
+    half of the sphere's, less 2 pi. `delaunay` takes the weights of the intrinsic Delaunay
+    triangulation.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
-    L = laplacian(mesh)
+    L = laplacian(mesh, delaunay=delaunay)
     double = doubled(mesh)
     with phase("assembly"):
         L_double = doubled_laplacian(L, double)
@@ -74,12 +77,12 @@ def qiem(
     z = balanced_planar_map(L_double, V, double.F)
     S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
     z = harmonic_extension(L, mesh.boundary, _boundary_on_circle(mesh, S))
-    z, repairs = without_folds(mesh, L, z)
+    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
     return Parameterization(
         z,
         len(energies) - 1,
         tuple(energy / 2 - 2 * np.pi for energy in energies),
-        {"fold_repairs": repairs, "energy_of": "half of the sphere's, less 2 pi"},
+        {**repair, "energy_of": "half of the sphere's, less 2 pi"},
     )
 
 

@@ -9,20 +9,21 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_energy import EnergyModel, in_gauge, minimise
+from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.conformal.filled_start import arcs_of_measure
+from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
-from cembench.conformal.metrics import SampledAngleError, flipped_triangles
+from cembench.conformal.metrics import SampledAngleError
 from cembench.core.clock import phase
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
-from .boundary_energy import EnergyModel, in_gauge, minimise
-from .circle_domain import CircleDomain
-from .filled_start import arcs_of_measure
 from .gauge_walk import STEPS, gauge_walk
 
 Real = NDArray[np.float64]
@@ -84,8 +85,7 @@ def direct_cem(
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
     uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
     energies += walked
-    folded = flipped_triangles(mesh, uv)
-    uv, repairs = without_folds(mesh, L, uv) if folded and not delaunay else (uv, 0)
+    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
@@ -93,8 +93,7 @@ def direct_cem(
         "gauge_steps": len(walked),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
-        "folded_before_repair": folded,
-        "fold_repairs": repairs,
+        **repair,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
 

@@ -12,9 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.boundary_energy import EnergyModel, moebius_descent
 from cembench.core.clock import phase
-
-from .boundary_energy import EnergyModel, moebius_descent
 
 Complex = NDArray[np.complex128]
 

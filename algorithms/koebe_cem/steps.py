@@ -151,7 +151,7 @@ def finished(
         uv = step.surface.in_order(step.surface.dirichlet(f_b), f_b)
     if (signed_areas(uv, mesh.F) > 0).all():
         return uv, 0
-    return interior_without_folds(mesh, laplacian(mesh), uv)
+    return interior_without_folds(mesh, uv)
 
 
 class _FilledSurface:

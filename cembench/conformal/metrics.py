@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.beltrami import dilatations as dilatations_between
 from cembench.conformal.laplacian import corner_products, half_cotangents
-from cembench.conformal.planar import fitted_circle, orientations, polygon_area
+from cembench.conformal.planar import fitted_circle, folded_triangles, polygon_area
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -79,8 +79,8 @@ class SampledAngleError:
 
 
 def flipped_triangles(mesh: TriangleMesh, uv: Complex) -> int:
-    """Return how many triangles are folded over or collapsed: image area not positive, exactly."""
-    return int(np.count_nonzero(orientations(uv, mesh.F) <= 0))
+    """Count the triangles that are folded over or collapsed, by the exact sign of their area."""
+    return len(folded_triangles(uv, mesh.F))
 
 
 def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:

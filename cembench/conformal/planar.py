@@ -29,6 +29,11 @@ def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
     return 0.5 * np.imag(np.conj(b - a) * (c - a))
 
 
+def folded_triangles(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the triangles whose image has no positive area, judged by its exact sign."""
+    return np.flatnonzero(orientations(uv, F) <= 0)
+
+
 def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
     """Return the exact sign of each triangle's image area: 1, 0 or -1, shape (m,).
 

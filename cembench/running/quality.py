@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.algorithms.direct_cem.boundary_energy import EnergyModel, in_gauge
-from cembench.algorithms.direct_cem.circle_domain import CircleDomain
-from cembench.algorithms.direct_cem.filled_start import arcs_of_measure, widest_start
 from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_energy import EnergyModel, in_gauge
+from cembench.conformal.circle_domain import CircleDomain
+from cembench.conformal.filled_start import arcs_of_measure, widest_start
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import by_rows, laplacian

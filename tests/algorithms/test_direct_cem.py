@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 from cembench.algorithms.cem import cem
-from cembench.algorithms.direct_cem.boundary_energy import EnergyModel
 from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.algorithms.direct_cem.gauge_walk import LEASH
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench import AlgorithmFailed, DiskMesh
+from cembench.conformal.boundary_energy import EnergyModel
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.metrics import all_metrics, angle_errors, flipped_triangles
 from cembench.conformal.planar import backward_arcs

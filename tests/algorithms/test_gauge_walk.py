@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
-from cembench.algorithms.direct_cem.boundary_energy import EnergyModel
-from cembench.algorithms.direct_cem.circle_domain import CircleDomain
 from cembench.algorithms.direct_cem.gauge_walk import LEAST_GAIN, STEPS, gauge_walk
 
 from cembench import DiskMesh
 from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_energy import EnergyModel
+from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
 from cembench.conformal.folds import interior_without_folds
-from cembench.conformal.laplacian import laplacian
 from cembench.conformal.moebius import Moebius
-from cembench.conformal.planar import signed_areas
+from cembench.conformal.planar import folded_triangles, signed_areas
+from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.workflows.morphing.transport import locate
 
@@ -47,7 +47,13 @@ def without_new_folds(mesh: DiskMesh, z: Complex) -> Complex:
     """
     if (signed_areas(z, mesh.F) > 0).all():
         return z
-    return interior_without_folds(mesh, laplacian(mesh), z)[0]
+    z, _ = interior_without_folds(mesh, z)
+    if folds := len(folded_triangles(z, mesh.F)):
+        raise AlgorithmFailed(
+            f"a Moebius map of the disk folds {folds} triangle(s), and they cannot be laid flat "
+            "with the boundary held: the mesh is too coarse there"
+        )
+    return z
 
 
 def centred(mesh: DiskMesh, z: Complex, landmarks: Ints) -> Complex:

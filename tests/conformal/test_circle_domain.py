@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from cembench.algorithms.direct_cem.boundary_energy import in_gauge
-from cembench.algorithms.direct_cem.circle_domain import CircleDomain, Rims
 
+from cembench.conformal.boundary_energy import in_gauge
+from cembench.conformal.circle_domain import CircleDomain, Rims
 from cembench.conformal.moebius import Moebius
 
 

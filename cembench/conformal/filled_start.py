@@ -13,12 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.boundary_energy import EnergyModel
+from cembench.conformal.circle_domain import LEAST_SHARE, CircleDomain, Rims
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.patches import disk_patch
 from cembench.conformal.planar import backward_arcs, polygon_area
-
-from .boundary_energy import EnergyModel
-from .circle_domain import LEAST_SHARE, CircleDomain, Rims
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -1,16 +1,16 @@
 import numpy as np
 import pytest
-from cembench.algorithms.direct_cem.circle_domain import Rims
-from cembench.algorithms.direct_cem.filled_start import (
+
+from cembench import HoledMesh
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.circle_domain import Rims
+from cembench.conformal.filled_start import (
     CROWDED,
     arcs_of_measure,
     equilibrium_measures,
     filled_start,
     widest_start,
 )
-
-from cembench import HoledMesh
-from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian

@@ -23,12 +23,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.conformal.trust_region import newton_step
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-
-from .circle_domain import CircleDomain
-from .trust_region import newton_step
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -3,20 +3,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cembench.algorithms.direct_cem import boundary_energy
-from cembench.algorithms.direct_cem.boundary_energy import (
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+from cembench import AlgorithmFailed, HoledMesh
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_energy import (
     EnergyModel,
     in_gauge,
     minimise,
     moebius_descent,
 )
-from cembench.algorithms.direct_cem.circle_domain import CircleDomain, Rims
-from cembench.algorithms.direct_cem.trust_region import newton_step
-from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
-
-from cembench import AlgorithmFailed, HoledMesh
-from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.circle_domain import CircleDomain, Rims
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
+from cembench.conformal.trust_region import newton_step
 from tests import gallery
 
 

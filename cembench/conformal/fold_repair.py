@@ -1,0 +1,65 @@
+"""What the repair of folds costs a map, and whether it is worth that."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.metrics import angle_errors, dirichlet_energy, flipped_triangles, image_area
+from cembench.core.clock import phase
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+Complex = NDArray[np.complex128]
+
+#: A repair that multiplies E_C or the mean angle error by more than this is not taken.
+MOST_COST = 1.25
+
+
+def accepted_repair(
+    mesh: TriangleMesh, before: Complex, repair: tuple[Complex, int]
+) -> tuple[Complex, dict[str, Any]]:
+    """Return a repaired map, or the map before where the repair costs too much, and the figures.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    before : complex (n,)
+        Its map before the repair.
+    repair : complex (n,) and int
+        The map after it and the number of rounds, as
+        :func:`cembench.conformal.folds.without_folds` returns them.
+
+    Returns
+    -------
+    z : complex (n,)
+        The map that is taken.
+    extras : dict
+        ``fold_repairs``, the number of rounds. Where there were any, ``before_repair`` has the
+        figures of the map before; where the repair is not taken, ``refused_repair`` has those of
+        the map after.
+
+    """
+    after, rounds = repair
+    if not rounds:
+        return before, {"fold_repairs": 0}
+    with phase("folds"):
+        old, new = _figures(mesh, before), _figures(mesh, after)
+    extras = {"fold_repairs": rounds, "before_repair": old}
+    if all(new[name] <= MOST_COST * max(old[name], 0) for name in JUDGED):
+        return after, extras
+    return before, extras | {"refused_repair": new}
+
+
+def _figures(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
+    return {
+        "flipped_triangles": flipped_triangles(mesh, uv),
+        "conformal_energy": dirichlet_energy(mesh, uv) - image_area(mesh, uv),
+        "angle_error_mean_deg": float(angle_errors(mesh, uv).mean()),
+    }
+
+
+#: Which figures a repair must not spoil.
+JUDGED = ("conformal_energy", "angle_error_mean_deg")
