@@ -78,7 +78,7 @@ def measure_one(mesh: str | None, size: int) -> dict[str, object]:
         V, F = surface.V, surface.F
         for _ in range(size):
             V, F = igl.upsample(V, F)
-        surface = DiskMesh(V, F.astype(np.int64))
+        surface = DiskMesh.trusted(V, F.astype(np.int64))
     order = np.concatenate([surface.interior, surface.boundary])
     k = len(surface.interior)
     rng = np.random.default_rng(0)

@@ -35,7 +35,7 @@ from cembench.results.store import Store
 from cembench.running.environment import with_threads
 from cembench.running.local import Launcher, Options, run_tasks
 from cembench.running.measure import Checked
-from cembench.running.plan import How, Task, plan_cells
+from cembench.running.plan import MeasurementSettings, Task, plan_cells
 
 BARE = """
 import sys
@@ -83,7 +83,9 @@ def main() -> None:
 
 def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
     """Seconds that the harness tells over those of the bare call, and forked over fresh."""
-    (task,) = plan_cells([load_registry().algorithm("cem")], [spherical_cap(faces)], {}, How())
+    (task,) = plan_cells(
+        [load_registry().algorithm("cem")], [spherical_cap(faces)], {}, MeasurementSettings()
+    )
     told: dict[str, list[float]] = {"told / bare": [], "forked / fresh": []}
     shuffled = random.Random(0)
     with tempfile.TemporaryDirectory() as folder:
@@ -137,10 +139,10 @@ class NoProcess(Launcher):
 def empty_cells(count: int) -> tuple[float, float]:
     """Seconds to plan so many cells, and to record them with all their rounds."""
     cem = load_registry().algorithm("cem")
-    meshes = [replace(spherical_cap(600 + 60 * k), name=f"cap-{k}") for k in range(20)]
+    meshes = [spherical_cap(600 + 60 * k).renamed(f"cap-{k}") for k in range(20)]
     start = perf_counter()
     algorithms = [replace(cem, name=f"cem-{k}") for k in range(count // len(meshes))]
-    tasks = plan_cells(algorithms, meshes, {}, How())
+    tasks = plan_cells(algorithms, meshes, {}, MeasurementSettings())
     planned = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
         records = run_tasks(tasks, Store(Path(folder)), launcher=NoProcess)

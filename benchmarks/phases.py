@@ -17,7 +17,7 @@ from pathlib import Path
 from cembench.registry import load_registry
 from cembench.results.store import Store
 from cembench.running.local import Options, run_tasks
-from cembench.running.plan import How, generate_surface, plan_cells, read_mesh_for
+from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells, read_mesh_for
 
 #: Phases that take less than this share of the total in every line go under "rest".
 SHOWN = 0.05
@@ -43,7 +43,9 @@ def main() -> None:
     tasks = [
         task
         for solves in ("reuse", "backslash")
-        for task in plan_cells(chosen, [surface], {}, How(solves=solves, repeats=arguments.repeats))
+        for task in plan_cells(
+            chosen, [surface], {}, MeasurementSettings(solves=solves, repeats=arguments.repeats)
+        )
     ]
     with tempfile.TemporaryDirectory() as folder:
         records = run_tasks(tasks, Store(Path(folder)), Options(timeout=arguments.timeout))

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from cembench.workflows.doctor import Finding
+from cembench.workflows.doctor import InstallationFinding
 
 from . import remesh
 
 
-def remeshing_finding() -> Finding:
+def remeshing_finding() -> InstallationFinding:
     """Are surfaces remeshed the usual way here, and if not, what should be installed?"""
     filter_ = "pymeshlab's filter meshing_isotropic_explicit_remeshing"
     if remesh.has_remeshing_filter():
-        return Finding("remeshing", True, filter_, required=False)
-    return Finding(
+        return InstallationFinding("remeshing", True, filter_, required=False)
+    return InstallationFinding(
         "remeshing",
         False,
         f"{filter_} is missing; surfaces are remeshed by local operations instead, which gives "

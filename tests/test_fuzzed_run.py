@@ -15,7 +15,7 @@ from cembench.registry import load_registry
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
 from cembench.running.local import Options, run_tasks
-from cembench.running.plan import How, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
 from tests.report.small_run import write_koebe
 from tests.validation.in_this_process import LauncherHere
 
@@ -67,9 +67,11 @@ def whole(tmp_path_factory):
     registry = load_registry()
     store = Store(folder / "run")
     chosen = [registry.algorithm(name) for name in ALGORITHMS]
-    tasks = plan_cells(chosen, [mesh], {}, How(repeats=1))
+    tasks = plan_cells(chosen, [mesh], {}, MeasurementSettings(repeats=1))
     run_tasks(tasks, store, Options(), launcher=LauncherHere)
-    (unfinished,) = plan_cells([registry.algorithm("lscm")], [mesh], {}, How(repeats=2))
+    (unfinished,) = plan_cells(
+        [registry.algorithm("lscm")], [mesh], {}, MeasurementSettings(repeats=2)
+    )
     samples = store.samples(unfinished.cell, describe_environment()["id"])
     outcome, uv = LauncherHere(folder, Options()).check(unfinished)
     samples.save_check(outcome, uv)

@@ -40,7 +40,7 @@ Weights: TypeAlias = Literal["surface", "plane"]
 
 
 @dataclass(frozen=True)
-class Step:
+class KoebeStep:
     """What one step of Koebe's method came to.
 
     Parameters
@@ -82,7 +82,7 @@ def koebe_steps(
     tolerance: float = 1e-5,
     max_iterations: int = 20,
     inversion: bool = True,
-) -> Iterator[Step]:
+) -> Iterator[KoebeStep]:
     """Which images does Koebe's method pass through? Each step as it is done.
 
     Parameters as in ``koebe_cem.py``.
@@ -116,7 +116,7 @@ def koebe_steps(
             kept[k], uv, energies, order_kept = disk.map(
                 start, tolerance=tolerance, max_iterations=max_iterations, inversion=inversion
             )
-            yield Step(sweep, k, before, uv, energies, order_kept, own)
+            yield KoebeStep(sweep, k, before, uv, energies, order_kept, own)
 
 
 def shown_steps(mesh: HoledMesh, *, sweeps: int = 1, outer: int | None = None) -> Iterator[MapStep]:
@@ -127,7 +127,7 @@ def shown_steps(mesh: HoledMesh, *, sweeps: int = 1, outer: int | None = None) -
 
 
 def finished(
-    mesh: HoledMesh, step: Step, *, outer: int | None = None, rounding: bool = True
+    mesh: HoledMesh, step: KoebeStep, *, outer: int | None = None, rounding: bool = True
 ) -> tuple[Complex, int]:
     """Which map comes of the last step's image, its holes made round and its folds mended?
 

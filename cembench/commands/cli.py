@@ -207,7 +207,12 @@ def map_(
     from cembench.report.render.terminal import figures_table
     from cembench.results.record_rows import row
     from cembench.running.local import Options, map_once
-    from cembench.running.plan import How, plan_cells, read_mesh_for, standing_of_file
+    from cembench.running.plan import (
+        MeasurementSettings,
+        paper_role_of_file,
+        plan_cells,
+        read_mesh_for,
+    )
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     registry = registry_with(plugin)
@@ -225,8 +230,8 @@ def map_(
         picture = usual if output is None else output.with_suffix(".png")
         if preview and not force:
             check_replaceable(picture)
-        standing = {surface.name: standing_of_file(registry, mesh, surface)}
-    how = How(solves.value, _installed(backend), threads, repeats=1)
+        standing = {surface.name: paper_role_of_file(registry, mesh, surface)}
+    how = MeasurementSettings(solves.value, _installed(backend), threads, repeats=1)
     tasks = plan_cells([chosen], [surface], assignments(parameter), how, plugin, standing)
     with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
         record, uv = map_once(tasks[0], options)
@@ -323,7 +328,7 @@ def run(
     from cembench.results.paper.profiles import algorithms_of, surfaces_of
     from cembench.results.store import Store
     from cembench.running.local import Options
-    from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
+    from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)
     policies = _policies(solves)
@@ -344,7 +349,7 @@ def run(
         found, standing = gather_surfaces(registry, chosen, files, generated, faces)
     tasks = []
     for policy in policies:
-        how = How(policy, _installed(backend), threads, repeats)
+        how = MeasurementSettings(policy, _installed(backend), threads, repeats)
         tasks += plan_cells(chosen, found, assignments(parameter), how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
@@ -376,7 +381,7 @@ def reproduce(
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.local import Options
-    from cembench.running.plan import How, generate_surface, plan_cells, standing_of
+    from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
 
     run_folder.check(output)
     folders.check(output / "report", "report")
@@ -388,8 +393,8 @@ def reproduce(
         with err.status(f"making {name}", spinner="line"):
             surfaces.append(generate_surface(registry, name))
     chosen = list(registry.algorithms.values())
-    standing = standing_of(registry, names)
-    tasks = plan_cells(chosen, surfaces, {}, How(repeats=1), standing=standing)
+    standing = paper_roles(registry, names)
+    tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), standing=standing)
     records = _measure(tasks, Store(output), options)
     command = f"cembench reproduce -o {output}"
     report, folder = report_verbs.make_report(output, None, command)

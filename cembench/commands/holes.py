@@ -128,12 +128,12 @@ def _measured(
 ) -> tuple[dict[str, Any], Record, Any]:
     """One checked call in a process of its own, as a row."""
     from cembench.running.local import Options, map_once
-    from cembench.running.plan import How, plan_cells
+    from cembench.running.plan import MeasurementSettings, plan_cells
 
     known = {parameter.name for parameter in algorithm.parameters}
     given = {"outer": outer, "sweeps": sweeps}
     parameters = {k: v for k, v in given.items() if v is not None and k in known}
-    task = plan_cells([algorithm], [mesh], parameters, How(repeats=1))[0]
+    task = plan_cells([algorithm], [mesh], parameters, MeasurementSettings(repeats=1))[0]
     record, uv = map_once(task, Options())
     outcome = record.outcome
     row = {
@@ -166,7 +166,7 @@ def _lay_down_pictures(
     """Figure 1, the steps of the first sweep, and Figure 7, the map."""
     from cembench.drawing.koebe_steps import write_steps
     from cembench.drawing.preview import write_preview
-    from cembench.results.exhibits import Exhibit, Picture, exhibit_folder, write_exhibit
+    from cembench.results.exhibits import Exhibit, ExhibitPicture, exhibit_folder, write_exhibit
 
     metrics = record.outcome.metrics
     origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
@@ -195,7 +195,7 @@ def _lay_down_pictures(
             command=command,
             origin=origin,
             figure="Figure 7",
-            pictures=(Picture(file="map.png", caption=caption, alternative=alternative),),
+            pictures=(ExhibitPicture(file="map.png", caption=caption, alternative=alternative),),
             facts=figures,
         ),
     )
@@ -221,7 +221,7 @@ def _lay_down_pictures(
             command=command,
             origin=origin,
             figure="Figure 1",
-            pictures=(Picture(file="steps.png", caption=words, alternative=alternative),),
+            pictures=(ExhibitPicture(file="steps.png", caption=words, alternative=alternative),),
             tables=(table,),
             facts={"iterations": [len(step.energies) - 1 for step in first]},
         ),
@@ -229,23 +229,23 @@ def _lay_down_pictures(
 
 
 def _panels(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
-    from cembench.drawing.koebe_steps import Panel
+    from cembench.drawing.koebe_steps import StepPanel
 
     first, others = mesh.outer_and_holes(outer)
     loops = (first, *others)
-    panels = [Panel("the surface")]
+    panels = [StepPanel("the surface")]
     for step in steps:
         name = "outer boundary" if step.boundary == 0 else f"hole {step.boundary}"
         if step.before is not None:
-            panels.append(Panel(f"{name} turned outside", step.before, loops[step.boundary]))
-        panels.append(Panel(f"{name} made a circle", step.uv, loops[step.boundary]))
+            panels.append(StepPanel(f"{name} turned outside", step.before, loops[step.boundary]))
+        panels.append(StepPanel(f"{name} made a circle", step.uv, loops[step.boundary]))
     return panels
 
 
 def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
     """Circularity of each boundary after each step of the sweep."""
     from cembench.conformal.metrics import circle_of
-    from cembench.results.exhibits import Table
+    from cembench.results.exhibits import ExhibitTable
 
     first, others = mesh.outer_and_holes(outer)
     loops = (first, *others)
@@ -259,7 +259,9 @@ def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> An
         for step in steps
     )
     columns = ("opened", "iterations", *(f"circularity, {name}" for name in names))
-    return Table(title="Circularity after each step, before rounding", columns=columns, rows=rows)
+    return ExhibitTable(
+        title="Circularity after each step, before rounding", columns=columns, rows=rows
+    )
 
 
 _TABLE = (
@@ -280,9 +282,9 @@ _TABLE = (
 
 
 def _lay_down_table(rows: list[dict[str, Any]], run: Path, command: str) -> None:
-    from cembench.results.exhibits import Exhibit, Table, write_exhibit
+    from cembench.results.exhibits import Exhibit, ExhibitTable, write_exhibit
 
-    table = Table(
+    table = ExhibitTable(
         title="Surfaces with holes",
         columns=tuple(title for title, _ in _TABLE),
         rows=tuple(tuple(row.get(key) for _, key in _TABLE) for row in rows),

@@ -222,7 +222,7 @@ def _maps(
 ) -> list[NDArray[Any]]:
     """A checked map of each surface; exit code 1 where there is none."""
     from cembench.running.local import Options, map_once
-    from cembench.running.plan import How, plan_cells
+    from cembench.running.plan import MeasurementSettings, plan_cells
 
     chosen = registry.algorithm(algorithm)
     if chosen.target != "disk":
@@ -232,7 +232,7 @@ def _maps(
         )
     maps = []
     for mesh in meshes:
-        (task,) = plan_cells([chosen], [mesh], parameters, How(repeats=1), plugins)
+        (task,) = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1), plugins)
         with err.status(f"{chosen.title} on {mesh.name}", spinner="line"):
             record, uv = map_once(task, Options(timeout=timeout))
         if record.outcome.status != "ok" or uv is None:
@@ -292,11 +292,11 @@ def _lay_down(
     registry: Registry,
     surfaces: list[str],
 ) -> list[Path]:
-    from cembench.running.plan import standing_of
+    from cembench.running.plan import paper_roles
     from cembench.workflows.morphing.exhibit import lay_down
 
     generated = [name for name in surfaces if name in registry.surfaces]
-    standing = standing_of(registry, generated)
+    standing = paper_roles(registry, generated)
     rows = tuple(standing[name].paper_row if name in standing else "" for name in surfaces)
     with err.status("drawing", spinner="line") as status:
         return lay_down(run, found, figures, command, rows, status.update)

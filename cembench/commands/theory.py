@@ -72,7 +72,7 @@ def theory(
 def _examine(
     mesh: DiskMesh, rival: Any, iterations: int, run: Path, command: str
 ) -> tuple[dict[str, Any], Exhibit]:
-    from cembench.results.exhibits import Exhibit, Picture, exhibit_folder, write_exhibit
+    from cembench.results.exhibits import Exhibit, ExhibitPicture, exhibit_folder, write_exhibit
     from cembench.workflows.theory import (
         BoundaryOperator,
         predicted_rate,
@@ -128,7 +128,7 @@ def _examine(
         command=command,
         origin="surface",
         pictures=(
-            Picture(
+            ExhibitPicture(
                 file="theory.png",
                 caption="Spectrum of K, conformal energy and steps of the bare iterations.",
                 alternative=_summary(facts),
@@ -204,13 +204,13 @@ def _summary(facts: dict[str, Any]) -> str:
 
 
 def _tables(given: list[Check], said: list[Check], energies: list[dict[str, Any]]) -> Any:
-    from cembench.results.exhibits import Table
+    from cembench.results.exhibits import ExhibitTable
 
-    def of(title: str, checks: list[Check]) -> Table:
+    def of(title: str, checks: list[Check]) -> ExhibitTable:
         rows = tuple(
             (c.name, c.source, "yes" if c.holds else "NO", c.figure, c.meaning) for c in checks
         )
-        return Table(
+        return ExhibitTable(
             title=title, columns=("what", "where", "holds", "figure", "meaning"), rows=rows
         )
 
@@ -220,7 +220,7 @@ def _tables(given: list[Check], said: list[Check], energies: list[dict[str, Any]
     return (
         of("Premises", given),
         of("Statements", said),
-        Table(title="Conformal energy E_C", columns=columns, rows=rows),
+        ExhibitTable(title="Conformal energy E_C", columns=columns, rows=rows),
     )
 
 

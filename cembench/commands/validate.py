@@ -22,8 +22,8 @@ from cembench.validation.verdict import Requirement
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Algorithm, Registry
-    from cembench.running.plan import Standing
-    from cembench.validation.examine import Telling
+    from cembench.running.plan import PaperRole
+    from cembench.validation.examine import ValidationHooks
     from cembench.validation.verdict import Validation
 
 Names = list[str]
@@ -86,7 +86,7 @@ def validate(
     from cembench.core import folders
     from cembench.running.local import Options
     from cembench.running.plan import distribute_parameters
-    from cembench.validation.examine import Asked, examine
+    from cembench.validation.examine import ValidationOptions, examine
     from cembench.validation.solver import Solver, in_a_process, load_solver
     from cembench.validation.terminal import validation_text
 
@@ -99,7 +99,7 @@ def validate(
     solver = Solver(algorithm, plugins, arguments, in_a_process(options))
     with err.status("reading surfaces", spinner="line"):
         meshes, standing = _chosen(algorithm, registry, profile, surfaces, mesh, mesh_dir, faces)
-    asked = Asked(
+    asked = ValidationOptions(
         against=split(against) or None,
         meshes=meshes,
         standing=standing,
@@ -132,15 +132,17 @@ def _chosen(
     files: list[Path],
     folders: list[Path],
     faces: int | None,
-) -> tuple[list[TriangleMesh], dict[str, Standing]]:
+) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
     """The surfaces that the user names, none for the usual ones; and what they stand for."""
     from cembench.results.paper.profiles import surfaces_of
-    from cembench.running.plan import How, gather_surfaces, mesh_files, plan_cells
+    from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     files = [*files, *(file for folder in folders for file in mesh_files(folder))]
     names = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
     found, standing = gather_surfaces(registry, [algorithm], files, names, faces)
-    plan_cells([algorithm], found, {}, How())  # complains now of what it could not run on later
+    plan_cells(
+        [algorithm], found, {}, MeasurementSettings()
+    )  # complains now of what it could not run on later
     return found, standing
 
 
@@ -157,15 +159,15 @@ def _folder(output: Path | None) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _telling() -> Telling:
+def _telling() -> ValidationHooks:
     """A line for each stage, and the progress of what is timed."""
     from cembench.commands.progress import LiveProgress, PlainProgress
-    from cembench.validation.examine import Telling
+    from cembench.validation.examine import ValidationHooks
 
     def watcher(cells: int) -> PlainProgress:
         return (LiveProgress if err.is_terminal else PlainProgress)(err, cells)
 
-    return Telling(lambda stage: err.print(f"{stage} ...", style="dim"), watcher)
+    return ValidationHooks(lambda stage: err.print(f"{stage} ...", style="dim"), watcher)
 
 
 def _write(found: Validation, folder: Path) -> dict[str, str]:

@@ -207,8 +207,9 @@ def _derivatives(V: Real, T: Indices) -> tuple[Complex, Complex, Real]:
     flat = np.zeros(T.shape, dtype=np.complex128)
     flat[:, 1], flat[:, 2] = length, (dots[:, 0] + 1j * double_area) / length
     opposite = np.roll(flat, -2, axis=1) - np.roll(flat, -1, axis=1)
-    gradient = 1j * opposite / double_area[:, None]
-    return np.conj(gradient) / 2, gradient / 2, double_area / 2
+    gradient: Complex = 1j * opposite / double_area[:, None]
+    conjugate: Complex = np.conj(gradient)
+    return conjugate / 2, gradient / 2, double_area / 2
 
 
 def _ratio(f_z: Complex, f_zbar: Complex, eps: Real) -> tuple[Real, Real, Real]:

@@ -28,7 +28,7 @@ OPEN = "#c8553d"
 
 
 @dataclass(frozen=True)
-class Panel:
+class StepPanel:
     """An image (n,), or the surface where it is None; `loop` is the boundary that is marked."""
 
     label: str
@@ -37,7 +37,7 @@ class Panel:
 
 
 def write_steps(
-    mesh: TriangleMesh, panels: Sequence[Panel], final: Complex, path: Path, title: str
+    mesh: TriangleMesh, panels: Sequence[StepPanel], final: Complex, path: Path, title: str
 ) -> None:
     """Draw the panels in rows into a PNG file.
 
@@ -81,7 +81,7 @@ def write_steps(
 def _outline(
     figure: Figure,
     mesh: TriangleMesh,
-    panel: Panel,
+    panel: StepPanel,
     corner: tuple[int, int],
     size: tuple[int, int],
 ) -> None:

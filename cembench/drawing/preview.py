@@ -50,7 +50,7 @@ SYSTEM_LIBRARIES = (
 
 
 @dataclass(frozen=True)
-class Drawn:
+class RendererUsed:
     """How a picture came about.
 
     Parameters
@@ -79,7 +79,7 @@ def write_preview(
     caption: str = "",
     size: tuple[int, int] = SIZE,
     renderer: Renderer = "pyvista",
-) -> Drawn:
+) -> RendererUsed:
     """Draw a surface and its image under one checkerboard into a PNG file; which renderer did it?
 
     Triangles that the map folds over are red in both panels, and ringed where they are small.
@@ -107,18 +107,30 @@ def write_preview(
         The file cannot be written, or no renderer works.
 
     """
-    _check(mesh, uv, size)
-    scene = Scene.of(mesh, uv)
-    side = compose.side_of(size)
-    (surface, image), drawn = _draw(scene, side, renderer)
-    outline = image_in_window(uv)[:, :2]
-    overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
-    png = compose.page(surface, image, overlay, (title, caption, _note(scene)), size)
+    png, drawn = _page(mesh, uv, (title, caption), size, renderer)
     write_bytes(path, png, error=RenderError, parents=False)
     return drawn
 
 
-def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> Drawn:
+def preview_png(mesh: TriangleMesh, uv: Complex, *, title: str = "", caption: str = "") -> bytes:
+    """Return the picture of :func:`write_preview` as PNG, drawn in this process."""
+    return _page(mesh, uv, (title, caption), SIZE, "matplotlib")[0]
+
+
+def _page(
+    mesh: TriangleMesh, uv: Complex, words: tuple[str, str], size: tuple[int, int], first: Renderer
+) -> tuple[bytes, RendererUsed]:
+    _check(mesh, uv, size)
+    scene = Scene.of(mesh, uv)
+    (surface, image), drawn = _draw(scene, compose.side_of(size), first)
+    outline = image_in_window(uv)[:, :2]
+    overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
+    return compose.page(surface, image, overlay, (*words, _note(scene)), size), drawn
+
+
+def write_thumbnail(
+    mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL
+) -> RendererUsed:
     """Draw a surface under the checkerboard of its map into a PNG file; which renderer did it?
 
     `side` in pixels; the rest, errors too, as in :func:`write_preview`.
@@ -178,15 +190,17 @@ def _note(scene: Scene) -> str:
     )
 
 
-def _draw(scene: Scene, side: int, renderer: Renderer) -> tuple[tuple[Picture, Picture], Drawn]:
+def _draw(
+    scene: Scene, side: int, renderer: Renderer
+) -> tuple[tuple[Picture, Picture], RendererUsed]:
     notice = ""
     if renderer == "pyvista":
         try:
-            return _by_pyvista(scene, side), Drawn("pyvista")
+            return _by_pyvista(scene, side), RendererUsed("pyvista")
         except _PyvistaFailed as reason:
             notice = f"drawn by matplotlib: {reason}"
     try:
-        return draw_numpy.draw(scene, side), Drawn("matplotlib", notice)
+        return draw_numpy.draw(scene, side), RendererUsed("matplotlib", notice)
     except (MemoryError, ArithmeticError, ValueError, IndexError) as error:
         raise RenderError(
             f"the picture could not be drawn: {type(error).__name__}: {error}"

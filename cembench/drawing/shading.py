@@ -1,7 +1,7 @@
 """Pictures of a surface and of its image, for a report: rasterized once, coloured in several ways.
 
-A :class:`Panel` knows which triangle is seen at every sample of a picture. On it one can paint a
-checkerboard, the mean curvature, or the edges of the mesh, on the surface and on the image alike,
+A :class:`RasterPanel` knows which triangle is seen at every sample of a picture. On it one can
+paint a checkerboard, the mean curvature, or the edges of the mesh, on the surface and the image,
 without looking at the triangles again. No graphics library takes part, so that the same mesh
 gives the same bytes on every machine.
 """
@@ -41,7 +41,7 @@ EXTREME = 0.95
 
 
 @dataclass(frozen=True)
-class Panel:
+class RasterPanel:
     """What is seen of a mesh that was placed before the viewer.
 
     Parameters
@@ -71,17 +71,17 @@ class Panel:
         return self.raster.interpolate(corners.reshape(-1, *values.shape[1:]))
 
 
-def surface_panel(mesh: TriangleMesh, side: int) -> Panel:
+def surface_panel(mesh: TriangleMesh, side: int) -> RasterPanel:
     """How does the surface look to the viewer? `side` in pixels."""
     points = look.framed(mesh.V @ view_rotation(mesh).T)
     light = look.brightness_of(mesh.F, points)
     panel = _panel(mesh, points, light, np.zeros(mesh.m, dtype=bool), side)
     inside = look.doubled_areas(points[mesh.F].reshape(-1, 3)[:, :2]) < 0
     dimmed = np.where(inside[panel.raster.face], look.INSIDE, 1.0)
-    return Panel(panel.F, points, panel.raster, panel.light * dimmed, panel.folded)
+    return RasterPanel(panel.F, points, panel.raster, panel.light * dimmed, panel.folded)
 
 
-def image_panel(mesh: TriangleMesh, uv: Complex, side: int) -> Panel:
+def image_panel(mesh: TriangleMesh, uv: Complex, side: int) -> RasterPanel:
     """How does the image look, with the surface's light and shade on it but fainter?"""
     shade = look.brightness_of(mesh.F, look.framed(mesh.V @ view_rotation(mesh).T))
     folded = ~(signed_areas(uv, mesh.F) > 0)
@@ -90,14 +90,14 @@ def image_panel(mesh: TriangleMesh, uv: Complex, side: int) -> Panel:
 
 def _panel(
     mesh: TriangleMesh, points: Real, light: Real, folded: NDArray[np.bool_], side: int
-) -> Panel:
+) -> RasterPanel:
     corners = points[mesh.F].reshape(-1, 3)
     corners[np.repeat(folded, 3), 2] += 1.0  # folds on top
     raster = rasterize(corners, side * SAMPLES)
-    return Panel(mesh.F, points, raster, raster.interpolate(light[mesh.F].ravel()), folded)
+    return RasterPanel(mesh.F, points, raster, raster.interpolate(light[mesh.F].ravel()), folded)
 
 
-def paint(panel: Panel, colour: Real) -> Picture:
+def paint(panel: RasterPanel, colour: Real) -> Picture:
     """The picture uint8 (side, side, 3) on white; `colour` (k, 3) from 0 to 1."""
     seen = np.where(panel.folded[panel.raster.face, None], look.FOLDED, colour)
     canvas = np.ones((panel.raster.size**2, 3))
@@ -105,7 +105,7 @@ def paint(panel: Panel, colour: Real) -> Picture:
     return shrunk(255 * canvas.reshape(panel.raster.size, panel.raster.size, 3))
 
 
-def checkerboard(panel: Panel, mesh: TriangleMesh, uv: Complex, surface: Panel) -> Real:
+def checkerboard(panel: RasterPanel, mesh: TriangleMesh, uv: Complex, surface: RasterPanel) -> Real:
     """The colours of a checkerboard on the image, pulled back where the panel is the surface.
 
     As in :mod:`cembench.drawing.scene`, squares are divided where they would be large on
@@ -122,7 +122,7 @@ def checkerboard(panel: Panel, mesh: TriangleMesh, uv: Complex, surface: Panel) 
     return _between(look.LIGHT, look.DARK, share)
 
 
-def curvature(panel: Panel, H: Real) -> Real:
+def curvature(panel: RasterPanel, H: Real) -> Real:
     """The colours of the mean curvature H (n,): blue inwards, orange outwards."""
     extreme = float(np.quantile(np.abs(H), EXTREME)) or 1.0
     share = np.clip(panel.at(H) / extreme, -1, 1)
@@ -130,7 +130,7 @@ def curvature(panel: Panel, H: Real) -> Real:
     return np.array(EVEN) + np.abs(share)[:, None] * (towards - np.array(EVEN))
 
 
-def edges(panel: Panel) -> Real:
+def edges(panel: RasterPanel) -> Real:
     """The colours of the mesh: dark edges; grey where triangles are too small to be told apart."""
     corners = _samples(panel)
     doubled = np.abs(look.doubled_areas(corners.reshape(-1, 2)))
@@ -140,7 +140,7 @@ def edges(panel: Panel) -> Real:
     return _between(BETWEEN, EDGE_COLOUR, np.clip(EDGE + 0.5 - distance, 0, 1) * 0.85)
 
 
-def _samples(panel: Panel) -> Real:
+def _samples(panel: RasterPanel) -> Real:
     """The triangles' corners (m, 3, 2) in samples of the picture."""
     return panel.points[panel.F][:, :, :2] * (panel.raster.size / 2)
 

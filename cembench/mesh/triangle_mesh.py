@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
 
@@ -30,7 +30,7 @@ LARGEST_LENGTH = 1e60
 SMALLEST_LENGTH = 1e-60
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class TriangleMesh:
     """An oriented 2-manifold triangulation in space.
 
@@ -52,10 +52,9 @@ class TriangleMesh:
     name: str = "mesh"
     notices: tuple[str, ...] = ()
 
-    @classmethod
-    def from_arrays(
-        cls, V: ArrayLike, F: ArrayLike, *, name: str = "mesh", notices: tuple[str, ...] = ()
-    ) -> Self:
+    def __init__(
+        self, V: ArrayLike, F: ArrayLike, name: str = "mesh", notices: tuple[str, ...] = ()
+    ) -> None:
         """Check everything, orient where needed, freeze.
 
         Raises
@@ -73,10 +72,44 @@ class TriangleMesh:
         if flipped:
             notices += (f"orientation repaired: {flipped} of {len(F)} triangles were turned over",)
         _check_vertex_stars(F)
-        notices += cls._check_topology(V, F)
+        notices += self._check_topology(V, F)
         V.setflags(write=False)
         F.setflags(write=False)
-        return cls(V, F, printable(name), notices)
+        self._set(V, F, printable(name), notices)
+
+    def _set(
+        self, V: NDArray[np.float64], F: NDArray[np.int64], name: str, notices: tuple[str, ...]
+    ) -> None:
+        for field, value in (("V", V), ("F", F), ("name", name), ("notices", notices)):
+            object.__setattr__(self, field, value)
+
+    @classmethod
+    def from_arrays(
+        cls, V: ArrayLike, F: ArrayLike, *, name: str = "mesh", notices: tuple[str, ...] = ()
+    ) -> Self:
+        """Return the checked mesh of these arrays; the same as calling the class."""
+        return cls(V, F, name, notices)
+
+    @classmethod
+    def trusted(
+        cls,
+        V: NDArray[np.float64],
+        F: NDArray[np.int64],
+        name: str = "mesh",
+        notices: tuple[str, ...] = (),
+    ) -> Self:
+        """Return a mesh of arrays that were checked before, and check nothing."""
+        mesh = cls.__new__(cls)
+        mesh._set(V, F, name, notices)
+        return mesh
+
+    def renamed(self, name: str) -> Self:
+        """Return the same mesh under another name."""
+        return self.trusted(self.V, self.F, printable(name), self.notices)
+
+    def moved(self, V: NDArray[np.float64]) -> Self:
+        """Return the same triangles with vertices at other places (n, 3)."""
+        return self.trusted(V, self.F, self.name, self.notices)
 
     @classmethod
     def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:
@@ -85,7 +118,7 @@ class TriangleMesh:
 
     def fresh(self) -> Self:
         """The same mesh, nothing derived from it yet: what a timed call starts from."""
-        return replace(self)
+        return self.trusted(self.V, self.F, self.name, self.notices)
 
     @property
     def n(self) -> int:
@@ -120,7 +153,7 @@ class TriangleMesh:
         return digest.hexdigest()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class DiskMesh(TriangleMesh):
     """A simply-connected open surface: connected, one boundary loop, Euler characteristic 1."""
 
@@ -144,7 +177,7 @@ class DiskMesh(TriangleMesh):
         return definition_1_notices(F, len(V), loops)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class HoledMesh(TriangleMesh):
     """A multiply-connected surface of genus zero: an outer boundary and at least one hole."""
 

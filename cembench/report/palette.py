@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Look:
+class SeriesStyle:
     """A colour; a marker and a dash, each in the words of matplotlib and of Plotly."""
 
     colour: str
@@ -20,15 +20,15 @@ class Look:
 
 
 _KNOWN = {
-    "cem": Look("#0072B2", ("o", "circle"), ("-", "solid")),
-    "qiem": Look("#D55E00", ("s", "square"), ("--", "dash")),
-    "fdm": Look("#009E73", ("^", "triangle-up"), ("-.", "dashdot")),
-    "ldm": Look("#CC79A7", ("D", "diamond"), (":", "dot")),
-    "harmonic-circle": Look("#E69F00", ("v", "triangle-down"), ("--", "longdash")),
-    "lscm": Look("#56B4E9", ("P", "cross"), ("-.", "longdashdot")),
+    "cem": SeriesStyle("#0072B2", ("o", "circle"), ("-", "solid")),
+    "qiem": SeriesStyle("#D55E00", ("s", "square"), ("--", "dash")),
+    "fdm": SeriesStyle("#009E73", ("^", "triangle-up"), ("-.", "dashdot")),
+    "ldm": SeriesStyle("#CC79A7", ("D", "diamond"), (":", "dot")),
+    "harmonic-circle": SeriesStyle("#E69F00", ("v", "triangle-down"), ("--", "longdash")),
+    "lscm": SeriesStyle("#56B4E9", ("P", "cross"), ("-.", "longdashdot")),
 }
 _MORE = tuple(
-    Look(colour, marker, dash)
+    SeriesStyle(colour, marker, dash)
     for colour, marker, dash in (
         ("#7f5f00", ("X", "x"), ("-", "solid")),
         ("#4d4d4d", ("<", "triangle-left"), ("--", "dash")),
@@ -39,7 +39,7 @@ _MORE = tuple(
     )
 )
 #: What is not an algorithm: bounds, fits, the paper's own figures.
-PLAIN = Look("#6b7683", ("o", "circle"), (":", "dot"))
+PLAIN = SeriesStyle("#6b7683", ("o", "circle"), (":", "dot"))
 #: Phases of a measured call and other parts of a whole; what is left over.
 PARTS = (
     "#0072B2",
@@ -58,7 +58,7 @@ PARTS = (
 REST = "#b3b9c0"
 
 
-def looks(names: Sequence[str]) -> dict[str, Look]:
+def looks(names: Sequence[str]) -> dict[str, SeriesStyle]:
     """A look for each name: the usual one for algorithms that are known, others in turn."""
     others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
     return _KNOWN | {name: _MORE[k % len(_MORE)] for k, name in enumerate(others)}

@@ -25,14 +25,14 @@ from PIL import Image
 
 from cembench.core.atomic import write_bytes, write_text
 from cembench.report.document import Figure
-from cembench.report.palette import PLAIN, Look
+from cembench.report.palette import PLAIN, SeriesStyle
 
 #: How a series is drawn: points joined or not, a staircase, bars side by side or on one another.
 Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
 
 
 @dataclass(frozen=True)
-class Series:
+class PlotSeries:
     """Values of one thing; `x` are numbers or names, `words` what is told of each point.
 
     What is stacked stands on names.
@@ -42,7 +42,7 @@ class Series:
     x: Sequence[float | str]
     y: Sequence[float | None]
     kind: Kind
-    look: Look = PLAIN
+    look: SeriesStyle = PLAIN
     words: Sequence[str] = ()
     #: Shown in the legend; one of several series of one name is enough.
     named: bool = True
@@ -56,10 +56,12 @@ class Point(NamedTuple):
     words: str = ""
 
 
-def through(name: str, points: Sequence[Point], kind: Kind, look: Look = PLAIN) -> Series:
+def through(
+    name: str, points: Sequence[Point], kind: Kind, look: SeriesStyle = PLAIN
+) -> PlotSeries:
     """A series of points that have words."""
     x, y = [p.x for p in points], [p.y for p in points]
-    return Series(name, x, y, kind, look, [p.words for p in points])
+    return PlotSeries(name, x, y, kind, look, [p.words for p in points])
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,12 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Panel:
+class PlotPanel:
     """One pair of axes."""
 
     x: Axis
     y: Axis
-    series: tuple[Series, ...]
+    series: tuple[PlotSeries, ...]
     title: str = ""
 
 
@@ -88,7 +90,7 @@ class Plot:
 
     name: str
     title: str
-    panels: tuple[Panel, ...]
+    panels: tuple[PlotPanel, ...]
     caption: str = ""
     alternative: str = ""
     paper: str = ""
@@ -191,13 +193,13 @@ def _with_few_colours(png: bytes) -> bytes:
     return buffer.getvalue()
 
 
-def _names_room(panel: Panel) -> float:
+def _names_room(panel: PlotPanel) -> float:
     """Inches for names that stand upright below the axis."""
     names = [x for series in panel.series for x in series.x if isinstance(x, str)]
     return min(0.055 * max(map(len, names), default=0), 1.3) if len(set(names)) > 4 else 0.0
 
 
-def _draw_panel(axes: Axes, panel: Panel) -> None:
+def _draw_panel(axes: Axes, panel: PlotPanel) -> None:
     names = list(dict.fromkeys(x for s in panel.series for x in s.x if isinstance(x, str)))
     bars = [s for s in panel.series if s.kind == "bars"]
     bottom = np.zeros(len(names))
@@ -225,7 +227,7 @@ def _draw_panel(axes: Axes, panel: Panel) -> None:
     _draw_axes(axes, panel, names)
 
 
-def _draw_axes(axes: Axes, panel: Panel, names: Sequence[str]) -> None:
+def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
     axes.set_title(panel.title, fontsize=9.5)
     axes.set_xlabel(panel.x.title)
     axes.set_ylabel(panel.y.title)
@@ -326,7 +328,7 @@ def _plotly_axis(axis: Axis) -> dict[str, Any]:
     return described
 
 
-def _plotly_trace(series: Series) -> dict[str, Any]:
+def _plotly_trace(series: PlotSeries) -> dict[str, Any]:
     trace: dict[str, Any] = {
         "name": series.name,
         "x": [_plain(x) for x in series.x],

@@ -24,7 +24,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
 from cembench.results import paper
 from cembench.results.records import MeshFacts
-from cembench.running.plan import generate_surface, mesh_facts, standing_of
+from cembench.running.plan import generate_surface, mesh_facts, paper_roles
 from cembench.running.sources import code_hash
 
 #: Whose map tells how unevenly a surface is scaled when it is flattened.
@@ -169,5 +169,5 @@ def _mapper(registry: Registry) -> Algorithm:
 
 
 def _standing(registry: Registry, surface: Surface) -> dict[str, Any]:
-    known = standing_of(registry, [surface.name])
+    known = paper_roles(registry, [surface.name])
     return {"standing": known[surface.name]} if known else {}

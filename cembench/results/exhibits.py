@@ -22,7 +22,7 @@ FOLDER = "exhibits"
 _DESCRIPTION = "exhibit.json"
 
 
-class Picture(BaseModel):
+class ExhibitPicture(BaseModel):
     """A picture of an exhibit: a file in the exhibit's folder."""
 
     model_config = ConfigDict(frozen=True)
@@ -33,7 +33,7 @@ class Picture(BaseModel):
     alternative: str = ""
 
 
-class Table(BaseModel):
+class ExhibitTable(BaseModel):
     """A table of an exhibit; None is a gap."""
 
     model_config = ConfigDict(frozen=True)
@@ -60,8 +60,8 @@ class Exhibit(BaseModel):
     command: Printable
     origin: MeshOrigin
     figure: str = ""
-    pictures: tuple[Picture, ...] = ()
-    tables: tuple[Table, ...] = ()
+    pictures: tuple[ExhibitPicture, ...] = ()
+    tables: tuple[ExhibitTable, ...] = ()
     facts: dict[str, Any] = {}
 
 

@@ -133,7 +133,7 @@ class _Forked:
 
 
 @dataclass(frozen=True)
-class _Order:
+class _ForkRequest:
     """What a forked process is to do, and how it is to be known."""
 
     job: str
@@ -141,7 +141,7 @@ class _Order:
     mark: str
 
 
-def _serve() -> _Order:
+def _serve() -> _ForkRequest:
     """Answer the requests on standard input, a line each; returns in every forked process."""
     requests = os.fdopen(0, "rb", buffering=0, closefd=False)
     child = 0
@@ -154,7 +154,7 @@ def _serve() -> _Order:
             continue
         child = os.fork()
         if not child:
-            return _Order(**request)
+            return _ForkRequest(**request)
         with suppress(OSError):  # the child did it, or has ended
             os.setpgid(child, child)
         _say(child)
@@ -165,7 +165,7 @@ def _say(number: int | None) -> None:
     os.write(1, json.dumps(number).encode() + b"\n")
 
 
-def _become(order: _Order) -> None:
+def _become(order: _ForkRequest) -> None:
     """Be in a group of our own, be marked, have no input, and write to the log."""
     os.setpgid(0, 0)
     for file, way, targets in (

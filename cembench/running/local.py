@@ -37,7 +37,7 @@ from cembench.running.environment import describe_environment, with_threads
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.measure import Checked
 from cembench.running.plan import Task
-from cembench.running.process import Ending, Limits, run_limited, spawning
+from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
 from cembench.running.worker import Answer, Job
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
@@ -361,11 +361,11 @@ class Launcher:
             self.scratch.mkdir(parents=True)
         self.scratch.chmod(0o700)
 
-    def _started(self, job: Job, limits: Limits, log: Path) -> Ending:
+    def _started(self, job: Job, limits: Limits, log: Path) -> ProcessEnd:
         command = [sys.executable, "-m", "cembench.running.worker", str(self._write(job))]
         return run_limited(spawning(command, with_threads(job.cell.threads)), limits, log)
 
-    def _forked(self, job: Job, limits: Limits, log: Path) -> Ending | None:
+    def _forked(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
         """How a process ended that the server forked; None where it forks none."""
         if not self.forks or not can_fork(job.cell.threads):
             return None
@@ -459,7 +459,7 @@ def _with_note(answer: Answer, left: int) -> Answer:
     return Answer(outcome=answer.outcome.model_copy(update={"notes": notes}))
 
 
-def _outcome_of(ending: Ending, seconds: float, memory_bytes: int | None) -> Outcome:
+def _outcome_of(ending: ProcessEnd, seconds: float, memory_bytes: int | None) -> Outcome:
     """As what is a process recorded that left no answer?"""
     seen = {"traceback": ending.said or None, "peak_memory_bytes": ending.seen_bytes or None}
     if ending.limit == "time":

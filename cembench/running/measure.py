@@ -218,7 +218,7 @@ def _no_metrics(error: Exception) -> Fault:
 
 
 def _changes(mesh: TriangleMesh, cell: Cell) -> list[Fault]:
-    if TriangleMesh(mesh.V, mesh.F).hash == cell.mesh_hash:
+    if mesh.fresh().hash == cell.mesh_hash:
         return []
     return [Fault(kind=FaultKind.MESH_CHANGED, detail=MESH_CHANGED)]
 

@@ -35,7 +35,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Standing:
+class PaperRole:
     """Which row of the paper's Table 1 a surface has, and whether it is that model or stands in."""
 
     paper_row: str = ""
@@ -43,7 +43,7 @@ class Standing:
 
 
 @dataclass(frozen=True)
-class How:
+class MeasurementSettings:
     """What a plan's cells have in common."""
 
     solves: str = "reuse"
@@ -56,9 +56,9 @@ def plan_cells(
     algorithms: Sequence[Algorithm],
     meshes: Sequence[TriangleMesh],
     parameters: Mapping[str, Any],
-    how: How,
+    how: MeasurementSettings,
     plugins: Sequence[str] = (),
-    standing: Mapping[str, Standing] = MappingProxyType({}),
+    standing: Mapping[str, PaperRole] = MappingProxyType({}),
 ) -> list[Task]:
     """Every algorithm on every surface that it takes, surfaces outermost.
 
@@ -92,7 +92,7 @@ def plan_cells(
                 f"{mesh.name} is a {type(mesh).__name__}, which none of the chosen algorithms "
                 f"takes: {chosen}."
             )
-        facts = mesh_facts(mesh, standing.get(mesh.name, Standing()))
+        facts = mesh_facts(mesh, standing.get(mesh.name, PaperRole()))
         for taker in takers:
             cell = Cell(
                 algorithm=taker.name,
@@ -131,7 +131,7 @@ def distribute_parameters(
     return {a.name: a.arguments(chosen[a.name]) for a in algorithms}
 
 
-def mesh_facts(mesh: TriangleMesh, standing: Standing = Standing()) -> MeshFacts:
+def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFacts:
     """What does a table say of this surface?"""
     return MeshFacts(
         vertices=mesh.n,
@@ -171,15 +171,15 @@ def gather_surfaces(
     files: Sequence[Path],
     names: Sequence[str],
     faces: int | None = None,
-) -> tuple[list[TriangleMesh], dict[str, Standing]]:
+) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
     """Read these files, generate these surfaces; and which rows of the paper do they stand for?"""
     found = [read_mesh_for(path, algorithms) for path in files]
     standing = {
-        mesh.name: standing_of_file(registry, path, mesh)
+        mesh.name: paper_role_of_file(registry, path, mesh)
         for path, mesh in zip(files, found, strict=True)
     }
     found += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
-    return found, standing | standing_of(registry, names)
+    return found, standing | paper_roles(registry, names)
 
 
 def mesh_files(folder: Path) -> list[Path]:
@@ -235,14 +235,14 @@ def surface_named(registry: Registry, name: str, kind: type[M], faces: int | Non
     return read_mesh(Path(name), kind)
 
 
-def standing_of(registry: Registry, names: Iterable[str]) -> dict[str, Standing]:
+def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole]:
     """Which rows of the paper do these registered surfaces stand for? Others are left out."""
     rows = {name: registry.surface(name).paper_row for name in names}
-    return {name: Standing(row, "stand-in") for name, row in rows.items() if row}
+    return {name: PaperRole(row, "stand-in") for name, row in rows.items() if row}
 
 
-def standing_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> Standing:
+def paper_role_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> PaperRole:
     """Is what was read from this file one of the paper's models?"""
     dataset = recognised(registry.datasets.values(), path, mesh.hash)
     row = dataset.paper_row if dataset else ""
-    return Standing(row, "model") if row else Standing()
+    return PaperRole(row, "model") if row else PaperRole()

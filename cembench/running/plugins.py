@@ -15,7 +15,7 @@ from pathlib import Path
 
 from cembench.core.errors import RegistryError, said_by
 from cembench.registry import Registry, declared_by, load_registry
-from cembench.running.process import Ending, Limits, die_with_parent, run_limited, spawning
+from cembench.running.process import Limits, ProcessEnd, die_with_parent, run_limited, spawning
 
 #: Wall-clock seconds that importing a plug-in may take.
 IMPORT_SECONDS = 60.0
@@ -55,7 +55,7 @@ def _try(plugin: str, seconds: float) -> None:
         raise RegistryError(said.decode(errors="replace"))
 
 
-def _told(ending: Ending, seconds: float) -> str:
+def _told(ending: ProcessEnd, seconds: float) -> str:
     if ending.limit:
         return f"that took more than {seconds:g} s"
     return f"the process that did it {ending.how}"

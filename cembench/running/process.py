@@ -43,7 +43,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Ending:
+class ProcessEnd:
     """How a process ended: by itself with a code (negative: a signal), or at a limit."""
 
     code: int
@@ -73,7 +73,7 @@ def _signal_name(number: int) -> str:
         return str(number)
 
 
-class Started(Protocol):
+class StartedProcess(Protocol):
     """A process, the first of its group: what is used here of `subprocess.Popen`."""
 
     @property
@@ -91,13 +91,13 @@ class Started(Protocol):
 
 
 #: Starts a process, given its mark (32 characters) and the file that takes its output.
-Start: TypeAlias = Callable[[str, Path], Started]
+Start: TypeAlias = Callable[[str, Path], StartedProcess]
 
 
 def spawning(command: Sequence[str], environment: Mapping[str, str]) -> Start:
     """What starts a command in this environment."""
 
-    def start(mark: str, log: Path) -> Started:
+    def start(mark: str, log: Path) -> StartedProcess:
         with log.open("ab") as output:  # appending: what is cut off stays off
             return subprocess.Popen(
                 command,
@@ -111,7 +111,7 @@ def spawning(command: Sequence[str], environment: Mapping[str, str]) -> Start:
     return start
 
 
-def run_limited(start: Start, limits: Limits, log: Path) -> Ending:
+def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
     """Let a process run until it ends or reaches a limit; then end all that it has started.
 
     `log` is a file for its output; however much that is, little is kept.
@@ -139,10 +139,10 @@ def run_limited(start: Start, limits: Limits, log: Path) -> Ending:
         code, left = _end_all(process, tree, mark)
     with suppress(OSError):  # the process may have removed it
         said = (said + log.read_bytes())[-KEPT_OUTPUT_BYTES:]
-    return Ending(code, limit, seen, said.decode(errors="replace").strip(), left)
+    return ProcessEnd(code, limit, seen, said.decode(errors="replace").strip(), left)
 
 
-def _ended_within(process: Started, seconds: float) -> bool:
+def _ended_within(process: StartedProcess, seconds: float) -> bool:
     """Wait at most so long; on Linux the end of the process wakes us at once."""
     if process.poll() is not None:
         return True
@@ -186,7 +186,9 @@ def _drain(log: Path, said: bytes) -> bytes:
     return said
 
 
-def _end_all(process: Started, tree: dict[int, psutil.Process], mark: str) -> tuple[int, int]:
+def _end_all(
+    process: StartedProcess, tree: dict[int, psutil.Process], mark: str
+) -> tuple[int, int]:
     """End the process and every descendant, twice: one may have started another meanwhile.
 
     Gives the code that the process ended with and the number of descendants that were there.

@@ -12,14 +12,14 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.records import FaultKind
 from cembench.running.measure import MESH_CHANGED
 from cembench.validation import surfaces
-from cembench.validation.finding import Finding
-from cembench.validation.solver import Mapped, Solver
+from cembench.validation.finding import ValidationFinding
+from cembench.validation.solver import CheckedMap, Solver
 
 #: How far the last entry of the energy history may be from E_C of the map, relative to its area.
 SAME_ENERGY = 1e-6
 
 
-def examine_contract(solver: Solver, registry: Registry) -> list[Finding]:
+def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFinding]:
     """The findings; where defaults are out of range or there is no map, only that is told."""
     findings = [parameters_fit(solver.algorithm)]
     if not findings[0].ok:
@@ -39,7 +39,7 @@ def examine_contract(solver: Solver, registry: Registry) -> list[Finding]:
     ]
 
 
-def parameters_fit(algorithm: Algorithm) -> Finding:
+def parameters_fit(algorithm: Algorithm) -> ValidationFinding:
     """Is each default within its own range, and can JSON hold it, so that a record can?"""
     wrong = []
     for parameter in algorithm.parameters:
@@ -48,7 +48,7 @@ def parameters_fit(algorithm: Algorithm) -> Finding:
             json.dumps(parameter.default, allow_nan=False)
         except (ParameterError, TypeError, ValueError) as error:
             wrong.append(f"{parameter.name}={parameter.default!r}: {error}")
-    return Finding(
+    return ValidationFinding(
         stage="contract",
         name="parameters",
         ok=not wrong,
@@ -58,13 +58,13 @@ def parameters_fit(algorithm: Algorithm) -> Finding:
     )
 
 
-def returns_a_map(mapped: Mapped) -> Finding:
+def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
     """Does a call end with an array that is a map, whatever that map is worth?"""
     outcome = mapped.outcome
     measured = f"complex128 ({mapped.mesh.n},), finite"
     if not mapped.is_usable:
         measured = f"{outcome.status} on {mapped.mesh.name}: {outcome.cause}"
-    return Finding(
+    return ValidationFinding(
         stage="contract",
         name="returns a map",
         ok=mapped.is_usable,
@@ -75,10 +75,10 @@ def returns_a_map(mapped: Mapped) -> Finding:
     )
 
 
-def leaves_the_mesh(mapped: Mapped) -> Finding:
+def leaves_the_mesh(mapped: CheckedMap) -> ValidationFinding:
     """Are V and F as they were after the call?"""
     changed = any(fault.kind is FaultKind.MESH_CHANGED for fault in mapped.outcome.faults)
-    return Finding(
+    return ValidationFinding(
         stage="contract",
         name="mesh untouched",
         ok=not changed,
@@ -88,7 +88,7 @@ def leaves_the_mesh(mapped: Mapped) -> Finding:
     )
 
 
-def tells_its_energy(mapped: Mapped) -> Finding:
+def tells_its_energy(mapped: CheckedMap) -> ValidationFinding:
     """Is what it reports of its iterations plausible, and its last energy that of the map?"""
     outcome = mapped.outcome
     history, iterations = outcome.energy_history, outcome.iterations or 0
@@ -107,7 +107,7 @@ def tells_its_energy(mapped: Mapped) -> Finding:
         right = f"{iterations} iterations, no energies"
     elif other:
         right = f"{iterations} iterations; energies are of another kind: {other}"
-    return Finding(
+    return ValidationFinding(
         stage="contract",
         name="energy history",
         ok=not wrong,
@@ -119,13 +119,13 @@ def tells_its_energy(mapped: Mapped) -> Finding:
     )
 
 
-def is_repeatable(first: Mapped, second: Mapped) -> Finding:
+def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
     """Does the same call in another process give the same bits?"""
     same = first.outcome.uv_hash == second.outcome.uv_hash
     apart = math.inf
     if first.uv is not None and second.uv is not None:
         apart = float(np.abs(first.uv - second.uv).max())
-    return Finding(
+    return ValidationFinding(
         stage="contract",
         name="repeatable",
         ok=same,
@@ -135,7 +135,7 @@ def is_repeatable(first: Mapped, second: Mapped) -> Finding:
     )
 
 
-def copes(mapped: list[Mapped]) -> Finding:
+def copes(mapped: list[CheckedMap]) -> ValidationFinding:
     """On meshes out of the ordinary: a map, or a cause?"""
     bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
     said = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
@@ -143,7 +143,7 @@ def copes(mapped: list[Mapped]) -> Finding:
     right = f"{len(mapped) - len(without)} of {len(mapped)} mapped"
     if without:
         right += f", gave up on {', '.join(without)} with a cause"
-    return Finding(
+    return ValidationFinding(
         stage="contract",
         name="awkward meshes",
         ok=not bad,

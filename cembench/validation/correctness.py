@@ -17,8 +17,8 @@ from cembench.registry import Algorithm, Registry
 from cembench.running.judge import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
-from cembench.validation.finding import Finding
-from cembench.validation.solver import Complex, Mapped, Solver
+from cembench.validation.finding import ValidationFinding
+from cembench.validation.solver import CheckedMap, Complex, Solver
 
 #: How far figures may move, relatively, and maps, when the same surface is given another way.
 SAME_FIGURES = 1e-6
@@ -36,11 +36,11 @@ _INVARIANT = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg", 
 
 
 @dataclass(frozen=True)
-class Series:
+class RefinementSeries:
     """The maps of one surface, from coarse to fine."""
 
-    surface: surfaces.Refined
-    maps: tuple[Mapped, ...]
+    surface: surfaces.RefinedSurface
+    maps: tuple[CheckedMap, ...]
 
     @property
     def order_scale(self) -> list[float]:
@@ -48,11 +48,11 @@ class Series:
         return [float(m.mesh.m) ** -0.5 for m in self.maps]
 
 
-def examine_correctness(solver: Solver, registry: Registry) -> list[Finding]:
+def examine_correctness(solver: Solver, registry: Registry) -> list[ValidationFinding]:
     """The findings; where a surface has no map at all, only that is told."""
     kind = surfaces.kind_of(solver.algorithm)
     series = [
-        Series(refined, tuple(solver.map(mesh) for mesh in refined.meshes))
+        RefinementSeries(refined, tuple(solver.map(mesh) for mesh in refined.meshes))
         for refined in surfaces.refined(registry, kind)
     ]
     uneven = solver.map(surfaces.uneven(registry, kind))
@@ -69,10 +69,10 @@ def examine_correctness(solver: Solver, registry: Registry) -> list[Finding]:
     return findings
 
 
-def maps_known_surfaces(maps: Sequence[Mapped]) -> Finding:
+def maps_known_surfaces(maps: Sequence[CheckedMap]) -> ValidationFinding:
     """Is there a map of each of the closed-form surfaces?"""
     bad = [f"{_named(m)}: {m.outcome.status}: {m.outcome.cause}" for m in maps if m.uv is None]
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name="maps known surfaces",
         ok=not bad,
@@ -82,10 +82,10 @@ def maps_known_surfaces(maps: Sequence[Mapped]) -> Finding:
     )
 
 
-def keeps_orientation(maps: Sequence[Mapped]) -> Finding:
+def keeps_orientation(maps: Sequence[CheckedMap]) -> ValidationFinding:
     """Are triangles that are counter-clockwise on the surface so in the plane?"""
     mirrored = [_named(m) for m in maps if image_area(m.mesh, _uv(m)) <= 0]
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name="orientation",
         ok=not mirrored,
@@ -95,7 +95,9 @@ def keeps_orientation(maps: Sequence[Mapped]) -> Finding:
     )
 
 
-def boundary_findings(algorithm: Algorithm, maps: Sequence[Mapped]) -> Iterator[Finding]:
+def boundary_findings(
+    algorithm: Algorithm, maps: Sequence[CheckedMap]
+) -> Iterator[ValidationFinding]:
     """Does the boundary lie where the target says? Nothing is asked of a free boundary."""
     if algorithm.target == "free boundary":
         return
@@ -105,7 +107,7 @@ def boundary_findings(algorithm: Algorithm, maps: Sequence[Mapped]) -> Iterator[
     allowed = CIRCLE_TOLERANCE if disk else CIRCULAR
     ok = off[worst] <= allowed
     where = "" if ok else f", on {_named(maps[worst])}"
-    yield Finding(
+    yield ValidationFinding(
         stage="correctness",
         name="boundary",
         ok=ok,
@@ -116,11 +118,11 @@ def boundary_findings(algorithm: Algorithm, maps: Sequence[Mapped]) -> Iterator[
     )
 
 
-def folds(maps: Sequence[Mapped]) -> Finding:
+def folds(maps: Sequence[CheckedMap]) -> ValidationFinding:
     """Are there folded triangles, on surfaces where there need not be any?"""
     counts = [(flipped_triangles(m.mesh, _uv(m)), m) for m in maps]
     bad = [f"{count} of {m.mesh.m} triangles folded on {_named(m)}" for count, m in counts if count]
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name="folds",
         ok=not bad,
@@ -133,14 +135,14 @@ def folds(maps: Sequence[Mapped]) -> Finding:
     )
 
 
-def energy_vanishes(series: Series) -> Finding:
+def energy_vanishes(series: RefinementSeries) -> ValidationFinding:
     """Does E_C, relative to the area, fall to zero as the triangles shrink?"""
     energies = [_relative_energy(m) for m in series.maps]
     order = _order(series, energies)
     return _rate(series, "E_C", energies, order, ENERGY_ORDER, ENERGY_ROUNDING)
 
 
-def angles_improve(series: Series) -> Finding:
+def angles_improve(series: RefinementSeries) -> ValidationFinding:
     """Does the mean angle error fall as the triangles shrink?"""
     errors = [_figure(m, "angle_error_mean_deg") for m in series.maps]
     order = _order(series, errors)
@@ -148,10 +150,15 @@ def angles_improve(series: Series) -> Finding:
 
 
 def _rate(
-    series: Series, what: str, errors: list[float], order: float, least: float, rounding: float
-) -> Finding:
+    series: RefinementSeries,
+    what: str,
+    errors: list[float],
+    order: float,
+    least: float,
+    rounding: float,
+) -> ValidationFinding:
     shown = ", ".join(f"{error:.2g}" for error in errors)
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name=f"{what} under refinement",
         ok=order >= least or max(errors) <= rounding,
@@ -163,13 +170,13 @@ def _rate(
     )
 
 
-def reaches_the_exact_map(series: Series) -> Finding:
+def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
     """How far is it from the closed-form map, after the best Moebius map?"""
     exact = series.surface.exact_map
     if exact is None:
         raise ValueError(f"no closed-form map of {series.surface.name} is known")
     errors = [distance(_uv(m), exact(m.mesh.V), moebius=True) for m in series.maps]
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name="exact map",
         ok=errors[-1] <= POSITION_ERROR,
@@ -181,7 +188,7 @@ def reaches_the_exact_map(series: Series) -> Finding:
     )
 
 
-def _invariances(solver: Solver, uneven: Mapped) -> Iterator[Finding]:
+def _invariances(solver: Solver, uneven: CheckedMap) -> Iterator[ValidationFinding]:
     renumbered, number = surfaces.renumbered(uneven.mesh)
     similarity = solver.algorithm.target == "free boundary"
     again = solver.map(renumbered)
@@ -206,8 +213,14 @@ def _invariances(solver: Solver, uneven: Mapped) -> Iterator[Finding]:
 
 
 def same_map(
-    what: str, first: Mapped, second: Mapped, uv: Complex | None, *, moebius: bool, remedy: str
-) -> Finding:
+    what: str,
+    first: CheckedMap,
+    second: CheckedMap,
+    uv: Complex | None,
+    *,
+    moebius: bool,
+    remedy: str,
+) -> ValidationFinding:
     """Is the map the same, or are its figures, when the surface is given another way?
 
     `uv` is the second map in the numbering of the first; equal is meant up to a Moebius map of
@@ -219,7 +232,7 @@ def same_map(
         apart = distance(uv, _uv(first), moebius=moebius)
         ok = min(figures, apart) <= SAME_FIGURES
         measured = f"figures differ by {figures:.1e}, maps by {apart:.1e}"
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name=what,
         ok=ok,
@@ -229,7 +242,7 @@ def same_map(
     )
 
 
-def same_under_backslash(reused: Mapped, anew: Mapped) -> Finding:
+def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFinding:
     """Is it the same map whether factors are kept or not?"""
     apart = np.inf
     if anew.uv is not None:
@@ -237,7 +250,7 @@ def same_under_backslash(reused: Mapped, anew: Mapped) -> Finding:
     measured = f"reuse and backslash differ by up to {apart:.1e}"
     if anew.uv is None:
         measured = f"{anew.outcome.status}: {anew.outcome.cause}"
-    return Finding(
+    return ValidationFinding(
         stage="correctness",
         name="both linear-algebra policies",
         ok=apart <= SAME_MAP,
@@ -248,7 +261,7 @@ def same_under_backslash(reused: Mapped, anew: Mapped) -> Finding:
     )
 
 
-def _figures_apart(first: Mapped, second: Mapped) -> float:
+def _figures_apart(first: CheckedMap, second: CheckedMap) -> float:
     """The largest relative difference of what neither motion, numbering nor scale changes."""
     mine, other = all_metrics(first.mesh, _uv(first)), all_metrics(second.mesh, _uv(second))
     apart = [
@@ -264,36 +277,36 @@ def _figures_apart(first: Mapped, second: Mapped) -> float:
     return float(max(apart))
 
 
-def _order(series: Series, errors: Sequence[float]) -> float:
+def _order(series: RefinementSeries, errors: Sequence[float]) -> float:
     """The slope of log(error) against log(h)."""
     heights = np.log(np.maximum(errors, 1e-300))
     return float(np.polyfit(np.log(series.order_scale), heights, 1)[0])
 
 
-def _relative_energy(mapped: Mapped) -> float:
+def _relative_energy(mapped: CheckedMap) -> float:
     return _figure(mapped, "conformal_energy") / abs(_figure(mapped, "image_area"))
 
 
-def _figure(mapped: Mapped, name: str) -> float:
+def _figure(mapped: CheckedMap, name: str) -> float:
     return float(all_metrics(mapped.mesh, _uv(mapped))[name])
 
 
-def _off_circle(mapped: Mapped) -> float:
+def _off_circle(mapped: CheckedMap) -> float:
     return float(np.abs(np.abs(_uv(mapped)[mapped.mesh.loops[0]]) - 1).max())
 
 
-def _off_circles(mapped: Mapped) -> float:
+def _off_circles(mapped: CheckedMap) -> float:
     uv = _uv(mapped)
     outer = max(mapped.mesh.loops, key=lambda loop: float(np.abs(uv[loop]).max()))
     off = float(np.abs(np.abs(uv[outer]) - 1).max())
     return max(off, boundary_circularity(mapped.mesh, uv))
 
 
-def _uv(mapped: Mapped) -> Complex:
+def _uv(mapped: CheckedMap) -> Complex:
     if mapped.uv is None:
         raise ValueError(f"there is no map of {mapped.mesh.name}")
     return mapped.uv
 
 
-def _named(mapped: Mapped) -> str:
+def _named(mapped: CheckedMap) -> str:
     return f"{mapped.mesh.name} ({mapped.mesh.m:,} triangles)"

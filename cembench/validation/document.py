@@ -19,12 +19,12 @@ from cembench.report.document import (
     words,
 )
 from cembench.report.palette import looks
-from cembench.report.plots import Axis, Panel, Plot, Series, write_plot
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.record_rows import row
 from cembench.results.records import Record
 from cembench.results.store import Store
-from cembench.validation.finding import Finding
-from cembench.validation.quality import Against, Pair, Sides
+from cembench.validation.finding import ValidationFinding
+from cembench.validation.quality import BaselineComparison, Pair, PairedComparison
 from cembench.validation.scaling import Growth
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -85,7 +85,7 @@ def _items(
         yield write_plot(_growths_plot(validation.growths), folder)
 
 
-def _findings_table(stage: str, findings: Sequence[Finding]) -> Table:
+def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
     columns = ("check", "found", "measured", "allowed")
     return Table(
         name=f"{stage}-findings",
@@ -104,7 +104,7 @@ def _findings_table(stage: str, findings: Sequence[Finding]) -> Table:
     )
 
 
-def _summary_table(compared: Sequence[Against]) -> Table:
+def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
     rows = []
     for against in compared:
         energy = "E_C by area" if against.relative else "E_C"
@@ -140,7 +140,7 @@ def _summary_table(compared: Sequence[Against]) -> Table:
     )
 
 
-def _sides_row(what: str, found: Sides) -> tuple[Value, ...]:
+def _sides_row(what: str, found: PairedComparison) -> tuple[Value, ...]:
     counts = (found.lower, found.equal, found.higher)
     return (
         words(what),
@@ -157,7 +157,7 @@ def _ratio(value: float | None) -> Value:
     return Value(f"{value:.3f}", value, "derived")
 
 
-def _pairs_table(against: Against, title: str, records: dict[str, Record]) -> Table:
+def _pairs_table(against: BaselineComparison, title: str, records: dict[str, Record]) -> Table:
     groups = (("E_C by area" if against.relative else "E_C"), "mean angle error, °", "seconds")
     columns = [Column("surface", numeric=False), Column("faces")]
     for group in groups:
@@ -237,14 +237,14 @@ def _growths_table(growths: Sequence[Growth]) -> Table:
 def _growths_plot(growths: Sequence[Growth]) -> Plot:
     styles = looks([growth.what for growth in growths])
     series = tuple(
-        Series(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])
+        PlotSeries(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])
         for growth in growths
     )
     axes = Axis("triangles", log=True), Axis("seconds", log=True)
     return Plot(
         "growth-plot",
         "Seconds against triangles",
-        (Panel(*axes, series),),
+        (PlotPanel(*axes, series),),
         "Medians of the rounds, on logarithmic axes.",
         "Lines that rise from left to right, one for each of the table's rows.",
     )

@@ -16,11 +16,11 @@ from cembench.results.records import DEFAULT_ROUNDS, Record
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
 from cembench.running.local import Options, Watcher, run_tasks
-from cembench.running.plan import How, Standing, plan_cells
+from cembench.running.plan import MeasurementSettings, PaperRole, plan_cells
 from cembench.validation import surfaces
 from cembench.validation.contract import examine_contract
 from cembench.validation.correctness import examine_correctness
-from cembench.validation.finding import Finding, Stage
+from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
@@ -38,14 +38,14 @@ _USUAL_BASELINE = {"disk": "cem", "free boundary": "lscm", "circular holes": "ko
 
 
 @dataclass(frozen=True)
-class Asked:
+class ValidationOptions:
     """What the user asked for."""
 
     #: None: the usual one of the target.
     against: Sequence[str] | None = None
     #: What is compared on; empty: the usual six.
     meshes: Sequence[TriangleMesh] = ()
-    standing: Mapping[str, Standing] = field(default_factory=dict)
+    standing: Mapping[str, PaperRole] = field(default_factory=dict)
     faces: int = 5000
     rounds: int = DEFAULT_ROUNDS
     #: Triangles of the largest mesh of the scaling stage; 0: no such stage.
@@ -58,7 +58,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class Telling:
+class ValidationHooks:
     """What hears how the examination goes on."""
 
     stage: Callable[[str], None] = lambda _: None
@@ -66,7 +66,11 @@ class Telling:
 
 
 def examine(
-    solver: Solver, registry: Registry, folder: Path, asked: Asked, telling: Telling | None = None
+    solver: Solver,
+    registry: Registry,
+    folder: Path,
+    asked: ValidationOptions,
+    telling: ValidationHooks | None = None,
 ) -> Validation:
     """Examine one algorithm; the runs that were timed are left in the folder.
 
@@ -86,10 +90,10 @@ def examine(
         registry,
         folder,
         asked,
-        telling or Telling(),
+        telling or ValidationHooks(),
         baselines(algorithm, registry, asked.against),
     )
-    findings: list[Finding] = []
+    findings: list[ValidationFinding] = []
     skipped: dict[Stage, str] = {}
     parts: dict[str, Any] = {}
     for stage, examined in _STAGES.items():
@@ -128,8 +132,8 @@ class _Work:
     solver: Solver
     registry: Registry
     folder: Path
-    asked: Asked
-    telling: Telling
+    asked: ValidationOptions
+    telling: ValidationHooks
     baselines: tuple[str, ...]
 
     @property
@@ -146,7 +150,7 @@ class _Work:
         """Side by side, in one sitting: what the folder holds from before is not taken."""
         chosen = [self.solver.algorithm, *(self.registry.algorithm(name) for name in beside)]
         given = {f"{self.name}.{key}": value for key, value in self.solver.parameters.items()}
-        how = How(repeats=rounds)
+        how = MeasurementSettings(repeats=rounds)
         plan = (how, self.solver.plugins, self.asked.standing)
         tasks = plan_cells(chosen, meshes, given, *plan)
         options = replace(self.asked.options, fresh=True)
@@ -154,7 +158,7 @@ class _Work:
             return run_tasks(tasks, Store(self.folder / stage), options, watcher)
 
 
-_Found = tuple[list[Finding], dict[str, Any]]
+_Found = tuple[list[ValidationFinding], dict[str, Any]]
 
 
 def _contract(work: _Work) -> _Found:
@@ -196,7 +200,7 @@ _STAGES: dict[Stage, Callable[[_Work], _Found]] = {
 }
 
 
-def _is_asked(stage: Stage, asked: Asked) -> bool:
+def _is_asked(stage: Stage, asked: ValidationOptions) -> bool:
     if stage in ("contract", "correctness"):
         return True
     return not asked.checks_only and (stage == "quality" or asked.up_to > 0)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 Stage = Literal["contract", "correctness", "quality", "scaling"]
 
 
-class Finding(BaseModel):
+class ValidationFinding(BaseModel):
     """One check: what was measured, what is allowed, and what to do where it is not ok.
 
     `measured` is a clause that a sentence can quote; `allowed` and `remedy` are sentences.

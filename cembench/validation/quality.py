@@ -22,7 +22,7 @@ from cembench.results.comparison import compare, compare_ratios, paired_ratios
 from cembench.results.intervals import median_interval
 from cembench.results.records import Record
 from cembench.running.measure import MESH_CHANGED
-from cembench.validation.finding import Finding
+from cembench.validation.finding import ValidationFinding
 
 #: Ratios this near to 1 are ties.
 TIE = 0.01
@@ -30,7 +30,7 @@ TIE = 0.01
 _NO_ENERGY = 1e-9
 
 
-class Sides(BaseModel):
+class PairedComparison(BaseModel):
     """On how many surfaces is a figure lower, equal within 1 %, or higher than the baseline's?"""
 
     model_config = ConfigDict(frozen=True)
@@ -80,7 +80,7 @@ class Pair(BaseModel):
     records: tuple[str, str]
 
 
-class Against(BaseModel):
+class BaselineComparison(BaseModel):
     """The comparison with one baseline."""
 
     model_config = ConfigDict(frozen=True)
@@ -90,13 +90,13 @@ class Against(BaseModel):
     #: Targets differ, so energies were divided by the area of the image.
     relative: bool
     pairs: tuple[Pair, ...]
-    energy: Sides
-    angle: Sides
+    energy: PairedComparison
+    angle: PairedComparison
     #: None where no round timed both.
     speed: Speed | None
 
 
-def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Against:
+def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> BaselineComparison:
     """All records of a run, of which those of two algorithms are compared.
 
     Raises
@@ -112,7 +112,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Agai
         raise ValueError(f"no surface has records of both {ours!r} and {baseline!r}")
     relative = next(iter(mine.values())).target != next(iter(theirs.values())).target
     pairs = tuple(_pair(mine[name], theirs[name], relative=relative) for name in names)
-    return Against(
+    return BaselineComparison(
         baseline=baseline,
         title=theirs[names[0]].title,
         relative=relative,
@@ -129,10 +129,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Agai
     )
 
 
-def sides(ratios: Sequence[float]) -> Sides:
+def sides(ratios: Sequence[float]) -> PairedComparison:
     """What do the ratios of the surfaces, ours over theirs, say?"""
     interval = median_interval(ratios)
-    return Sides(
+    return PairedComparison(
         lower=sum(ratio < 1 - TIE for ratio in ratios),
         equal=sum(1 - TIE <= ratio <= 1 + TIE for ratio in ratios),
         higher=sum(ratio > 1 + TIE for ratio in ratios),
@@ -164,7 +164,7 @@ def without_map(records: Sequence[Record]) -> dict[str, str]:
     return {r.cell.mesh: r.outcome.cause or "" for r in records if _has_none(r)}
 
 
-def quality_findings(records: Sequence[Record]) -> list[Finding]:
+def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
     """Is every outcome a map, a map with folds, or an honest refusal? The candidate's records."""
     bad = [
         f"{r.cell.mesh}: {r.outcome.status}: {r.outcome.cause}"
@@ -176,7 +176,7 @@ def quality_findings(records: Sequence[Record]) -> list[Finding]:
         r.cell.mesh for r in records if any("not deterministic" in n for n in r.outcome.notes)
     ]
     return [
-        Finding(
+        ValidationFinding(
             stage="quality",
             name="every surface",
             ok=not bad and not none,
@@ -188,7 +188,7 @@ def quality_findings(records: Sequence[Record]) -> list[Finding]:
             "cause; folds are counted",
             remedy="run `cembench map` on that surface and follow the cause.",
         ),
-        Finding(
+        ValidationFinding(
             stage="quality",
             name="repeatable in every round",
             ok=not changing,

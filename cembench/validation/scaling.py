@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict
 
 from cembench.core.errors import ParameterError
 from cembench.results.records import Record
-from cembench.validation.finding import Finding
+from cembench.validation.finding import ValidationFinding
 
 #: The largest exponent that is allowed. Factoring the Laplacian of a planar mesh costs faces^1.5
 #: in theory; 0.25 is for iterations that become more with the mesh, and for the clock.
@@ -97,7 +97,7 @@ def growths(records: Sequence[Record], ours: str, baseline: str | None) -> list[
     return found
 
 
-def scales(ours: Growth | None, others: Sequence[Growth]) -> Finding:
+def scales(ours: Growth | None, others: Sequence[Growth]) -> ValidationFinding:
     """Is our exponent one that a solver of sparse systems may have? None: too few timed sizes.
 
     Judged is the smallest exponent of the rounds: a disturbance in one of them is no fault.
@@ -107,7 +107,7 @@ def scales(ours: Growth | None, others: Sequence[Growth]) -> Finding:
     if ours is not None:
         measured = f"seconds grow like faces^{ours.exponent:.2f}" + (beside and f" ({beside})")
         measured += f" from {ours.faces[-2]:,} to {ours.faces[-1]:,} triangles"
-    return Finding(
+    return ValidationFinding(
         stage="scaling",
         name="growth of the seconds",
         ok=ours is not None and ours.low <= MOST_EXPONENT,

@@ -15,7 +15,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, load_registry
 from cembench.results.records import Outcome
 from cembench.running.local import Options, map_once
-from cembench.running.plan import How, Task, plan_cells
+from cembench.running.plan import MeasurementSettings, Task, plan_cells
 from cembench.running.plugins import load_with_plugins
 
 Complex = NDArray[np.complex128]
@@ -23,7 +23,7 @@ Call = Callable[[Task], tuple[Outcome, Complex | None]]
 
 
 @dataclass(frozen=True)
-class Mapped:
+class CheckedMap:
     """One surface, what the harness says of the call, and the map if a figure can be made of it."""
 
     mesh: TriangleMesh
@@ -55,11 +55,11 @@ class Solver:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     call: Call = field(default_factory=lambda: in_a_process(Options(timeout=120.0)))
 
-    def map(self, mesh: TriangleMesh, solves: str = "reuse") -> Mapped:
+    def map(self, mesh: TriangleMesh, solves: str = "reuse") -> CheckedMap:
         """What comes out on this surface, with systems solved this way?"""
-        how = How(solves=solves, repeats=1)
+        how = MeasurementSettings(solves=solves, repeats=1)
         (task,) = plan_cells([self.algorithm], [mesh], self.parameters, how, self.plugins)
-        return Mapped(mesh, *self.call(task))
+        return CheckedMap(mesh, *self.call(task))
 
 
 def load_solver(text: str) -> tuple[Algorithm, Registry, tuple[str, ...]]:

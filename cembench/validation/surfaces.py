@@ -5,7 +5,7 @@ They are taken from the registry by name, so a check says which family it needs 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,7 +39,7 @@ _GROWING: dict[type[TriangleMesh], str] = {DiskMesh: "hemi-ellipsoid", HoledMesh
 
 
 @dataclass(frozen=True)
-class Refined:
+class RefinedSurface:
     """One surface in triangulations that become finer."""
 
     name: str
@@ -76,10 +76,10 @@ def awkward(registry: Registry, kind: type[TriangleMesh]) -> list[TriangleMesh]:
     return [_fan(), _strip(), _slanted(make(registry, "hemi-ellipsoid", 600), kind)]
 
 
-def refined(registry: Registry, kind: type[TriangleMesh]) -> list[Refined]:
+def refined(registry: Registry, kind: type[TriangleMesh]) -> list[RefinedSurface]:
     """The families on which errors must fall with the size of the triangles."""
     return [
-        Refined(
+        RefinedSurface(
             name,
             tuple(make(registry, name, faces) for faces in sizes),
             registry.surface(name).exact_map,
@@ -94,7 +94,7 @@ def compared(registry: Registry, kind: type[TriangleMesh], faces: int) -> list[T
     for name, parameters in _COMPARED[kind]:
         mesh = make(registry, name, faces, **parameters)
         suffix = "".join(f"-{value}" for value in parameters.values())
-        meshes.append(replace(mesh, name=name + suffix))
+        meshes.append(mesh.renamed(name + suffix))
     return meshes
 
 
@@ -104,7 +104,7 @@ def growing(
     """One surface in these sizes."""
     name = _GROWING[kind]
     meshes = [make(registry, name, faces) for faces in sizes]
-    return [replace(mesh, name=f"{name}-{mesh.m}") for mesh in meshes]
+    return [mesh.renamed(f"{name}-{mesh.m}") for mesh in meshes]
 
 
 def moved(mesh: TriangleMesh) -> TriangleMesh:

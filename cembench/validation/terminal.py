@@ -9,8 +9,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from cembench.validation.finding import Finding
-from cembench.validation.quality import Against, Pair, Sides
+from cembench.validation.finding import ValidationFinding
+from cembench.validation.quality import BaselineComparison, Pair, PairedComparison
 from cembench.validation.scaling import Growth
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -35,7 +35,7 @@ def validation_text(validation: Validation) -> RenderableType:
     return Group(*parts, Text(), Text(f"{validation.title}: {sentence(validation)}.", style=style))
 
 
-def _finding_lines(finding: Finding) -> Iterator[RenderableType]:
+def _finding_lines(finding: ValidationFinding) -> Iterator[RenderableType]:
     mark = Text("  ok  ", style="green") if finding.ok else Text("  BAD ", style="bold red")
     line = Table.grid()
     line.add_column(width=6)
@@ -47,7 +47,7 @@ def _finding_lines(finding: Finding) -> Iterator[RenderableType]:
             yield Padding(Text(f"{label}: {words}", style="dim"), (0, 0, 0, 8))
 
 
-def _pairs_table(against: Against, title: str) -> Table:
+def _pairs_table(against: BaselineComparison, title: str) -> Table:
     table = Table(
         box=None,
         pad_edge=False,
@@ -103,7 +103,7 @@ def growths_table(growths: tuple[Growth, ...]) -> Table:
     return table
 
 
-def sides_text(found: Sides) -> str:
+def sides_text(found: PairedComparison) -> str:
     """On how many lower, equal, higher, and the median ratio."""
     words = f"lower on {found.lower}, equal within 1 % on {found.equal}, higher on {found.higher}"
     if found.ratio is None:

@@ -12,8 +12,8 @@ from typing import Any, get_args
 from pydantic import BaseModel, ConfigDict
 
 from cembench.results.records import Printable
-from cembench.validation.finding import Finding, Stage
-from cembench.validation.quality import Against, Sides, Speed
+from cembench.validation.finding import Stage, ValidationFinding
+from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
 from cembench.validation.scaling import Growth
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
@@ -41,21 +41,21 @@ class Validation(BaseModel):
     parameters: dict[str, Any]
     command: Printable
     environment: str
-    findings: tuple[Finding, ...]
+    findings: tuple[ValidationFinding, ...]
     #: Stages that were not reached, with the reason.
     skipped: dict[Stage, str] = {}
     surfaces: tuple[str, ...] = ()
     folds_on: tuple[str, ...] = ()
     #: Surfaces without a map, and why.
     no_map_on: dict[str, str] = {}
-    against: tuple[Against, ...] = ()
+    against: tuple[BaselineComparison, ...] = ()
     growths: tuple[Growth, ...] = ()
     #: Of those asked for, the requirements that are not met.
     unmet: tuple[Requirement, ...] = ()
     seconds: float = 0.0
 
     @property
-    def faults(self) -> tuple[Finding, ...]:
+    def faults(self) -> tuple[ValidationFinding, ...]:
         """The findings that are not ok, the first cause first."""
         return tuple(finding for finding in self.findings if not finding.ok)
 
@@ -94,7 +94,7 @@ def sentence(validation: Validation) -> str:
     return "; ".join(parts)
 
 
-def _invalid(faults: Sequence[Finding]) -> str:
+def _invalid(faults: Sequence[ValidationFinding]) -> str:
     first, *others = faults
     words = f"invalid: {first.name}: {first.measured}"
     if others:
@@ -103,7 +103,7 @@ def _invalid(faults: Sequence[Finding]) -> str:
     return words
 
 
-def _energy_words(against: Against) -> str:
+def _energy_words(against: BaselineComparison) -> str:
     found, title = against.energy, against.title
     energy = "E_C by area" if against.relative else "E_C"
     if not found.surfaces:
@@ -122,7 +122,7 @@ def _energy_words(against: Against) -> str:
     return f"{words} ({_ratio_words(found)})"
 
 
-def _ratio_words(found: Sides) -> str:
+def _ratio_words(found: PairedComparison) -> str:
     words = f"median ratio {found.ratio:.2f}"
     if found.low is not None:
         return f"{words}, 95 % interval {found.low:.2f}-{found.high:.2f}"
@@ -157,7 +157,7 @@ def _meets(requirement: Requirement, validation: Validation) -> bool:
     )
 
 
-def _meets_against(requirement: Requirement, against: Against) -> bool:
+def _meets_against(requirement: Requirement, against: BaselineComparison) -> bool:
     energy, speed = against.energy, against.speed
     if requirement is Requirement.faster:
         return speed is not None and speed.verdict == "faster"

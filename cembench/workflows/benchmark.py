@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Registry, load_registry
 from cembench.results.records import DEFAULT_ROUNDS, Record
 from cembench.results.store import Store
@@ -147,7 +148,8 @@ def benchmark(
         raise ParameterError(f"rounds={rounds!r} is not allowed; it takes at least 1.")
     chosen = [registry.algorithm(name) for name in algorithms or registry.algorithms]
     kinds = list(dict.fromkeys(a.mesh_type for a in chosen))
-    meshes, roles = [], {}
+    meshes: list[TriangleMesh] = []
+    roles: dict[str, PaperRole] = {}
     for number, one in enumerate(given, start=1):
         mesh = checked_surface(one, kinds, registry)
         if isinstance(one, tuple | list):

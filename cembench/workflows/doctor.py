@@ -1,7 +1,7 @@
 """Is everything there that cembench needs, and what does an extra bring?
 
 A package that has something of its own to look at offers it through the entry points
-``cembench.checks``: functions without arguments that return a :class:`Finding`.
+``cembench.checks``: functions without arguments that return a :class:`InstallationFinding`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ CHECKS = "cembench.checks"
 
 
 @dataclass(frozen=True)
-class Finding:
+class InstallationFinding:
     """One line of the report; `remedy` says what to do where it is not ok."""
 
     name: str
@@ -44,7 +44,7 @@ class Finding:
     remedy: str = ""
 
 
-def examine() -> list[Finding]:
+def examine() -> list[InstallationFinding]:
     """Look at the interpreter, the libraries, the back ends, the plug-ins and the machine."""
     return [
         _python(),
@@ -59,22 +59,26 @@ def examine() -> list[Finding]:
     ]
 
 
-def _python() -> Finding:
+def _python() -> InstallationFinding:
     ok = sys.version_info >= (3, 11)
-    return Finding("python", ok, sys.version.split()[0], remedy="Install Python 3.11 or newer.")
+    return InstallationFinding(
+        "python", ok, sys.version.split()[0], remedy="Install Python 3.11 or newer."
+    )
 
 
-def _library(package: str, module: str) -> Finding:
+def _library(package: str, module: str) -> InstallationFinding:
     try:
         importlib.import_module(module)
-        return Finding(package, True, version(package))
+        return InstallationFinding(package, True, version(package))
     except ImportError as error:
-        return Finding(package, False, str(error), remedy=f"Run `pip install {package}`.")
+        return InstallationFinding(
+            package, False, str(error), remedy=f"Run `pip install {package}`."
+        )
 
 
-def _backends() -> Finding:
+def _backends() -> InstallationFinding:
     there = available_backends()
-    return Finding(
+    return InstallationFinding(
         "cholesky",
         "cvxopt" in there,
         f"{', '.join(there)} (default cvxopt; its CHOLMOD is under the GPL at run time)",
@@ -82,23 +86,25 @@ def _backends() -> Finding:
     )
 
 
-def _plugins() -> Finding:
+def _plugins() -> InstallationFinding:
     try:
         found = load_registry()
     except CembenchError as error:
-        return Finding("plug-ins", False, str(error), remedy="See the message.")
+        return InstallationFinding("plug-ins", False, str(error), remedy="See the message.")
     detail = f"{len(found.algorithms)} algorithms, {len(found.surfaces)} surfaces"
-    return Finding("plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench.")
+    return InstallationFinding(
+        "plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench."
+    )
 
 
-def _renderer() -> Finding:
+def _renderer() -> InstallationFinding:
     from cembench.drawing.preview import renderer_status
 
     try:
         ok, message = renderer_status()
     except ImportError as error:  # a library that is required; said in its own line
         ok, message = False, str(error)
-    return Finding(
+    return InstallationFinding(
         "pictures",
         ok,
         message,
@@ -107,19 +113,19 @@ def _renderer() -> Finding:
     )
 
 
-def _offered(entry: EntryPoint) -> Finding:
+def _offered(entry: EntryPoint) -> InstallationFinding:
     """What an installed package's own check finds; one that breaks is a finding itself."""
     try:
         found = entry.load()()
     except Exception as error:  # it is not ours and may raise anything
         detail = f"{entry.value} failed: {type(error).__name__}: {error}"
         remedy = "Repair or uninstall the package that declares it."
-        return Finding(entry.name, False, detail, required=False, remedy=remedy)
-    assert isinstance(found, Finding)
+        return InstallationFinding(entry.name, False, detail, required=False, remedy=remedy)
+    assert isinstance(found, InstallationFinding)
     return found
 
 
-def _datasets() -> list[Finding]:
+def _datasets() -> list[InstallationFinding]:
     try:
         known = load_registry().datasets
     except CembenchError:  # said in the plug-ins' own line
@@ -128,12 +134,16 @@ def _datasets() -> list[Finding]:
     detail = f"{len(here)} of {len(known)} fetched{': ' if here else ''}{', '.join(here)}"
     detail += f"; kept in {cache_directory()}"
     remedy = "For the paper's public models run `cembench fetch NAME`; stand-ins do without."
-    return [Finding("datasets", len(here) == len(known), detail, required=False, remedy=remedy)]
+    return [
+        InstallationFinding(
+            "datasets", len(here) == len(known), detail, required=False, remedy=remedy
+        )
+    ]
 
 
-def _video() -> Finding:
+def _video() -> InstallationFinding:
     there = find_spec("imageio_ffmpeg") is not None
-    return Finding(
+    return InstallationFinding(
         "video",
         there,
         "imageio-ffmpeg writes MP4" if there else "MP4 needs imageio-ffmpeg; GIF needs nothing",
@@ -142,10 +152,10 @@ def _video() -> Finding:
     )
 
 
-def _machine() -> Finding:
+def _machine() -> InstallationFinding:
     about = describe_environment()
     detail = (
         f"{about['cpu']}, {about['hardware_threads']} hardware threads, "
         f"{about['memory_bytes'] / 2**30:.0f} GiB; {'; '.join(about['blas']) or 'BLAS unknown'}"
     )
-    return Finding("machine", True, detail, required=False)
+    return InstallationFinding("machine", True, detail, required=False)

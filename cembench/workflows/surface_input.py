@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -78,11 +78,13 @@ def _converted(mesh: TriangleMesh, kind: type[TriangleMesh]) -> TriangleMesh:
     return kind.from_arrays(mesh.V, mesh.F, name=mesh.name)
 
 
-def _first(kinds: Sequence[type[TriangleMesh]], make: Any) -> TriangleMesh:
+def _first(
+    kinds: Sequence[type[TriangleMesh]], make: Callable[[type[TriangleMesh]], TriangleMesh]
+) -> TriangleMesh:
     """Return what the first kind that fits makes; the first kind's error counts."""
     for kind in kinds[1:]:
         try:
-            return make(kind)  # type: ignore[no-any-return]
+            return make(kind)
         except MeshError:
             continue
-    return make(kinds[0])  # type: ignore[no-any-return]
+    return make(kinds[0])

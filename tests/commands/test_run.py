@@ -157,7 +157,7 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
         "def declare(k, row):\n"
         "    @surface(f's{k}', title=row, paper_row=row)\n"
         "    def plate(faces: int = 100 + 10 * k) -> DiskMesh:\n"
-        "        return replace(flat_disk(100 + 60 * k), name=f's{k}')\n"
+        "        return flat_disk(100 + 60 * k).renamed(f's{k}')\n"
         "    plate.__module__ = __name__\n"
         "    return plate\n"
         "for k, row in enumerate(paper.table(1)):\n"
@@ -170,10 +170,10 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
 
 def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
     from cembench.registry import load_registry
-    from cembench.running.plan import Standing, standing_of
+    from cembench.running.plan import PaperRole, paper_roles
 
-    found = standing_of(load_registry(), ["foot", "flat-disk"])
-    assert found == {"foot": Standing("Foot", "stand-in")}
+    found = paper_roles(load_registry(), ["foot", "flat-disk"])
+    assert found == {"foot": PaperRole("Foot", "stand-in")}
 
 
 def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):

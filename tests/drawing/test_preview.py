@@ -9,7 +9,7 @@ from PIL import Image
 
 from cembench.core.errors import ParameterError, RenderError
 from cembench.drawing import compose, draw_numpy, preview
-from cembench.drawing.preview import Drawn, renderer_status, write_preview
+from cembench.drawing.preview import RendererUsed, renderer_status, write_preview
 from cembench.drawing.scene import FILL, SQUARES, Scene
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import load_registry
@@ -76,7 +76,7 @@ def test_png_has_the_asked_size_and_panels_with_something_in_them(tmp_path):
     drawn = write_preview(
         mesh, seen_from_above(mesh), path, title="A disk", size=SMALL, renderer="matplotlib"
     )
-    assert drawn == Drawn("matplotlib")
+    assert drawn == RendererUsed("matplotlib")
     assert pixels(path).shape == (SMALL[1], SMALL[0], 3)
     for panel in panels(path, SMALL):
         assert 0.70 < (panel < 250).any(axis=2).mean() < 0.80  # pi / 4 of the square

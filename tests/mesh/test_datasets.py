@@ -24,7 +24,7 @@ from cembench.mesh.datasets import Dataset, fetch, is_fetched
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
-from cembench.running.plan import Standing, standing_of_file
+from cembench.running.plan import PaperRole, paper_role_of_file
 from tests.limits import files_of_at_most, tree
 from tests.real_meshes import real_mesh
 
@@ -186,18 +186,18 @@ def test_a_model_is_recognised_by_its_bytes_and_by_its_mesh(tiny, known, server,
     path.write_bytes(server.content)
     mesh = read_mesh(path)
     found = load_registry()
-    assert standing_of_file(found, path, mesh) == Standing("Nefertiti", "model")
+    assert paper_role_of_file(found, path, mesh) == PaperRole("Nefertiti", "model")
     write_mesh(tmp_path / "other.ply", mesh)
-    assert standing_of_file(found, tmp_path / "other.ply", mesh) == Standing()
+    assert paper_role_of_file(found, tmp_path / "other.ply", mesh) == PaperRole()
     hashed = replace(found, datasets={"tiny": replace(tiny, mesh_hash=mesh.hash)})
-    assert standing_of_file(hashed, tmp_path / "other.ply", mesh).paper_row == "Nefertiti"
+    assert paper_role_of_file(hashed, tmp_path / "other.ply", mesh).paper_row == "Nefertiti"
 
 
 @pytest.mark.parametrize("name", ["chinese_lion.mat", "chinese_lion.obj"])
 def test_the_chinese_lion_is_recognised_in_either_format(name):
     path = real_mesh(name)
-    found = standing_of_file(load_registry(), path, read_mesh(path, TriangleMesh))
-    assert found == Standing("Chinese Lion", "model")
+    found = paper_role_of_file(load_registry(), path, read_mesh(path, TriangleMesh))
+    assert found == PaperRole("Chinese Lion", "model")
 
 
 def test_fetch_lists_what_there_is(cli, known):

@@ -21,7 +21,7 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.report.surface_facts import factor_spans, row_check
 from cembench.results.paper.profiles import Profile, surfaces_of
-from cembench.running.plan import Standing, mesh_facts
+from cembench.running.plan import PaperRole, mesh_facts
 
 #: Made in seconds; the others are for the slow run.
 QUICK = ("nefertiti", "cowboy-hat", "chinese-vase")
@@ -47,7 +47,7 @@ def fresh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
 
 
 def _check(name: str, mesh: DiskMesh) -> dict[str, Any]:
-    check = row_check(mesh_facts(mesh, Standing(ROWS[name].model, "stand-in")))
+    check = row_check(mesh_facts(mesh, PaperRole(ROWS[name].model, "stand-in")))
     assert check is not None
     return check
 

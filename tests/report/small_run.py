@@ -9,7 +9,13 @@ from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
-from cembench.results.exhibits import Exhibit, Picture, Table, exhibit_folder, write_exhibit
+from cembench.results.exhibits import (
+    Exhibit,
+    ExhibitPicture,
+    ExhibitTable,
+    exhibit_folder,
+    write_exhibit,
+)
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 from cembench.results.store import Store
 
@@ -112,7 +118,9 @@ def write_koebe(folder):
         command="cembench holes --run RUN",
         origin="stand-in",
         figure="Figure 1",
-        pictures=(Picture(file="steps 1.jpg", caption="Steps"),),
-        tables=(Table(title="Sweeps", columns=("sweep", "off"), rows=((1, 0.1), (2, None))),),
+        pictures=(ExhibitPicture(file="steps 1.jpg", caption="Steps"),),
+        tables=(
+            ExhibitTable(title="Sweeps", columns=("sweep", "off"), rows=((1, 0.1), (2, None))),
+        ),
     )
     write_exhibit(folder, exhibit)

@@ -11,7 +11,7 @@ from cembench.report.content.figures.energy_by_iteration import energy_by_iterat
 from cembench.report.content.figures.performance_profile import performance_profile, ratios
 from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.palette import looks
-from cembench.report.plots import Axis, Panel, Plot, Point, Series, plotly_of, write_plot
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, plotly_of, write_plot
 from tests.report.small_run import meshes, ok, record, write_run
 
 
@@ -19,11 +19,11 @@ from tests.report.small_run import meshes, ok, record, write_run
 def plot():
     kinds = ("line", "points", "both", "steps", "bars", "stack")
     panels = tuple(
-        Panel(
+        PlotPanel(
             Axis("x"),
             Axis("y", log=kind == "line"),
             (
-                Series(
+                PlotSeries(
                     kind,
                     ["a", "b_$", "c"] if kind in ("bars", "stack") else [0, 1, 2],
                     [1.0, None, 3.0],

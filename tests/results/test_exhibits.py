@@ -1,7 +1,13 @@
 import pytest
 
 from cembench.core.errors import RecordError
-from cembench.results.exhibits import Exhibit, Picture, exhibit_folder, read_exhibits, write_exhibit
+from cembench.results.exhibits import (
+    Exhibit,
+    ExhibitPicture,
+    exhibit_folder,
+    read_exhibits,
+    write_exhibit,
+)
 
 
 def exhibit(name="koebe"):
@@ -11,7 +17,7 @@ def exhibit(name="koebe"):
         text="What happens.",
         command="cembench holes",
         origin="surface",
-        pictures=(Picture(file="steps.png", caption="Steps"),),
+        pictures=(ExhibitPicture(file="steps.png", caption="Steps"),),
         facts={"sweeps": 1},
     )
 

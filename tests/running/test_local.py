@@ -12,7 +12,7 @@ from cembench.results.records import FaultKind
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.local import Options, Watcher, in_random_order, map_once, run_tasks
-from cembench.running.plan import How, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
 MEMORY = 500 * 2**20
@@ -21,7 +21,9 @@ MEMORY = 500 * 2**20
 def tasks_of(*names, faces=600, **how):
     registry = load_registry([FAULTY])
     chosen = [registry.algorithm(name) for name in names]
-    return plan_cells(chosen, [flat_disk(faces)], {}, How(**{"repeats": 1, **how}), [FAULTY])
+    return plan_cells(
+        chosen, [flat_disk(faces)], {}, MeasurementSettings(**{"repeats": 1, **how}), [FAULTY]
+    )
 
 
 @pytest.mark.parametrize(
@@ -235,7 +237,7 @@ def test_an_edited_plugin_is_a_new_cell(tmp_path):
         (tmp_path / "plugin.py").write_text(text)
         plugin = str(tmp_path / "plugin.py")
         chosen = load_registry([plugin]).algorithm("good")
-        (task,) = plan_cells([chosen], [flat_disk(600)], {}, How(), [plugin])
+        (task,) = plan_cells([chosen], [flat_disk(600)], {}, MeasurementSettings(), [plugin])
         keys.append(task.cell.key)
     assert keys[0] == keys[2] != keys[1]
 
@@ -256,7 +258,7 @@ def test_a_renamed_mesh_is_not_measured_again(tmp_path):
     def task_called(name):
         chosen = load_registry([FAULTY]).algorithm("good")
         mesh = dataclasses.replace(flat_disk(600), name=name)
-        return plan_cells([chosen], [mesh], {}, How(repeats=1), [FAULTY])[0]
+        return plan_cells([chosen], [mesh], {}, MeasurementSettings(repeats=1), [FAULTY])[0]
 
     def meshes():
         return [record.cell.mesh for record in store.records()]

@@ -7,7 +7,7 @@ from cembench import HoledMesh, Parameterization, algorithm
 from cembench.running import measure
 from cembench.running.judge import faults
 from cembench.running.measure import check_cell
-from cembench.running.plan import How, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
 from tests import gallery
 
 MESH = gallery.three_holes()
@@ -22,7 +22,7 @@ def mapped(uv):
         return Parameterization(uv)
 
     spec = given.__cembench__
-    task = plan_cells([spec], [MESH], {}, How(repeats=1))[0]
+    task = plan_cells([spec], [MESH], {}, MeasurementSettings(repeats=1))[0]
     return check_cell(spec, MESH, task.cell)[0], [f.detail for f in faults(spec, MESH, uv)]
 
 

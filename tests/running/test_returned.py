@@ -8,7 +8,7 @@ from cembench import DiskMesh, Parameterization, algorithm
 from cembench.core.clock import phase
 from cembench.results.records import FaultKind
 from cembench.running.measure import Checked, check_cell, time_cell
-from cembench.running.plan import How, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.worker import Answer
 
 MESH = flat_disk(100)
@@ -65,7 +65,7 @@ def solver_of(make):
     def given(mesh: DiskMesh) -> Parameterization:
         return make()
 
-    (task,) = plan_cells([given.__cembench__], [MESH], {}, How(repeats=1))
+    (task,) = plan_cells([given.__cembench__], [MESH], {}, MeasurementSettings(repeats=1))
     return task.algorithm, task.cell
 
 

@@ -9,7 +9,7 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench import RegistryError
 from cembench.registry import load_registry
 from cembench.running.local import map_once
-from cembench.running.plan import How, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.sources import code_hash, sources_of
 
 HEAD = """
@@ -156,7 +156,7 @@ def test_a_module_of_a_package_counts_with_its_package_alone(folder):
 def test_the_record_says_what_was_hashed(folder):
     spec = folder(plugin=declared(DECLARATION, head="import helper"), helper="")
     plugin = str(folder.path / "plugin.py")
-    (task,) = plan_cells([spec], [flat_disk(100)], {}, How(repeats=1), [plugin])
+    (task,) = plan_cells([spec], [flat_disk(100)], {}, MeasurementSettings(repeats=1), [plugin])
     record, _ = map_once(task)
     assert record.outcome.status == "ok", record.outcome.cause
     assert record.sources == sources_of(spec)

@@ -1,24 +1,24 @@
 import pytest
 
-from cembench.validation.finding import Finding
-from cembench.validation.quality import Against, Sides, Speed
+from cembench.validation.finding import ValidationFinding
+from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
 
 
 def finding(name, measured, ok):
-    return Finding(
+    return ValidationFinding(
         stage="correctness", name=name, ok=ok, measured=measured, allowed="x", remedy="y"
     )
 
 
 def against(title="CEM", energy=(17, 0, 3, 0.93, 0.90, 0.96), speed=(0.55, 0.53, 0.58, "faster")):
     counts = dict(zip(("lower", "equal", "higher", "ratio", "low", "high"), energy, strict=True))
-    found = Sides(**counts)
+    found = PairedComparison(**counts)
     timed = None
     if speed:
         ratio, low, high, verdict = speed
         timed = Speed(ratio=ratio, low=low, high=high, verdict=verdict, rounds=6)
-    return Against(
+    return BaselineComparison(
         baseline=title.lower(),
         title=title,
         relative=False,

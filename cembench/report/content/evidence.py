@@ -16,7 +16,7 @@ from cembench.core.errors import RecordError
 from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.palette import Look, looks
+from cembench.report.palette import SeriesStyle, looks
 from cembench.results import paper
 from cembench.results import record_rows as frame
 from cembench.results.comparison import compare
@@ -30,7 +30,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Series:
+class AlgorithmSeries:
     """An algorithm with one choice of parameters: a column of the tables, a colour of the plots.
 
     `label` tells it apart from the same algorithm with other parameters in the same run.
@@ -51,7 +51,7 @@ class Series:
 
 
 @dataclass(frozen=True)
-class SurfaceFacts:
+class MeasuredSurface:
     """A surface of the run."""
 
     name: str
@@ -115,13 +115,13 @@ class Evidence:
         return tuple(sorted({r.cell.solves for r in self.records}, key=lambda p: p != "reuse"))
 
     @cached_property
-    def surfaces(self) -> tuple[SurfaceFacts, ...]:
+    def surfaces(self) -> tuple[MeasuredSurface, ...]:
         """The paper's models in its order, then other surfaces from small to large."""
         order = list(paper.table(1))
-        found: dict[str, SurfaceFacts] = {}
+        found: dict[str, MeasuredSurface] = {}
         for record in self.records:
             facts = record.mesh
-            found[record.cell.mesh_hash] = SurfaceFacts(
+            found[record.cell.mesh_hash] = MeasuredSurface(
                 name=record.cell.mesh,
                 mesh_hash=record.cell.mesh_hash,
                 vertices=facts.vertices,
@@ -132,39 +132,39 @@ class Evidence:
                 origin=facts.origin if facts.paper_row in order else "surface",
             )
 
-        def place(s: SurfaceFacts) -> tuple[int, int, str]:
+        def place(s: MeasuredSurface) -> tuple[int, int, str]:
             return (order.index(s.paper_row) if s.paper_row else len(order), s.faces, s.name)
 
         return tuple(sorted(found.values(), key=place))
 
     @property
-    def models(self) -> tuple[SurfaceFacts, ...]:
+    def models(self) -> tuple[MeasuredSurface, ...]:
         """The surfaces that are, or stand for, models of the paper."""
         return tuple(s for s in self.surfaces if s.paper_row)
 
     @cached_property
-    def one_each(self) -> tuple[SurfaceFacts, ...]:
+    def one_each(self) -> tuple[MeasuredSurface, ...]:
         """One surface for each model of the paper: the model itself before what stands for it."""
         real_first = sorted(self.models, key=lambda s: s.origin != "model")
         chosen = {s.paper_row: s for s in reversed(real_first)}
         return tuple(s for s in self.models if chosen[s.paper_row] is s)
 
     @cached_property
-    def set_aside(self) -> tuple[SurfaceFacts, ...]:
+    def set_aside(self) -> tuple[MeasuredSurface, ...]:
         """The stand-ins that averages leave out, since the run has the model or another one."""
         return tuple(s for s in self.models if s not in self.one_each)
 
-    def standing_for(self, model: str) -> SurfaceFacts | None:
+    def standing_for(self, model: str) -> MeasuredSurface | None:
         """The surface that is, or stands for, this model of the paper; None if none does."""
         return next((s for s in self.one_each if s.paper_row == model), None)
 
     @property
-    def others(self) -> tuple[SurfaceFacts, ...]:
+    def others(self) -> tuple[MeasuredSurface, ...]:
         """The surfaces that are not in the paper."""
         return tuple(s for s in self.surfaces if not s.paper_row)
 
     @cached_property
-    def series(self) -> tuple[Series, ...]:
+    def series(self) -> tuple[AlgorithmSeries, ...]:
         """Every algorithm of the run: the paper's in its order, then others by name."""
         variants: dict[str, Counter[str]] = {}
         about: dict[str, Record] = {}
@@ -181,11 +181,11 @@ class Evidence:
                 if titles[title] > 1:
                     title = f"{title} ({name})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
-                found.append(Series(name, title, target, choice, label, main=k == 0))
+                found.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(found)
 
     @property
-    def disk_series(self) -> tuple[Series, ...]:
+    def disk_series(self) -> tuple[AlgorithmSeries, ...]:
         """Those that map to the unit disk: only they are compared with one another."""
         return tuple(s for s in self.series if s.target == DISK)
 
@@ -197,13 +197,13 @@ class Evidence:
         }
 
     @cached_property
-    def looks(self) -> dict[str, Look]:
+    def looks(self) -> dict[str, SeriesStyle]:
         """Colour, marker and dash of each series, by its label: the same in every plot."""
         found = looks([s.name for s in self.series])
         return {s.label: found[s.name] for s in self.series}
 
     def find(
-        self, surface: SurfaceFacts, series: Series, policy: str | None = None
+        self, surface: MeasuredSurface, series: AlgorithmSeries, policy: str | None = None
     ) -> Record | None:
         """The record of an algorithm on a surface; without a policy, the first that ended ok."""
         held = [
@@ -213,7 +213,7 @@ class Evidence:
         there = [record for record in held if record is not None]
         return next((r for r in there if r.outcome.status == "ok"), there[0] if there else None)
 
-    def series_of(self, algorithm: str) -> Series | None:
+    def series_of(self, algorithm: str) -> AlgorithmSeries | None:
         """The main series of an algorithm; None where the run has none."""
         return next((s for s in self.series if s.algorithm == algorithm and s.main), None)
 
@@ -236,7 +236,7 @@ class Evidence:
         found = compare(record, base)
         return None if found is None else found.speedup
 
-    def name_of(self, surface: SurfaceFacts) -> str:
+    def name_of(self, surface: MeasuredSurface) -> str:
         """A file name and anchor for a surface, unlike that of any other of the run."""
         return self._names[surface.mesh_hash]
 
@@ -251,7 +251,7 @@ class Evidence:
         cause = record.outcome.cause
         return record.outcome.status + (f": {cause}" if cause else "")
 
-    def mesh(self, surface: SurfaceFacts) -> TriangleMesh | None:
+    def mesh(self, surface: MeasuredSurface) -> TriangleMesh | None:
         """The surface itself, or None where the run did not keep it."""
         record = next(r for r in self.records if r.cell.mesh_hash == surface.mesh_hash)
         mesh = self.store.mesh(record.cell)

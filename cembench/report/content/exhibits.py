@@ -20,8 +20,7 @@ from cembench.report.document import (
     Value,
     missing,
 )
-from cembench.results.exhibits import Exhibit, place_of
-from cembench.results.exhibits import Table as ExhibitTable
+from cembench.results.exhibits import Exhibit, ExhibitTable, place_of
 from cembench.results.records import MeshOrigin
 
 #: The paper's figures that are exhibits, what they show, and the verb that makes them.

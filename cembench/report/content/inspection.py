@@ -19,9 +19,9 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import (
     DISK,
     REFERENCE,
+    AlgorithmSeries,
     Evidence,
-    Series,
-    SurfaceFacts,
+    MeasuredSurface,
 )
 from cembench.report.document import Figure
 from cembench.results.records import Record
@@ -64,7 +64,7 @@ class Inspection:
     `checkerboards` and `angles` are by the label of the series.
     """
 
-    surface: SurfaceFacts
+    surface: MeasuredSurface
     kept: bool
     checkerboards: Mapping[str, Figure] = field(default_factory=lambda: MappingProxyType({}))
     curvature: Figure | None = None
@@ -80,7 +80,7 @@ class Inspection:
         )
 
 
-def inspect_surface(evidence: Evidence, surface: SurfaceFacts, folder: Path) -> Inspection:
+def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) -> Inspection:
     """Draw a surface with every map that ended ok, and take its angles."""
     mesh = evidence.mesh(surface)
     if mesh is None:
@@ -90,7 +90,7 @@ def inspect_surface(evidence: Evidence, surface: SurfaceFacts, folder: Path) -> 
     drawer = _Drawer(evidence, surface, mesh, folder)
     checkerboards: dict[str, Figure] = {}
     angles: dict[str, Angles] = {}
-    shown: tuple[Series, shading.Panel] | None = None
+    shown: tuple[AlgorithmSeries, shading.RasterPanel] | None = None
     for series, record, uv in maps:
         if uv is None:
             continue
@@ -116,7 +116,7 @@ class _Drawer:
     """Draws one surface; what is seen of it in space is found out once for all maps."""
 
     def __init__(
-        self, evidence: Evidence, surface: SurfaceFacts, mesh: TriangleMesh, folder: Path
+        self, evidence: Evidence, surface: MeasuredSurface, mesh: TriangleMesh, folder: Path
     ) -> None:
         self.surface, self.mesh, self.folder = surface, mesh, folder
         self.name = evidence.name_of(surface)
@@ -126,7 +126,11 @@ class _Drawer:
         self.space = shading.surface_panel(mesh, SIDE)
 
     def checkerboard(
-        self, series: Series, record: Record, panel: shading.Panel, uv: NDArray[np.complex128]
+        self,
+        series: AlgorithmSeries,
+        record: Record,
+        panel: shading.RasterPanel,
+        uv: NDArray[np.complex128],
     ) -> Figure:
         pictures = [
             shading.paint(p, shading.checkerboard(p, self.mesh, uv, self.space))
@@ -145,7 +149,9 @@ class _Drawer:
             pictures,
         )
 
-    def curvature_and_mesh(self, series: Series, panel: shading.Panel) -> tuple[Figure, Figure]:
+    def curvature_and_mesh(
+        self, series: AlgorithmSeries, panel: shading.RasterPanel
+    ) -> tuple[Figure, Figure]:
         H = mean_curvature(self.mesh)
         panels = (self.space, panel)
         coloured = [shading.paint(p, shading.curvature(p, H)) for p in panels]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from cembench.report.content.evidence import Evidence, Series
+from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.printed_beside_measured import (
     Footer,
     Quantity,
@@ -21,7 +21,7 @@ from cembench.report.document import Table
 from cembench.results import paper
 
 #: The quantities of one algorithm; the second argument is its column in the paper, or None.
-Quantities = Callable[[Series | None, str | None], Sequence[Quantity]]
+Quantities = Callable[[AlgorithmSeries | None, str | None], Sequence[Quantity]]
 
 
 def three_kinds(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cembench.report.content.averages import geometric_rate
-from cembench.report.content.evidence import REFERENCE, Evidence, Series, SurfaceFacts
+from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.content.table_2 import measured_rates
 from cembench.report.document import Column, Gap, Table, Value, missing, words
-from cembench.report.plots import Axis, Panel, Plot
-from cembench.report.plots import Series as Bars
+from cembench.report.plots import Axis, Plot, PlotPanel
+from cembench.report.plots import PlotSeries as Bars
 
 BOTH = ("reuse", "backslash")
 
@@ -31,7 +31,7 @@ def both_gap(evidence: Evidence) -> Gap:
 
 
 def seconds_under(
-    evidence: Evidence, surface: SurfaceFacts, series: Series, policy: str
+    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
 ) -> tuple[Value, float | None]:
     """A cell's seconds under a policy, as a value and as a number."""
     record = evidence.find(surface, series, policy)
@@ -128,7 +128,7 @@ def policies_plot(evidence: Evidence) -> Plot:
     return Plot(
         "reuse-against-backslash",
         "What factoring anew costs",
-        (Panel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
+        (PlotPanel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
         "Seconds with a factorisation at every solve over seconds with factors kept.",
         "A line for each algorithm over the surfaces; iterative ones lie high.",
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from cembench.report.content.evidence import Evidence, Series, SurfaceFacts
+from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results import paper
 from cembench.results.comparison import UNSTABLE_WIDTH
@@ -38,7 +38,7 @@ class Quantity:
     """
 
     heading: str
-    series: Series | None
+    series: AlgorithmSeries | None
     measured: Callable[[Record], Number]
     show: Callable[[float], str]
     column: tuple[int, str] | None = None
@@ -81,7 +81,7 @@ def paper_value(table: int, model: str, column: str, digits: int) -> Value:
 
 
 def here(
-    evidence: Evidence, surface: SurfaceFacts, quantity: Quantity, policy: str | None
+    evidence: Evidence, surface: MeasuredSurface, quantity: Quantity, policy: str | None
 ) -> Value:
     """A figure as it was measured, or why there is none."""
     if quantity.series is None:
@@ -106,7 +106,7 @@ def table_beside(
     evidence: Evidence,
     name: str,
     title: str,
-    surfaces: Sequence[SurfaceFacts],
+    surfaces: Sequence[MeasuredSurface],
     quantities: Sequence[Quantity],
     *,
     policy: str | None = None,
@@ -140,7 +140,7 @@ def table_beside(
 
 
 def _row(
-    evidence: Evidence, surface: SurfaceFacts, quantities: Sequence[Quantity], policy: str | None
+    evidence: Evidence, surface: MeasuredSurface, quantities: Sequence[Quantity], policy: str | None
 ) -> tuple[Value, ...]:
     cells = [words(surface.title), Value(f"{surface.faces:,}", surface.faces)]
     for quantity in quantities:
@@ -181,7 +181,7 @@ def _remarks(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> li
     return [f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in found.items()]
 
 
-def _sizes(surfaces: Sequence[SurfaceFacts]) -> list[str]:
+def _sizes(surfaces: Sequence[MeasuredSurface]) -> list[str]:
     """Surfaces that have another size than the model whose row they are in."""
     odd = [
         f"{s.title}: {s.faces:,} here, {paper.faces(s.paper_row):,} in print"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cembench.conformal.metrics import metrics_shown
-from cembench.report.content.evidence import DISK, Evidence, SurfaceFacts
+from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
 from cembench.report.content.figures.angle_histograms import histogram
 from cembench.report.content.figures.energy_by_iteration import history_panel
 from cembench.report.content.figures.time_by_phase import phases_panel
@@ -23,7 +23,7 @@ from cembench.report.document import (
     Value,
     words,
 )
-from cembench.report.plots import Axis, Panel, Plot
+from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.results.records import Record
 
 #: Degrees up to which the histograms of a page go.
@@ -32,7 +32,7 @@ _METRICS = metrics_shown("overview", "page")
 
 
 def surface_page(
-    evidence: Evidence, surface: SurfaceFacts, seen: Inspection
+    evidence: Evidence, surface: MeasuredSurface, seen: Inspection
 ) -> tuple[Section, Plot | None]:
     """The page without its plot, which goes where :func:`with_plot` puts it, and the plot."""
     name = evidence.name_of(surface)
@@ -59,7 +59,7 @@ def surface_page(
     return section, _plot(evidence, surface, seen, name)
 
 
-def _about(surface: SurfaceFacts) -> str:
+def _about(surface: MeasuredSurface) -> str:
     about = (
         f"{surface.vertices:,} vertices, {surface.faces:,} triangles, "
         f"{surface.boundary_vertices:,} boundary vertices; {surface.non_delaunay_share:.1%} of the "
@@ -71,13 +71,13 @@ def _about(surface: SurfaceFacts) -> str:
     return about + f"{surface.name}: {kind}."
 
 
-def notices(evidence: Evidence, surface: SurfaceFacts) -> list[Text]:
+def notices(evidence: Evidence, surface: MeasuredSurface) -> list[Text]:
     """What was noticed of the mesh when it was read."""
     record = next(r for r in evidence.records if r.cell.mesh_hash == surface.mesh_hash)
     return [Text(f"Note: {notice}.") for notice in record.mesh.notices]
 
 
-def figures_table(evidence: Evidence, surface: SurfaceFacts, name: str) -> Table:
+def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Table:
     """All figures of merit of every algorithm on one surface, a line a cell."""
     columns = [
         Column("algorithm", numeric=False),
@@ -119,7 +119,7 @@ def figures_table(evidence: Evidence, surface: SurfaceFacts, name: str) -> Table
 
 
 def _line(
-    evidence: Evidence, surface: SurfaceFacts, record: Record, label: str
+    evidence: Evidence, surface: MeasuredSurface, record: Record, label: str
 ) -> tuple[Value, ...]:
     outcome, row, key = record.outcome, evidence.row(record), record.cell.key
     why = evidence.why_not(record)
@@ -152,9 +152,9 @@ def _line(
     return tuple(cells)
 
 
-def _plot(evidence: Evidence, surface: SurfaceFacts, seen: Inspection, name: str) -> Plot | None:
+def _plot(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, name: str) -> Plot | None:
     """Histograms, the energies of the iterations and the phases, as far as there are any."""
-    panels: list[Panel] = []
+    panels: list[PlotPanel] = []
     curves = [
         histogram(s.label, seen.angles[s.label], evidence.looks[s.label], SHOWN, "line")
         for s in evidence.series
@@ -162,7 +162,7 @@ def _plot(evidence: Evidence, surface: SurfaceFacts, seen: Inspection, name: str
     ]
     if curves:
         axis = Axis("angular distortion (degrees)", low=0, high=SHOWN)
-        panels.append(Panel(axis, Axis("corners (%)", low=0), tuple(curves), "angles"))
+        panels.append(PlotPanel(axis, Axis("corners (%)", low=0), tuple(curves), "angles"))
     history = history_panel(evidence, surface, "energy against iterations")
     phases = phases_panel(evidence, surface, evidence.policies[0])
     panels += [panel for panel in (history, phases) if panel]
@@ -178,7 +178,7 @@ def _plot(evidence: Evidence, surface: SurfaceFacts, seen: Inspection, name: str
     )
 
 
-def _caption(panels: Sequence[Panel]) -> str:
+def _caption(panels: Sequence[PlotPanel]) -> str:
     about = {
         "angles": "share of the corners by angular distortion, in bins of a tenth of a degree",
         "energy against iterations": "conformal energy after each iteration of CEM",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cembench.report.content.evidence import REFERENCE, Evidence, Series
+from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
 from cembench.report.content.paper_table import three_kinds
 from cembench.report.content.printed_beside_measured import POLICIES, Quantity, significant
 from cembench.report.document import Table
@@ -30,7 +30,7 @@ def table_1(evidence: Evidence) -> list[Table]:
     return tables
 
 
-def _quantities(series: Series | None, column: str | None) -> list[Quantity]:
+def _quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:
     title = series.label if series else str(column).upper()
     seconds = Quantity(
         title,

@@ -12,7 +12,7 @@ from cembench.report.content.averages import (
     percent,
     printed_rates,
 )
-from cembench.report.content.evidence import REFERENCE, Evidence, Series
+from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
 from cembench.report.content.paper_table import three_kinds
 from cembench.report.content.printed_beside_measured import (
     POLICIES,
@@ -53,8 +53,8 @@ def table_2(evidence: Evidence) -> list[Table]:
 
 def _quantities(
     rate: Callable[[Record], Number],
-) -> Callable[[Series | None, str | None], list[Quantity]]:
-    def quantities(series: Series | None, column: str | None) -> list[Quantity]:
+) -> Callable[[AlgorithmSeries | None, str | None], list[Quantity]]:
+    def quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:
         if series is not None and series.algorithm == REFERENCE:
             return []
         title = series.label if series else str(column).upper()

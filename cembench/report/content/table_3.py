@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cembench.report.content.evidence import Evidence, Series
+from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.paper_table import three_kinds
 from cembench.report.content.printed_beside_measured import Quantity, metric
 from cembench.report.document import Table
@@ -19,7 +19,7 @@ def table_3(evidence: Evidence) -> list[Table]:
     return three_kinds(evidence, 3, "conformal energy", _quantities, caption=CAPTION)
 
 
-def _quantities(series: Series | None, column: str | None) -> list[Quantity]:
+def _quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:
     title = series.label if series else str(column).upper()
     place = (3, column) if column else None
     energy = metric("conformal_energy")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cembench.report.content.evidence import Evidence, Series
+from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.paper_table import three_kinds
 from cembench.report.content.printed_beside_measured import Quantity, metric
 from cembench.report.document import Table
@@ -21,7 +21,7 @@ def table_4(evidence: Evidence) -> list[Table]:
     )
 
 
-def _quantities(series: Series | None, column: str | None) -> list[Quantity]:
+def _quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:
     title = series.label if series else str(column).upper()
     return [
         Quantity(

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import ParameterError
+from cembench.drawing.array_bundle import ArrayBundle
 from cembench.drawing.camera import viewpoints
 from cembench.drawing.draw_numpy import SAMPLES, shrunk
-from cembench.drawing.hand_over import HandedOver
 from cembench.drawing.rasterizer import rasterize
 from cembench.drawing.scene import FILL, INSIDE, brightness_of, doubled_areas
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -35,7 +35,7 @@ CLAY = (0.90, 0.80, 0.71)
 
 
 @dataclass(frozen=True)
-class Film(HandedOver):
+class Film(ArrayBundle):
     """All that is needed to draw the frames of a path.
 
     Parameters

@@ -7,7 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from cembench.core.atomic import write_bytes
-from cembench.results.exhibits import Exhibit, Picture, Table, exhibit_folder, write_exhibit
+from cembench.results.exhibits import (
+    Exhibit,
+    ExhibitPicture,
+    ExhibitTable,
+    exhibit_folder,
+    write_exhibit,
+)
 from cembench.results.records import MeshOrigin
 from cembench.workflows.morphing.morph import Morph
 from cembench.workflows.morphing.pages import registration_page, strip_page
@@ -77,12 +83,12 @@ def lay_down(
     return [write_exhibit(run, exhibit) for exhibit in done]
 
 
-def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> Picture:
+def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> ExhibitPicture:
     write_bytes(exhibit_folder(run, name) / file, content)
-    return Picture(file=file, caption=caption, alternative=caption)
+    return ExhibitPicture(file=file, caption=caption, alternative=caption)
 
 
-def registration_table(figures: dict[str, Any]) -> Table:
+def registration_table(figures: dict[str, Any]) -> ExhibitTable:
     """The metrics of the registrations, a row a surface."""
     keys = {
         "surface": "surface",
@@ -95,7 +101,7 @@ def registration_table(figures: dict[str, Any]) -> Table:
         "hausdorff_edges": "Hausdorff / edge",
     }
     rows = tuple(tuple(row[key] for key in keys) for row in figures["registrations"])
-    return Table(
+    return ExhibitTable(
         title="Registrations",
         columns=tuple(keys.values()),
         rows=rows,
@@ -106,8 +112,8 @@ def registration_table(figures: dict[str, Any]) -> Table:
     )
 
 
-def _path_table(figures: dict[str, Any]) -> Table:
-    return Table(
+def _path_table(figures: dict[str, Any]) -> ExhibitTable:
+    return ExhibitTable(
         title="Smoothness of the path",
         columns=("largest acceleration of a vertex", "largest step between frames"),
         rows=((figures["largest_acceleration_share"], figures["largest_step_share"]),),

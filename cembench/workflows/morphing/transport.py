@@ -13,7 +13,7 @@ Real = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Places:
+class BarycentricPlaces:
     """Points in triangles: `faces` (p,) and barycentric coordinates `weights` (p, 3)."""
 
     faces: Ints
@@ -25,7 +25,7 @@ class Places:
         return found
 
 
-def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> Places:
+def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> BarycentricPlaces:
     """In which triangle of a map without folds lies each point, and where in it?
 
     A tree of boxes (libigl's AABB) finds the triangle; a point of the disk between the circle and
@@ -50,7 +50,7 @@ def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> Places:
     plane = _lifted(uv)
     _, faces, _ = igl.point_mesh_squared_distance(_lifted(inward), plane, F)
     faces = np.asarray(faces, dtype=np.int64)
-    return Places(faces, _barycentric(uv, F[faces], inward))
+    return BarycentricPlaces(faces, _barycentric(uv, F[faces], inward))
 
 
 def _lifted(z: Complex) -> Real:

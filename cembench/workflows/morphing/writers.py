@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import BinaryIO
@@ -150,7 +149,7 @@ def write_meshes(
         place.mkdir(parents=True, exist_ok=True)
         with atomic.draft_folder(files[0]) as folder:
             for k, (file, time) in enumerate(zip(files, times, strict=True)):
-                write_mesh(folder / file.name, replace(mesh, V=at(time)))
+                write_mesh(folder / file.name, mesh.moved(at(time)))
                 tell(k)
             for file in files:
                 (folder / file.name).replace(file)

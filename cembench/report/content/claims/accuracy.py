@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cembench.report.content.claims.verdicts import tested_on, verdict_of
-from cembench.report.content.evidence import REFERENCE, Evidence, SurfaceFacts
+from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
 from cembench.report.content.figures.angle_histograms import MODELS
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
@@ -18,7 +18,7 @@ Inspections = Mapping[str, Inspection]
 SIMILAR = 0.25
 
 
-def cem_records(evidence: Evidence) -> list[tuple[SurfaceFacts, Record]]:
+def cem_records(evidence: Evidence) -> list[tuple[MeasuredSurface, Record]]:
     """CEM's records that ended ok or invalid: those with a map that can be judged."""
     series = evidence.series_of(REFERENCE)
     found = [(s, evidence.find(s, series)) for s in evidence.surfaces] if series else []
@@ -158,7 +158,7 @@ def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim
     )
 
 
-def _triples(evidence: Evidence, metric: str) -> dict[SurfaceFacts, tuple[float, ...]]:
+def _triples(evidence: Evidence, metric: str) -> dict[MeasuredSurface, tuple[float, ...]]:
     """The figures of FDM, LDM and CEM on the models where all three ended ok."""
     value: Callable[[Record | None], float | None] = lambda r: (  # noqa: E731
         r.outcome.metrics.get(metric) if r is not None and r.outcome.status == "ok" else None

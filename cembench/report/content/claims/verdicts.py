@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cembench.report.content.evidence import Evidence, SurfaceFacts
+from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.document import Verdict
 
 OURS = (
@@ -22,7 +22,7 @@ def verdict_of(held: int, tested: int) -> Verdict:
     return "holds in part" if held else "does not hold here"
 
 
-def tested_on(surfaces: Sequence[SurfaceFacts]) -> str:
+def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:
     """On what kind of surfaces a verdict rests."""
     kinds = {
         "model": "the paper's own models",

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.plots import Axis, Panel, Plot, Point, through
+from cembench.report.plots import Axis, Plot, PlotPanel, Point, through
 from cembench.results.records import Record
 
 METRIC = "angle_error_mean_deg"
@@ -30,7 +30,7 @@ def accuracy_against_time(evidence: Evidence) -> Plot | None:
     )
 
 
-def _panel(evidence: Evidence, policy: str) -> Panel | None:
+def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
     clouds: dict[str, list[Point]] = {s.label: [] for s in evidence.disk_series}
     for surface in evidence.surfaces:
         found = [(s, evidence.find(surface, s, policy)) for s in evidence.disk_series]
@@ -49,7 +49,7 @@ def _panel(evidence: Evidence, policy: str) -> Panel | None:
     ]
     middles = [_middle(label, cloud) for label, cloud in clouds.items() if cloud]
     front = sorted(m for m in middles if not any(_beats(other, m) for other in middles))
-    return Panel(
+    return PlotPanel(
         Axis("time, times the fastest", log=True),
         Axis("mean angular distortion, times the smallest", log=True),
         (*drawn, through("not beaten in the mean", front, "both")),

@@ -10,8 +10,8 @@ from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.figures.energy_by_iteration import model_gap
 from cembench.report.content.inspection import BIN, LAST, Angles, Inspection
 from cembench.report.document import Gap
-from cembench.report.palette import Look, looks
-from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.report.palette import SeriesStyle, looks
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
 #: The models of the paper's figure, in its order.
 MODELS = ("Liu's Neutral Face", "Liu's Smile Face", "Liu's Wry Face", "Liu's Pouting Face")
@@ -49,10 +49,10 @@ def angle_histograms(
     return plot, gaps
 
 
-def _panel(title: str, angles: Angles) -> Panel:
+def _panel(title: str, angles: Angles) -> PlotPanel:
     bars = histogram("CEM", angles, looks([REFERENCE])[REFERENCE], SHOWN)
     heading = f"{title}: {angles.below_one:.1%} below 1°"
-    return Panel(
+    return PlotPanel(
         Axis("angular distortion (degrees)", low=0, high=SHOWN),
         Axis("corners (%)"),
         (bars,),
@@ -61,11 +61,11 @@ def _panel(title: str, angles: Angles) -> Panel:
 
 
 def histogram(
-    name: str, angles: Angles, look: Look, shown: float = LAST, kind: str = "bars"
-) -> Series:
+    name: str, angles: Angles, look: SeriesStyle, shown: float = LAST, kind: str = "bars"
+) -> PlotSeries:
     """The bins up to so many degrees, in percent of all corners."""
     count = round(shown / BIN)
     middles = (np.arange(count) + 0.5) * BIN
     shares = 100 * angles.shares[:count]
     x, y = [round(float(v), 6) for v in middles], [float(v) for v in shares]
-    return Series(name, x, y, "bars" if kind == "bars" else "line", look)
+    return PlotSeries(name, x, y, "bars" if kind == "bars" else "line", look)

@@ -9,8 +9,8 @@ import numpy as np
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Column, Table, Value, missing, words
-from cembench.report.palette import Look, looks
-from cembench.report.plots import Axis, Panel, Plot, Point, Series, through
+from cembench.report.palette import SeriesStyle, looks
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, through
 from cembench.results import paper
 
 #: Fewer points determine no exponent that says anything.
@@ -83,7 +83,7 @@ def cost_by_faces(evidence: Evidence) -> Plot:
     )
 
 
-def _panel(groups: Sequence[tuple[str, Look, list[Point]]], title: str) -> Panel:
+def _panel(groups: Sequence[tuple[str, SeriesStyle, list[Point]]], title: str) -> PlotPanel:
     drawn = []
     for label, look, points in groups:
         if not points:
@@ -94,8 +94,10 @@ def _panel(groups: Sequence[tuple[str, Look, list[Point]]], title: str) -> Panel
             ends = [min(p.x for p in points), max(p.x for p in points)]
             line = [law.factor * e**law.exponent for e in ends]
             words = [f"{label}: exponent {law.exponent:.2f}"] * 2
-            drawn.append(Series(f"{label}, fitted", ends, line, "line", look, words, named=False))
-    return Panel(Axis("triangles", log=True), Axis("seconds", log=True), tuple(drawn), title)
+            drawn.append(
+                PlotSeries(f"{label}, fitted", ends, line, "line", look, words, named=False)
+            )
+    return PlotPanel(Axis("triangles", log=True), Axis("seconds", log=True), tuple(drawn), title)
 
 
 def exponents_table(evidence: Evidence) -> Table:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cembench.report.content.evidence import REFERENCE, Evidence, SurfaceFacts, model_surface
+from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface, model_surface
 from cembench.report.document import Gap
-from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 from cembench.results import paper
 
 #: The models of the paper's figure.
@@ -37,7 +37,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
     return plot, gaps
 
 
-def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Panel | None:
+def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> PlotPanel | None:
     """The energies of CEM's iterations on a surface; None where there are none.
 
     CEM with other parameters, and algorithms that are not in the paper and tell E_C after each
@@ -55,13 +55,13 @@ def history_panel(evidence: Evidence, surface: SurfaceFacts, title: str) -> Pane
             continue
         history = record.outcome.energy_history
         look = evidence.looks[series.label]
-        shown.append(Series(series.label, list(range(len(history))), history, "both", look))
+        shown.append(PlotSeries(series.label, list(range(len(history))), history, "both", look))
         if is_cem and series.main:
             shown.insert(0, shown.pop())
     main = evidence.series_of(REFERENCE)
     if not main or not any(s.name == main.label for s in shown):
         return None
-    return Panel(Axis("iteration"), Axis("conformal energy E_C"), tuple(shown), title)
+    return PlotPanel(Axis("iteration"), Axis("conformal energy E_C"), tuple(shown), title)
 
 
 def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:

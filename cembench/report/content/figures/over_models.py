@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.palette import looks
-from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 from cembench.results import paper
 
 
@@ -25,7 +25,7 @@ def energy_over_models(evidence: Evidence) -> Plot:
 
 def angles_over_models(evidence: Evidence) -> Plot:
     """Figure 12: (a) mean and (b) SD of the angular distortion on every model of the run."""
-    panels: tuple[Panel, ...] = ()
+    panels: tuple[PlotPanel, ...] = ()
     for what, words in (("mean", "mean"), ("sd", "SD")):
         axis = Axis(f"{words} of angular distortion (degrees)", log=True)
         column = _column(what)
@@ -46,7 +46,7 @@ def _column(what: str) -> Callable[[str], str]:
 
 def _pair(
     evidence: Evidence, metric: str, axis: Axis, table: int, column: Callable[[str], str]
-) -> tuple[Panel, Panel]:
+) -> tuple[PlotPanel, PlotPanel]:
     """Measured and printed side by side, for the same models."""
     style = looks(paper.ALGORITHMS)
     measured, printed = [], []
@@ -60,11 +60,11 @@ def _pair(
             values.append(record.outcome.metrics.get(metric) if record and ok else None)
         title = series.title if series else algorithm.upper()
         if series:
-            measured.append(Series(title, names, values, "both", style[algorithm]))
+            measured.append(PlotSeries(title, names, values, "both", style[algorithm]))
         rows = [paper.table(table)[s.paper_row][column(algorithm)] for s in evidence.models]
-        printed.append(Series(title, names, rows, "both", style[algorithm], named=not series))
+        printed.append(PlotSeries(title, names, rows, "both", style[algorithm], named=not series))
     origins = sorted({s.origin for s in evidence.models})
     return (
-        Panel(Axis(""), axis, tuple(measured), f"measured here ({', '.join(origins)})"),
-        Panel(Axis(""), axis, tuple(printed), "printed in the paper"),
+        PlotPanel(Axis(""), axis, tuple(measured), f"measured here ({', '.join(origins)})"),
+        PlotPanel(Axis(""), axis, tuple(printed), "printed in the paper"),
     )

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from math import inf
 
-from cembench.report.content.evidence import Evidence, Series, SurfaceFacts
-from cembench.report.plots import Axis, Panel, Plot
-from cembench.report.plots import Series as Line
+from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
+from cembench.report.plots import Axis, Plot, PlotPanel
+from cembench.report.plots import PlotSeries as Line
 
 
-def time_of(evidence: Evidence, surface: SurfaceFacts, series: Series, policy: str) -> float | None:
+def time_of(
+    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
+) -> float | None:
     """Seconds, infinite where the cell did not end ok; None where it is not in the run."""
     record = evidence.find(surface, series, policy)
     if record is None:
@@ -60,7 +62,7 @@ def performance_profile(evidence: Evidence) -> Plot | None:
     )
 
 
-def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: str) -> Panel:
+def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: str) -> PlotPanel:
     finite = [r for values in found.values() for r in values if r < inf]
     last = 1.15 * max(finite)
     lines = []
@@ -69,7 +71,7 @@ def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: st
         x = [1.0, *ordered, last]
         y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
         lines.append(Line(series.label, x, y, "steps", evidence.looks[series.label]))
-    return Panel(
+    return PlotPanel(
         Axis("tau, times the fastest", log=True, low=1.0, high=last),
         Axis("surfaces (%)", low=0, high=104),
         tuple(lines),

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cembench.report.content.evidence import Evidence, SurfaceFacts
-from cembench.report.palette import PARTS, REST, Look
-from cembench.report.plots import Axis, Panel, Plot, Series
+from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.palette import PARTS, REST, SeriesStyle
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 from cembench.results.records import Record
 
 
@@ -24,7 +24,7 @@ def time_by_phase(evidence: Evidence) -> Plot | None:
                 bars.append((f"{series.label} (n={len(shares)})", mean))
         if bars:
             axis = Axis("share of the time (%)", low=0, high=100)
-            panels.append(Panel(Axis(""), axis, _stacked(bars), f"solves: {policy}"))
+            panels.append(PlotPanel(Axis(""), axis, _stacked(bars), f"solves: {policy}"))
     if not panels:
         return None
     return Plot(
@@ -37,13 +37,13 @@ def time_by_phase(evidence: Evidence) -> Plot | None:
     )
 
 
-def phases_panel(evidence: Evidence, surface: SurfaceFacts, policy: str) -> Panel | None:
+def phases_panel(evidence: Evidence, surface: MeasuredSurface, policy: str) -> PlotPanel | None:
     """Seconds by phase of every algorithm on one surface; None where nothing was timed."""
     found = [(s, evidence.find(surface, s, policy)) for s in evidence.series]
     bars = [(s.label, r.outcome.phases) for s, r in found if r and r.outcome.phases]
     if not bars:
         return None
-    return Panel(Axis(""), Axis("seconds"), _stacked(bars), f"time by phase, solves: {policy}")
+    return PlotPanel(Axis(""), Axis("seconds"), _stacked(bars), f"time by phase, solves: {policy}")
 
 
 def _shares(record: Record) -> dict[str, float]:
@@ -51,7 +51,7 @@ def _shares(record: Record) -> dict[str, float]:
     return {name: 100 * seconds / total for name, seconds in record.outcome.phases.items()}
 
 
-def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[Series, ...]:
+def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[PlotSeries, ...]:
     """A series for each phase, the largest first; what is left over last."""
     total: dict[str, float] = {}
     for _, phases in bars:
@@ -60,7 +60,7 @@ def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[Series, ...]
     order = sorted(total, key=lambda name: (name == "other", -total[name], name))
     labels = [label for label, _ in bars]
     return tuple(
-        Series(
+        PlotSeries(
             name, labels, [phases.get(name, 0.0) for _, phases in bars], "stack", colour_of(name)
         )
         for name in order
@@ -84,6 +84,6 @@ _KNOWN = (
 )
 
 
-def colour_of(phase: str) -> Look:
+def colour_of(phase: str) -> SeriesStyle:
     """The colour of a phase; what is left over, and what no built-in algorithm books, is grey."""
-    return Look(PARTS[_KNOWN.index(phase)] if phase in _KNOWN else REST)
+    return SeriesStyle(PARTS[_KNOWN.index(phase)] if phase in _KNOWN else REST)

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 
-class HandedOver:
+class ArrayBundle:
     """A dataclass whose fields are all arrays: it can be written to a file and read again."""
 
     def save(self, path: Path) -> None:
