@@ -20,6 +20,7 @@ import numpy as np
 from cembench.core import atomic
 from cembench.core.errors import MeshError, RecordError
 from cembench.core.names import file_name
+from cembench.core.notices import Notice, NoticeKind, notice_of_old
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -76,7 +77,7 @@ def read(mesh_type: type[M], path: Path) -> M | None:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             V, F = data["V"], data["F"]
             digest, name = str(data["hash"]), str(data["name"])
-            notices = tuple(str(notice) for notice in data["notices"])
+            notices = _notices(data)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
     # The mesh passed its checks when it was written; the hash says that it is the same one.
@@ -86,6 +87,15 @@ def read(mesh_type: type[M], path: Path) -> M | None:
     mesh.V.setflags(write=False)
     mesh.F.setflags(write=False)
     return mesh
+
+
+def _notices(data: Mapping[str, Any]) -> tuple[Notice, ...]:
+    """Return the notices of a file; ValueError for an unknown kind or another number of kinds."""
+    texts = [str(text) for text in data["notices"]]
+    if "notice_kinds" not in data:
+        return tuple(map(notice_of_old, texts))
+    kinds = [NoticeKind(str(kind)) for kind in data["notice_kinds"]]
+    return tuple(Notice(kind, text) for kind, text in zip(kinds, texts, strict=True))
 
 
 def write(mesh: TriangleMesh, path: Path) -> None:
@@ -100,6 +110,7 @@ def write(mesh: TriangleMesh, path: Path) -> None:
         "F": mesh.F.astype(np.int32),
         "hash": np.array(mesh.hash),
         "name": np.array(mesh.name),
-        "notices": np.array(mesh.notices, dtype=np.str_),
+        "notices": np.array([notice.text for notice in mesh.notices], dtype=np.str_),
+        "notice_kinds": np.array([notice.kind for notice in mesh.notices], dtype=np.str_),
     }
     atomic.write(path, lambda file: np.savez(file, **arrays))

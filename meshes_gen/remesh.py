@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 from skimage.measure import marching_cubes
 
 from cembench.core.errors import MeshError
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -50,9 +51,10 @@ BASE = 110_000
 NON_DELAUNAY = 0.05
 
 #: What the notices say where pymeshlab's filter is missing.
-FALLBACK_NOTE = (
+FALLBACK_NOTE = Notice(
+    NoticeKind.REMESHED_WITHOUT_FILTER,
     "remeshed by local operations alone: pymeshlab's isotropic remeshing filter is missing "
-    "(see `cembench doctor`)"
+    "(see `cembench doctor`)",
 )
 
 

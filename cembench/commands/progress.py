@@ -13,7 +13,7 @@ from rich.text import Text
 
 from cembench.report.render.terminal import status_style
 from cembench.results.records import Record
-from cembench.running.local import Watcher
+from cembench.running.local import Step, Watcher
 from cembench.running.plan import Task
 
 #: Cells that the live table shows.
@@ -61,7 +61,7 @@ class PlainProgress(Watcher):
         self.cells = cells
         self.finished_cells = 0
         self.remaining = Remaining()
-        self._step = ""
+        self._step: Step | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -77,14 +77,14 @@ class PlainProgress(Watcher):
         """Know how much there is to do."""
         self.remaining.expect(processes)
 
-    def starts(self, task: Task, step: str) -> None:
+    def starts(self, task: Task, step: Step) -> None:
         """A line where a new round begins."""
         if step != self._step:
             self._step = step
             left = self.remaining.seconds
-            self._say(step + ("" if left is None else f", about {duration(left)} left"))
+            self._say(str(step) + ("" if left is None else f", about {duration(left)} left"))
 
-    def ends(self, task: Task, step: str, seconds: float) -> None:
+    def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Learn how long such a process takes."""
         self.remaining.ended(task.cell.label, rounds_left(task, step), seconds)
 
@@ -118,12 +118,12 @@ class LiveProgress(PlainProgress):
     def __exit__(self, *error: Any) -> None:
         self._live.__exit__(*error)
 
-    def starts(self, task: Task, step: str) -> None:
+    def starts(self, task: Task, step: Step) -> None:
         """Move the cell to the end of the table."""
         self._notice = ""
-        self._show(task, Text(step, style="bold"))
+        self._show(task, Text(str(step), style="bold"))
 
-    def ends(self, task: Task, step: str, seconds: float) -> None:
+    def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Show that the step is done."""
         super().ends(task, step, seconds)
         self._show(task, Text(f"{step} done", style="dim"))
@@ -163,10 +163,9 @@ class LiveProgress(PlainProgress):
         return Group(table, bar, *([Text(self._notice)] if self._notice else []))
 
 
-def rounds_left(task: Task, step: str) -> int:
+def rounds_left(task: Task, step: Step) -> int:
     """How many processes does a cell need after this step, if nothing goes wrong?"""
-    number = step.split()[1] if step.startswith("round") else "0"
-    return task.cell.repeats - int(number)
+    return task.cell.repeats - (step.round or 0)
 
 
 def duration(seconds: float) -> str:

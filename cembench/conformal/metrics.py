@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cembench.conformal.beltrami import dilatations as dilatations_between
 from cembench.conformal.laplacian import corner_products, half_cotangents
 from cembench.conformal.planar import fitted_circle, folded_triangles, polygon_area
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -286,7 +287,7 @@ def metrics_markdown() -> str:
     return f"| name | meaning | unit |\n|---|---|---|\n{rows}\n"
 
 
-def lost_in_rounding(metrics: Mapping[str, float]) -> list[str]:
+def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
     """Name the figures that say nothing: not finite, or an energy below what is possible."""
     found = [
         f"{name} is {value}, which is not a figure"
@@ -296,7 +297,7 @@ def lost_in_rounding(metrics: Mapping[str, float]) -> list[str]:
     energy, whole = metrics["conformal_energy"], metrics["dirichlet_energy"]
     if energy < -LEAST_ENERGY * abs(whole):
         found.append(f"conformal_energy is {energy:.3g}, which only rounding can make negative")
-    return found
+    return [Notice(NoticeKind.LOST_IN_ROUNDING, told) for told in found]
 
 
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.atomic import write_by
 from cembench.core.errors import MeshError
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.reading import READERS as _READERS
 from cembench.mesh.reading import read_soup
 from cembench.mesh.soup import Soup
@@ -56,8 +57,11 @@ def checked(soup: Soup, mesh_type: type[M]) -> M:
 
     """
     polygons = int((soup.sizes > 3).sum())
-    cut = (f"{polygons} polygons were cut into triangles",) if polygons else ()
-    return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=soup.notices + cut)
+    notices = soup.notices
+    if polygons:
+        told = f"{polygons} polygons were cut into triangles"
+        notices += (Notice(NoticeKind.POLYGONS_CUT, told),)
+    return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
 
 
 def write_mesh(

@@ -11,6 +11,7 @@ from array import array
 from collections.abc import Iterator
 from pathlib import Path
 
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown, words_of
 
 #: Statements that hold no polygon and are skipped; any other word is reported.
@@ -89,10 +90,11 @@ def _face(words: list[str], vertices: int) -> list[int]:
     return face
 
 
-def _unknown_notice(unknown: list[str]) -> tuple[str, ...]:
+def _unknown_notice(unknown: list[str]) -> tuple[Notice, ...]:
     if not unknown:
         return ()
-    return (
+    told = (
         f"lines that are not statements of OBJ were ignored: {len(unknown)}, the first: "
-        f"{unknown[0]}",
+        f"{unknown[0]}"
     )
+    return (Notice(NoticeKind.LINES_IGNORED, told),)

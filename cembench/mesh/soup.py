@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError
+from cembench.core.notices import Notice
 
 #: What `str.split` takes for space though no mesh format does.
 _NOT_SPACES = dict.fromkeys(map(ord, "\x1c\x1d\x1e\x1f\x85\xa0"), "\0")
@@ -36,7 +37,7 @@ class Soup:
         Number of corners of each polygon, at least 3.
     name : str
         What reports call it: the file's stem.
-    notices : tuple of str
+    notices : tuple of Notice
         What was changed or ignored while the file was read.
 
     """
@@ -45,7 +46,7 @@ class Soup:
     corners: NDArray[np.int64]
     sizes: NDArray[np.int64]
     name: str = "mesh"
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     @classmethod
     def from_arrays(
@@ -55,7 +56,7 @@ class Soup:
         sizes: ArrayLike,
         *,
         counted_from: int = 0,
-        notices: tuple[str, ...] = (),
+        notices: tuple[Notice, ...] = (),
     ) -> Self:
         """Check that there are polygons, and that their corners are vertices that exist.
 

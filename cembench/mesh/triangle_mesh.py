@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Self
@@ -19,6 +19,7 @@ from scipy.sparse import csgraph
 from cembench.core.clock import phase
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import printable
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
 
 #: A triangle counts as degenerate when its area is below this share of its longest edge squared.
@@ -42,7 +43,7 @@ class TriangleMesh:
         Triangles, counter-clockwise seen from outside; read-only.
     name : str
         What reports call it.
-    notices : tuple of str
+    notices : tuple of Notice
         What was changed on the way in, and which premises of the paper the mesh breaks.
 
     """
@@ -50,10 +51,10 @@ class TriangleMesh:
     V: NDArray[np.float64]
     F: NDArray[np.int64]
     name: str = "mesh"
-    notices: tuple[str, ...] = ()
+    notices: tuple[Notice, ...] = ()
 
     def __init__(
-        self, V: ArrayLike, F: ArrayLike, name: str = "mesh", notices: tuple[str, ...] = ()
+        self, V: ArrayLike, F: ArrayLike, name: str = "mesh", notices: tuple[Notice, ...] = ()
     ) -> None:
         """Check everything, orient where needed, freeze.
 
@@ -70,7 +71,8 @@ class TriangleMesh:
         _check_edges(F)
         F, flipped = _oriented(F)
         if flipped:
-            notices += (f"orientation repaired: {flipped} of {len(F)} triangles were turned over",)
+            told = f"orientation repaired: {flipped} of {len(F)} triangles were turned over"
+            notices += (Notice(NoticeKind.ORIENTATION_REPAIRED, told),)
         _check_vertex_stars(F)
         notices += self._check_topology(V, F)
         V.setflags(write=False)
@@ -78,14 +80,14 @@ class TriangleMesh:
         self._set(V, F, printable(name), notices)
 
     def _set(
-        self, V: NDArray[np.float64], F: NDArray[np.int64], name: str, notices: tuple[str, ...]
+        self, V: NDArray[np.float64], F: NDArray[np.int64], name: str, notices: tuple[Notice, ...]
     ) -> None:
         for field, value in (("V", V), ("F", F), ("name", name), ("notices", notices)):
             object.__setattr__(self, field, value)
 
     @classmethod
     def from_arrays(
-        cls, V: ArrayLike, F: ArrayLike, *, name: str = "mesh", notices: tuple[str, ...] = ()
+        cls, V: ArrayLike, F: ArrayLike, *, name: str = "mesh", notices: tuple[Notice, ...] = ()
     ) -> Self:
         """Return the checked mesh of these arrays; the same as calling the class."""
         return cls(V, F, name, notices)
@@ -96,7 +98,7 @@ class TriangleMesh:
         V: NDArray[np.float64],
         F: NDArray[np.int64],
         name: str = "mesh",
-        notices: tuple[str, ...] = (),
+        notices: tuple[Notice, ...] = (),
     ) -> Self:
         """Return a mesh of arrays that were checked before, and check nothing."""
         mesh = cls.__new__(cls)
@@ -112,7 +114,7 @@ class TriangleMesh:
         return self.trusted(V, self.F, self.name, self.notices)
 
     @classmethod
-    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:
+    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
         """Raise where the surface is not of this class; return what the user should know."""
         return ()
 
@@ -163,7 +165,7 @@ class DiskMesh(TriangleMesh):
         return self.loops[0]
 
     @classmethod
-    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:
+    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
         loops = _loops_of_connected_open_surface(F, len(V))
         if len(loops) > 1:
             sizes = ", ".join(str(len(loop)) for loop in sorted(loops, key=len, reverse=True)[:5])
@@ -217,7 +219,7 @@ class HoledMesh(TriangleMesh):
         return loops.pop(chosen[0]), tuple(loops)
 
     @classmethod
-    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:
+    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
         loops = _loops_of_connected_open_surface(F, len(V))
         if len(loops) == 1:
             raise MeshError(
@@ -260,7 +262,7 @@ def _some(indices: NDArray[np.int64], most: int = 5) -> str:
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
 
 
-def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ...]:
+def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
     """Raise for coordinates or indices that are no triangles; a notice of those hardly any."""
     bad = np.flatnonzero(~np.isfinite(V).all(axis=1))
     if len(bad):
@@ -298,10 +300,11 @@ def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[str, ..
     thin = np.flatnonzero(double_area <= 2 * SLIVER_AREA * longest)
     if not len(thin):
         return ()
-    return (
+    told = (
         f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
-        f"{_some(thin)}; energies and dilatations lose digits in rounding there",
+        f"{_some(thin)}; energies and dilatations lose digits in rounding there"
     )
+    return (Notice(NoticeKind.SLIVERS, told),)
 
 
 def _check_scale(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
@@ -397,33 +400,34 @@ def _check_genus(F: NDArray[np.int64], n: int, loops: int) -> None:
 
 def definition_1_notices(
     F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
-) -> tuple[str, ...]:
+) -> tuple[Notice, ...]:
     """Return where the mesh breaks the paper's Definition 1 (a well-conditioned mesh)."""
+    broken = _breaks_of_definition_1(F, n, loops)
+    return tuple(Notice(NoticeKind.DEFINITION_1, f"Definition 1 {where}") for where in broken)
+
+
+def _breaks_of_definition_1(
+    F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
+) -> Iterator[str]:
     inside = np.ones(n, dtype=bool)
     inside[np.concatenate(loops)] = False
     graph = topology.vertex_graph(F, n)
-    notices: tuple[str, ...] = ()
     if not inside.any():
-        return ("Definition 1 (ii), (iv) broken: the mesh has no interior vertex",)
+        yield "(ii), (iv) broken: the mesh has no interior vertex"
+        return
     interior = np.flatnonzero(inside)
     pieces, _ = csgraph.connected_components(graph[interior][:, interior], directed=False)
     if pieces > 1:
-        notices += (
-            f"Definition 1 (ii) broken: the interior vertices form {pieces} pieces, not one",
-        )
+        yield f"(ii) broken: the interior vertices form {pieces} pieces, not one"
     for loop in loops:
         ears = loop[graph[loop][:, interior].sum(axis=1) == 0]
         if len(ears) and len(loops) == 1:
-            notices += (
-                "Definition 1 (iv) broken: boundary vertices without an interior neighbour: "
-                f"{_some(ears)}",
-            )
+            yield f"(iv) broken: boundary vertices without an interior neighbour: {_some(ears)}"
         elif len(ears):
-            notices += (
-                f"Definition 1 (iv) broken: on the boundary of vertex {loop.min()} ({len(loop)} "
+            yield (
+                f"(iv) broken: on the boundary of vertex {loop.min()} ({len(loop)} "
                 f"vertices), vertices without an interior neighbour: {_some(ears)}. If this is a "
                 "hole, their triangles fold in every map to a disk with round holes: a triangle "
                 "with all corners on a circle lies inside it. Remove these vertices, or divide "
-                "their triangles",
+                "their triangles"
             )
-    return notices

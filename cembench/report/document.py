@@ -80,6 +80,8 @@ class Table:
     caption: str = ""
     #: Below the table: how many surfaces an aggregate runs over, misprints, causes of gaps.
     notes: tuple[str, ...] = ()
+    #: The one among the notes that names surfaces which the run lacks; empty where it lacks none.
+    absent: str = ""
     #: Rows at the end that hold aggregates; sorting leaves them where they are.
     footer_rows: int = 0
 

@@ -19,6 +19,7 @@ from cembench.conformal.metrics import all_metrics
 from cembench.conformal.planar import signed_areas
 from cembench.core.atomic import read_model, write_model
 from cembench.core.errors import RecordError, RegistryError
+from cembench.core.notices import NoticeKind, of_kind
 from cembench.mesh.datasets import CACHE_VARIABLE
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
@@ -141,7 +142,7 @@ def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
         "boundary_off": boundary_off,
         "ok": abs(faces_off) <= FACES_OFF
         and abs(boundary_off) <= BOUNDARY_OFF
-        and not any(notice.startswith("Definition 1") for notice in mesh.notices),
+        and not of_kind(NoticeKind.DEFINITION_1, mesh.notices),
     }
 
 

@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from cembench.core.names import file_name, printable
+from cembench.core.notices import Notice, notice_of_old
 
 #: Changes when a record's meaning does; a record of another version is not resumed from.
 SCHEMA_VERSION = 1
@@ -34,6 +35,11 @@ def _escaped(value: object) -> object:
 
 #: Words that somebody else has chosen, as names of files; what cannot be printed is escaped.
 Printable = Annotated[str, BeforeValidator(_escaped)]
+
+#: A notice; plain texts, as records hold that are older than its kinds, become notices.
+KeptNotice = Annotated[
+    Notice, BeforeValidator(lambda v: notice_of_old(v) if isinstance(v, str) else v)
+]
 
 Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
 
@@ -134,7 +140,7 @@ class MeshFacts(BaseModel):
     faces: Count
     boundary_vertices: Count
     non_delaunay_share: Annotated[float, Field(ge=0, le=1)]
-    notices: tuple[str, ...] = ()
+    notices: tuple[KeptNotice, ...] = ()
     #: The model of the paper's Table 1 that it is ("model") or stands for ("stand-in"), if any.
     paper_row: str = ""
     origin: MeshOrigin = "surface"
@@ -204,7 +210,7 @@ class Outcome(BaseModel):
     #: The same, less the resident set before the call.
     memory_increase_bytes: Whole | None = None
     #: What the user should know of the measurement.
-    notes: tuple[str, ...] = ()
+    notes: tuple[KeptNotice, ...] = ()
 
     @property
     def seconds(self) -> tuple[float, ...]:

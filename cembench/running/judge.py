@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.registry import Algorithm
 from cembench.results.records import Fault, FaultKind
@@ -61,10 +62,12 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]
 def broken_premises(mesh: TriangleMesh) -> list[str]:
     """Return what to say of a mesh that breaks a premise of the paper; nothing of another."""
     broken = definition_1_notices(mesh.F, mesh.n, mesh.loops) if mesh.loops else ()
-    return [f"the mesh breaks a premise of the paper: {'; '.join(broken)}"] if broken else []
+    return (
+        [f"the mesh breaks a premise of the paper: {'; '.join(map(str, broken))}"] if broken else []
+    )
 
 
-def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[str]:
+def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Notice]:
     """Return what a reader should know of a map without faults.
 
     That a free boundary overlaps itself, which its target does not rule out; and that holes are not
@@ -72,7 +75,10 @@ def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[str]:
     """
     if algorithm.target == "free boundary":
         found = _crossings(mesh, uv)
-        return [f"the image overlaps itself: {fault.detail}" for fault in found]
+        return [
+            Notice(NoticeKind.IMAGE_OVERLAPS, f"the image overlaps itself: {fault.detail}")
+            for fault in found
+        ]
     return _uncircular_holes(mesh, uv) if algorithm.target == "circular holes" else []
 
 
@@ -126,12 +132,13 @@ def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
     ]
 
 
-def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[str]:
+def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[Notice]:
     circles = boundary_circles(mesh, uv)[1:]
     off = [circle for circle in circles if not circle.circularity <= CIRCULAR]
     if not off:
         return []
     worst = max(circle.circularity for circle in off)
-    return [
+    told = (
         f"{len(off)} of {len(circles)} holes are no circles: off by up to {worst:.2g} of the radius"
-    ]
+    )
+    return [Notice(NoticeKind.HOLES_NOT_CIRCULAR, told)]

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from cembench.core.errors import RecordError
+from cembench.core.notices import Notice, NoticeKind
 from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, not_ok
 from cembench.results.samples import Samples
 from cembench.results.store import Store
@@ -66,6 +67,18 @@ class Options:
         return self.fresh or (self.rerun_failed and kept.outcome.status != "ok")
 
 
+@dataclass(frozen=True)
+class Step:
+    """One process of a cell: its check, or one of its rounds, counted from 1."""
+
+    #: None: the check.
+    round: int | None = None
+    rounds: int = 0
+
+    def __str__(self) -> str:
+        return "check" if self.round is None else f"round {self.round} of {self.rounds}"
+
+
 class Watcher:
     """Is told how a run goes on; a subclass shows it."""
 
@@ -75,10 +88,10 @@ class Watcher:
     def begins(self, processes: int) -> None:
         """So many processes are to be run."""
 
-    def starts(self, task: Task, step: str) -> None:
+    def starts(self, task: Task, step: Step) -> None:
         """A process starts."""
 
-    def ends(self, task: Task, step: str, seconds: float) -> None:
+    def ends(self, task: Task, step: Step, seconds: float) -> None:
         """It has ended, after so many seconds in all."""
 
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
@@ -186,7 +199,7 @@ class _Run:
         samples = self._samples(task)
         outcome = samples.check()
         if outcome is None:
-            with _Step(self.watcher, task, "check"):
+            with _Process(self.watcher, task, Step()):
                 outcome, uv = self.launcher.check(task)
             samples.save_check(outcome, uv)
         if outcome.status != "ok":
@@ -202,11 +215,11 @@ class _Run:
         )
 
     def _time(self, task: Task, number: int) -> None:
-        step = f"round {number + 1} of {task.cell.repeats}"
+        step = Step(number + 1, task.cell.repeats)
         started = _now()
         checked = self._samples(task).check()
         assert checked is not None
-        with _Step(self.watcher, task, step):
+        with _Process(self.watcher, task, step):
             found = self.launcher.time(task, Checked.of(checked))
         if isinstance(found, Outcome):
             cause = f"in {step}: {found.cause}"
@@ -238,29 +251,30 @@ class _Run:
 
 
 @dataclass
-class _Step:
+class _Process:
     """Tells the watcher of a process's start and end."""
 
     watcher: Watcher
     task: Task
-    name: str
+    step: Step
     since: float = field(default_factory=monotonic)
 
     def __enter__(self) -> None:
-        self.watcher.starts(self.task, self.name)
+        self.watcher.starts(self.task, self.step)
 
     def __exit__(self, *_: object) -> None:
-        self.watcher.ends(self.task, self.name, monotonic() - self.since)
+        self.watcher.ends(self.task, self.step, monotonic() - self.since)
 
 
-def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[str, ...]:
+def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
     differing = [
         k + 1 for k, r in enumerate(rounds) if r.uv_hash != checked.uv_hash or not all(r.same_bits)
     ]
     if not differing:
         return ()
     named = ", ".join(map(str, differing))
-    return (f"not deterministic: other bits than in the check came out in rounds {named}",)
+    told = f"not deterministic: other bits than in the check came out in rounds {named}"
+    return (Notice(NoticeKind.NOT_DETERMINISTIC, told),)
 
 
 def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Record:
@@ -455,7 +469,8 @@ def _with_note(answer: Answer, left: int) -> Answer:
     """Say of a checked call that it left processes behind."""
     if answer.outcome is None or not left:
         return answer
-    notes = (*answer.outcome.notes, f"left {left} processes behind, which were ended")
+    told = Notice(NoticeKind.PROCESSES_LEFT, f"left {left} processes behind, which were ended")
+    notes = (*answer.outcome.notes, told)
     return Answer(outcome=answer.outcome.model_copy(update={"notes": notes}))
 
 

@@ -51,9 +51,6 @@ LONG_CALL = 5.0
 #: maps of a solver that draws random numbers differ by less, one that stops earlier by more.
 SAME_ENERGY = 1e-6
 
-#: The cause where the arrays V and F are not as they were before the call.
-MESH_CHANGED = "the algorithm changed the mesh it was given"
-
 Complex = NDArray[np.complex128]
 Call = Callable[[], tuple[Any, Timing]]
 
@@ -220,7 +217,8 @@ def _no_metrics(error: Exception) -> Fault:
 def _changes(mesh: TriangleMesh, cell: Cell) -> list[Fault]:
     if mesh.fresh().hash == cell.mesh_hash:
         return []
-    return [Fault(kind=FaultKind.MESH_CHANGED, detail=MESH_CHANGED)]
+    told = "the algorithm changed the mesh it was given"
+    return [Fault(kind=FaultKind.MESH_CHANGED, detail=told)]
 
 
 def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:

@@ -24,6 +24,7 @@ from cembench.conformal.laplacian import by_rows, laplacian
 from cembench.conformal.metrics import angle_errors, corner_angles
 from cembench.conformal.planar import polygon_area, signed_areas
 from cembench.core.errors import AlgorithmFailed
+from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh, definition_1_notices
 
@@ -41,31 +42,34 @@ CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
 
 def quality_notes(
     target: str, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
-) -> list[str]:
+) -> list[Notice]:
     """Return what a reader should know of how conformal a valid map is; empty where it is."""
     notes = []
     if extras.get("stopped") == "crowded":
-        notes.append(
+        told = (
             "the iteration ended early, because the boundary is too crowded for it: this is not "
             "the map of least energy"
         )
+        notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, told))
     known = yardstick(target, mesh, uv)
     if known is None:
         return notes
     error, reachable = (float(angle_errors(mesh, z).mean()) for z in (uv, known))
     causes = likely_causes(mesh, uv, extras)
     if error > FAR * reachable:
-        notes.append(
+        told = (
             f"far from conformal: angles are off by {error:.2f} degrees in the mean, where a "
             f"harmonic map of this mesh by harmonic measure has {reachable:.2f}. Likely cause: "
             f"{'; '.join(causes) or 'the method, not the mesh'}"
         )
+        notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
     elif error > COLLAPSED * collapsed_error(mesh):
-        notes.append(
+        told = (
             f"far from conformal: angles are off by {error:.2f} degrees in the mean, and a "
             f"harmonic map of this mesh by harmonic measure is no better ({reachable:.2f}). "
             f"Likely cause: {'; '.join(causes) or 'the mesh is too coarse for this domain'}"
         )
+        notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
     return notes
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from cembench.core.errors import MeshError
+from cembench.core.notices import Notice
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, load_algorithm
 from cembench.results.records import Cell, Outcome, Round
@@ -36,7 +37,7 @@ class Job(BaseModel):
     cell: Cell
     plugins: tuple[str, ...]
     mesh_type: str
-    notices: tuple[str, ...]
+    notices: tuple[Notice, ...]
     #: Of V and F, as ``.npy``.
     mesh_files: tuple[Path, Path]
     #: Takes an :class:`Answer`.

@@ -10,7 +10,6 @@ import numpy as np
 from cembench.core.errors import ParameterError
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import FaultKind
-from cembench.running.measure import MESH_CHANGED
 from cembench.validation import surfaces
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.solver import CheckedMap, Solver
@@ -77,12 +76,12 @@ def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
 
 def leaves_the_mesh(mapped: CheckedMap) -> ValidationFinding:
     """Are V and F as they were after the call?"""
-    changed = any(fault.kind is FaultKind.MESH_CHANGED for fault in mapped.outcome.faults)
+    changes = [f.detail for f in mapped.outcome.faults if f.kind is FaultKind.MESH_CHANGED]
     return ValidationFinding(
         stage="contract",
         name="mesh untouched",
-        ok=not changed,
-        measured=MESH_CHANGED if changed else "V and F as before",
+        ok=not changes,
+        measured="; ".join(changes) or "V and F as before",
         allowed="mesh.V and mesh.F have the same bits after the call",
         remedy="work on copies: V = mesh.V.copy().",
     )

@@ -72,7 +72,8 @@ def _items(
 ) -> Iterator[Item]:
     for skipped, why in validation.skipped.items():
         if skipped == stage:
-            yield Gap(_TITLES[stage], why, "" if "fault" in why else "cembench validate PLUGIN.py")
+            command = "cembench validate PLUGIN.py" if stage in validation.not_asked_for else ""
+            yield Gap(_TITLES[stage], why, command)
     findings = [finding for finding in validation.findings if finding.stage == stage]
     if findings:
         yield _findings_table(stage, findings)

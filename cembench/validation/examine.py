@@ -117,6 +117,7 @@ def examine(
         environment=describe_environment()["id"],
         findings=tuple(findings),
         skipped=skipped,
+        not_asked_for=tuple(stage for stage in skipped if not _is_asked(stage, asked)),
         seconds=monotonic() - started,
         **parts,
     )

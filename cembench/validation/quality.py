@@ -17,11 +17,11 @@ from statistics import median
 
 from pydantic import BaseModel, ConfigDict
 
+from cembench.core.notices import NoticeKind, of_kind
 from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.comparison import compare, compare_ratios, paired_ratios
 from cembench.results.intervals import median_interval
-from cembench.results.records import Record
-from cembench.running.measure import MESH_CHANGED
+from cembench.results.records import FaultKind, Record
 from cembench.validation.finding import ValidationFinding
 
 #: Ratios this near to 1 are ties.
@@ -173,7 +173,7 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
     ]
     none = len(without_map(records)) == len(records)
     changing = [
-        r.cell.mesh for r in records if any("not deterministic" in n for n in r.outcome.notes)
+        r.cell.mesh for r in records if of_kind(NoticeKind.NOT_DETERMINISTIC, r.outcome.notes)
     ]
     return [
         ValidationFinding(
@@ -238,14 +238,9 @@ def _median_ratio(ratios: Sequence[float]) -> float:
 
 
 def _only_folds(record: Record) -> bool:
-    """Is there nothing wrong with the map but folds? The harness names a boundary first."""
-    cause, folded = record.outcome.cause or "", record.outcome.metrics.get("flipped_triangles")
-    told = f"{folded} of {record.mesh.faces} triangles are folded"
-    return (
-        record.outcome.status == "invalid"
-        and cause.startswith(told)
-        and (MESH_CHANGED not in cause)
-    )
+    """Whether nothing is wrong but folds, and a boundary out of order, which makes them."""
+    kinds = {fault.kind for fault in record.outcome.faults}
+    return FaultKind.FOLDED in kinds <= {FaultKind.FOLDED, FaultKind.BOUNDARY_ORDER}
 
 
 def _has_none(record: Record) -> bool:

@@ -44,6 +44,8 @@ class Validation(BaseModel):
     findings: tuple[ValidationFinding, ...]
     #: Stages that were not reached, with the reason.
     skipped: dict[Stage, str] = {}
+    #: Those among them that were skipped because nobody asked for them.
+    not_asked_for: tuple[Stage, ...] = ()
     surfaces: tuple[str, ...] = ()
     folds_on: tuple[str, ...] = ()
     #: Surfaces without a map, and why.

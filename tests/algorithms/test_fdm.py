@@ -53,7 +53,7 @@ def test_ears_on_the_boundary_collapse_in_the_half_plane_and_do_no_harm():
     # The corner triangles of a rectangle have all three vertices on the boundary.
     V, F = gallery.flat_rectangle(12, 20)
     mesh = DiskMesh.from_arrays(V, F)
-    assert any("without an interior neighbour" in notice for notice in mesh.notices)
+    assert any("without an interior neighbour" in notice.text for notice in mesh.notices)
     assert all_metrics(mesh, fdm(mesh).uv)["flipped_triangles"] == 0
 
 

@@ -5,6 +5,7 @@ import pytest
 from rich.console import Console
 
 from cembench.commands.progress import LiveProgress, Remaining, duration
+from cembench.running.local import Step
 from tests.results.test_comparison import record_of
 
 
@@ -30,9 +31,9 @@ def test_the_live_table_shows_cells_and_what_remains():
     console = Console(file=io.StringIO(), width=80, force_terminal=True)
     with LiveProgress(console, 3) as progress:
         progress.begins(14)
-        progress.starts(task, "check")
-        progress.ends(task, "check", 2.0)
-        progress.starts(task, "round 1 of 6")
+        progress.starts(task, Step())
+        progress.ends(task, Step(), 2.0)
+        progress.starts(task, Step(1, 6))
         progress.waits()
         shown = Console(file=io.StringIO(), width=80)
         shown.print(progress._picture())

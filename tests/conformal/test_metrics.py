@@ -196,6 +196,6 @@ def test_figures_that_rounding_has_eaten_are_named():
     assert lost_in_rounding(sound) == []
     assert lost_in_rounding(sound | {"conformal_energy": -1e-12}) == []
     (note,) = lost_in_rounding(sound | {"conformal_energy": -7.0})
-    assert "conformal_energy is -7" in note
+    assert "conformal_energy is -7" in note.text
     notes = lost_in_rounding(sound | {"dilatation_max": np.inf, "conformal_energy": np.nan})
-    assert [note.split()[0] for note in notes] == ["conformal_energy", "dilatation_max"]
+    assert [note.text.split()[0] for note in notes] == ["conformal_energy", "dilatation_max"]

@@ -322,7 +322,7 @@ def test_damaged_files_are_refused_with_what_was_found(name, tmp_path):
 def test_lines_that_are_not_obj_are_reported(text, tmp_path):
     soup = read_soup(write(tmp_path, "a.obj", OBJ + "f 1 2 3\n" + text))
     (notice,) = soup.notices
-    assert notice.endswith(f"OBJ were ignored: 1, the first: line 6, {text.strip()!r}")
+    assert notice.text.endswith(f"OBJ were ignored: 1, the first: line 6, {text.strip()!r}")
 
 
 def test_matlab_files_cut_anywhere_are_refused(tmp_path):

@@ -7,6 +7,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench import DiskMesh, HoledMesh, MeshError, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import ParameterError
+from cembench.core.notices import NoticeKind
 from tests import gallery
 
 
@@ -45,7 +46,7 @@ def test_orientation_is_repaired_towards_the_majority_with_a_notice():
     wrong = F.copy()
     wrong[[0, 5, 9]] = wrong[[0, 5, 9]][:, ::-1]
     mesh = DiskMesh.from_arrays(V, wrong)
-    assert any("3 of 40 triangles" in notice for notice in mesh.notices)
+    assert any("3 of 40 triangles" in notice.text for notice in mesh.notices)
     before, after = (
         np.cross(V[T[:, 1]] - V[T[:, 0]], V[T[:, 2]] - V[T[:, 0]])[:, 2] for T in (F, mesh.F)
     )
@@ -67,10 +68,10 @@ def test_a_tube_is_holed_and_a_disk_is_not():
 
 def test_definition_1_is_reported_where_it_fails():
     V, F = gallery.flat_rectangle(1, 5)  # a strip: no interior vertex at all
-    assert any("no interior vertex" in notice for notice in DiskMesh.from_arrays(V, F).notices)
+    assert any("no interior vertex" in notice.text for notice in DiskMesh.from_arrays(V, F).notices)
     V, F = gallery.flat_rectangle(4, 4)  # two corners lie in a single triangle
     notices = DiskMesh.from_arrays(V, F).notices
-    assert any("(iv) broken" in notice for notice in notices)
+    assert any("(iv) broken" in notice.text for notice in notices)
     assert flat_disk(600).notices == ()
 
 
@@ -176,12 +177,15 @@ def test_allowed_scales_change_no_figure(scale):
 def test_slivers_are_reported():
     V, F = gallery.flat_rectangle()
     (notice,) = TriangleMesh.from_arrays(V * [1, 1e-7, 1], F).notices
-    assert notice.startswith("slivers, with less area than 1e-06 of their longest edge squared: ")
+    assert notice.kind is NoticeKind.SLIVERS
+    assert notice.text.startswith(
+        "slivers, with less area than 1e-06 of their longest edge squared: "
+    )
     assert not TriangleMesh.from_arrays(V * [1, 1e-5, 1], F).notices
 
 
 def test_an_ear_on_a_hole_is_told_with_its_loop_and_vertex():
     mesh, ear = gallery.eared_hole()
     hole = min(mesh.loops, key=len)
-    (notice,) = [n for n in mesh.notices if f"boundary of vertex {hole.min()} " in n]
-    assert f"without an interior neighbour: {ear}." in notice
+    (notice,) = [n for n in mesh.notices if f"boundary of vertex {hole.min()} " in n.text]
+    assert f"without an interior neighbour: {ear}." in notice.text

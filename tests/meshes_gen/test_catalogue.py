@@ -17,6 +17,7 @@ from cembench.surfaces.rows import ROWS
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.conformal.metrics import flipped_triangles
 from cembench.core.errors import RegistryError
+from cembench.core.notices import NoticeKind
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.report.surface_facts import factor_spans, row_check
@@ -120,8 +121,9 @@ def test_another_route_without_pymeshlab(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr("cembench.surfaces.remesh.has_remeshing_filter", lambda: False)
     monkeypatch.setattr("cembench.surfaces.catalogue.has_remeshing_filter", lambda: False)
     mesh = catalogue.stand_in("cowboy-hat")
-    assert "pymeshlab" in mesh.notices[0]
-    assert "doctor" in mesh.notices[0]
+    (notice,) = mesh.notices
+    assert notice.kind is NoticeKind.REMESHED_WITHOUT_FILTER
+    assert "doctor" in notice.text
     assert _check("cowboy-hat", mesh)["ok"]
 
 

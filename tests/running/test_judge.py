@@ -82,7 +82,7 @@ def test_an_overlapping_free_boundary_is_told_and_not_refused():
     free = solver("free boundary")
     assert faults(free, DISK, doubled(FLAT)) == []
     (told,) = remarks(free, DISK, doubled(FLAT))
-    assert told.startswith("the image overlaps itself: boundary ")
+    assert told.text.startswith("the image overlaps itself: boundary ")
     assert remarks(free, DISK, FLAT) == []
 
 

@@ -7,6 +7,7 @@ import psutil
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
+from cembench.core.notices import NoticeKind
 from cembench.registry import load_registry
 from cembench.results.records import FaultKind
 from cembench.results.store import Store
@@ -95,10 +96,10 @@ def test_a_run_over_the_unruly_measures_the_good(tmp_path):
         assert not psutil.pid_exists(outcomes[name].extras["child"]) or (
             psutil.Process(outcomes[name].extras["child"]).status() == psutil.STATUS_ZOMBIE
         )
-        assert "left 1 processes behind" in outcomes[name].notes[0]
-    assert outcomes["by-chance"].notes == (
-        "not deterministic: other bits than in the check came out in rounds 1",
-    )
+        assert outcomes[name].notes[0].kind is NoticeKind.PROCESSES_LEFT
+    (note,) = outcomes["by-chance"].notes
+    assert note.kind is NoticeKind.NOT_DETERMINISTIC
+    assert note.text.endswith("came out in rounds 1")
     assert outcomes["good"].notes == ()
 
 
@@ -160,7 +161,7 @@ def test_what_is_in_the_store_is_not_measured_again(tmp_path):
             self.steps, self.kept = [], []
 
         def starts(self, task, step):
-            self.steps.append((task.cell.algorithm, step))
+            self.steps.append((task.cell.algorithm, str(step)))
 
         def finished(self, task, record, *, kept):
             self.kept.append(kept)
@@ -191,7 +192,7 @@ def test_rounds_go_over_all_cells_in_turn(tmp_path):
 
     class Noting(Watcher):
         def starts(self, task, step):
-            steps.append(step)
+            steps.append(str(step))
 
     run_tasks(tasks_of("good", "by-chance", repeats=2), Store(tmp_path), None, Noting())
     assert steps == ["check"] * 2 + ["round 1 of 2"] * 2 + ["round 2 of 2"] * 2
@@ -214,7 +215,7 @@ def test_samples_of_a_killed_run_are_gone_on_with(tmp_path):
 
     class Killing(Watcher):
         def starts(self, task, step):
-            if step == "round 2 of 2":
+            if step.round == 2:
                 raise KilledError
 
     store = Store(tmp_path)

@@ -45,7 +45,7 @@ def test_a_hole_that_is_no_circle_is_told_but_no_fault():
     uv[loop] = middle + 0.999 * (uv[loop] - middle) + 0.02 * np.conj(uv[loop] - middle)
     outcome, _ = mapped(uv)
     assert outcome.status == "ok"
-    assert "1 of 3 holes are no circles" in outcome.notes[0]
+    assert "1 of 3 holes are no circles" in outcome.notes[0].text
     assert outcome.metrics["boundary_circularity"] > 0.01
 
 
@@ -84,4 +84,4 @@ def test_an_ok_map_does_not_hide_figures_that_are_infinite(monkeypatch):
     outcome, _ = mapped(FLAT)
     assert outcome.metrics["dilatation_max"] is None
     (note,) = outcome.notes
-    assert note.startswith("dilatation_max is inf")
+    assert note.text.startswith("dilatation_max is inf")

@@ -13,6 +13,7 @@ from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench import DiskMesh
 from cembench.conformal.metrics import angle_errors
+from cembench.core.notices import NoticeKind
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.running.quality import collapsed_error, likely_causes, quality_notes, yardstick
 from tests import gallery
@@ -51,8 +52,8 @@ def test_conformal_maps_get_no_note(algorithm):
 def test_a_map_by_arc_length_of_a_long_surface_is_far_from_conformal():
     mesh = flat_disk(600, stretch=4.0)
     (note,) = quality_notes("disk", mesh, harmonic_circle(mesh).uv, {})
-    assert "far from conformal" in note
-    assert "the method, not the mesh" in note
+    assert note.kind is NoticeKind.FAR_FROM_CONFORMAL
+    assert "the method, not the mesh" in note.text
 
 
 def test_with_holes_the_yardstick_has_the_same_boundary_outside():
@@ -68,7 +69,8 @@ def test_with_holes_the_yardstick_has_the_same_boundary_outside():
 def test_a_crowded_end_is_never_passed_over():
     mesh = spherical_cap(300)
     uv = direct_cem(mesh).uv
-    assert "crowded" in quality_notes("disk", mesh, uv, {"stopped": "crowded"})[0]
+    note = quality_notes("disk", mesh, uv, {"stopped": "crowded"})[0]
+    assert note.kind is NoticeKind.CROWDED_BOUNDARY
 
 
 def test_causes_are_those_of_the_mesh_and_of_the_map():
@@ -86,8 +88,8 @@ def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_b
     assert angle_errors(mesh, flat).mean() == pytest.approx(collapsed_error(mesh), rel=0.3)
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
     (note,) = quality_notes("disk", mesh, flat, {})
-    assert "no better" in note
-    assert "too coarse" in note
+    assert "no better" in note.text
+    assert "too coarse" in note.text
 
 
 def test_a_free_boundary_has_no_yardstick():

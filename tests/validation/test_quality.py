@@ -1,6 +1,7 @@
 import pytest
 
-from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.core.notices import Notice, NoticeKind
+from cembench.results.records import Cell, Fault, FaultKind, MeshFacts, Outcome, Record, Round
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
@@ -27,8 +28,13 @@ def record(algorithm, mesh, energy=0.01, seconds=(), *, target="disk", **outcome
 
 def folded(mesh, **more):
     metrics = {"conformal_energy": 1.0, "image_area": 3.14, "flipped_triangles": 2}
-    cause = "2 of 8 triangles are folded (25.00%)"
-    return record("ours", mesh, status="invalid", metrics=metrics, **({"cause": cause} | more))
+    faults = (fault(FaultKind.FOLDED),)
+    about = {"status": "invalid", "cause": "some reason", "faults": faults, "metrics": metrics}
+    return record("ours", mesh, **(about | more))
+
+
+def fault(kind):
+    return Fault(kind=kind, detail="in any words")
 
 
 def test_ratios_within_one_percent_are_ties():
@@ -78,30 +84,26 @@ def test_speed_is_judged_over_rounds_paired_on_every_surface():
 
 
 def test_folds_are_counted_and_are_no_fault():
-    records = [record("ours", "a"), folded("hand")]
-    assert folds_on(records) == ["hand"]
+    with_its_cause = (fault(FaultKind.FOLDED), fault(FaultKind.BOUNDARY_ORDER))
+    records = [record("ours", "a"), folded("hand"), folded("foot", faults=with_its_cause)]
+    assert folds_on(records) == ["hand", "foot"]
     assert quality_findings(records)[0].ok
 
 
 @pytest.mark.parametrize(
     "worse",
     [
-        {"cause": "the boundary lies off the unit circle by up to 1; 2 of 8 triangles are folded"},
-        {
-            "cause": "2 of 8 triangles are folded (25.00%); the algorithm changed the mesh it was "
-            "given"
-        },
-        {"cause": "uv is NaN or infinite at 1 vertices, the first being 0", "metrics": {}},
-        {"status": "failed", "cause": "ZeroDivisionError: x", "traceback": "t", "metrics": {}},
-        {"status": "failed", "cause": "the process was ended by signal SIGSEGV", "metrics": {}},
+        {"faults": (fault(FaultKind.OFF_CIRCLE), fault(FaultKind.FOLDED))},
+        {"faults": (fault(FaultKind.FOLDED), fault(FaultKind.MESH_CHANGED))},
+        {"faults": (fault(FaultKind.OTHER_MAP), fault(FaultKind.FOLDED))},
+        {"faults": (fault(FaultKind.NOT_FINITE),), "metrics": {}},
+        {"faults": (fault(FaultKind.RAISED),), "status": "failed", "metrics": {}},
+        {"faults": (fault(FaultKind.PROCESS_ENDED),), "status": "failed", "metrics": {}},
+        {"faults": (), "cause": "2 of 8 triangles are folded (25.00%)"},
     ],
 )
 def test_what_is_worse_than_a_fold_is_a_fault(worse):
-    records = [record("ours", "a"), folded("hand").model_copy()]
-    if "metrics" in worse:
-        records[1] = record("ours", "hand", **({"status": "invalid"} | worse))
-    else:
-        records[1] = folded("hand", **worse)
+    records = [record("ours", "a"), folded("hand", **worse)]
     finding = quality_findings(records)[0]
     assert not finding.ok
     assert "hand" in finding.measured
@@ -122,7 +124,7 @@ def test_a_refusal_with_a_cause_is_told_and_is_no_fault():
 
 
 def test_other_bits_in_a_later_round_are_a_fault():
-    note = "not deterministic: other bits than in the check came out in rounds 2"
+    note = Notice(NoticeKind.NOT_DETERMINISTIC, "in any words")
     finding = quality_findings([record("ours", "a", notes=(note,))])[1]
     assert not finding.ok
     assert "a" in finding.measured

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,8 @@ from cembench.results.store import Store
 REFERENCE = frame.REFERENCE
 DISK = "disk"
 Row = Mapping[str, Any]
+#: What else than surface and policy tells two cells of an algorithm apart: names with values.
+Variant = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
@@ -39,10 +41,12 @@ class AlgorithmSeries:
     algorithm: str
     title: str
     target: str
-    parameters: str
+    variant: Variant
     label: str
     #: Is it the choice of parameters that most cells of the run have? Tables show that one.
     main: bool = True
+    #: The parameters of the variant, by name.
+    parameters: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def name(self) -> str:
@@ -166,11 +170,14 @@ class Evidence:
     @cached_property
     def series(self) -> tuple[AlgorithmSeries, ...]:
         """Every algorithm of the run: the paper's in its order, then others by name."""
-        variants: dict[str, Counter[str]] = {}
+        variants: dict[str, Counter[Variant]] = {}
         about: dict[str, Record] = {}
+        parameters: dict[tuple[str, Variant], Mapping[str, Any]] = {}
         for record in self.records:
             name = record.cell.algorithm
-            variants.setdefault(name, Counter())[_variant(record.cell)] += 1
+            choice = _variant(record.cell)
+            variants.setdefault(name, Counter())[choice] += 1
+            parameters[name, choice] = record.cell.parameters
             about[name] = record
         titles = Counter(record.title for record in about.values())
         found = []
@@ -181,7 +188,10 @@ class Evidence:
                 if titles[title] > 1:
                     title = f"{title} ({name})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
-                found.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
+                given = parameters[name, choice]
+                found.append(
+                    AlgorithmSeries(name, title, target, choice, label, k == 0, parameters=given)
+                )
         return tuple(found)
 
     @property
@@ -190,7 +200,7 @@ class Evidence:
         return tuple(s for s in self.series if s.target == DISK)
 
     @cached_property
-    def _index(self) -> dict[tuple[str, str, str, str], Record]:
+    def _index(self) -> dict[tuple[str, str, Variant, str], Record]:
         return {
             (r.cell.mesh_hash, r.cell.algorithm, _variant(r.cell), r.cell.solves): r
             for r in self.records
@@ -207,7 +217,7 @@ class Evidence:
     ) -> Record | None:
         """The record of an algorithm on a surface; without a policy, the first that ended ok."""
         held = [
-            self._index.get((surface.mesh_hash, series.algorithm, series.parameters, p))
+            self._index.get((surface.mesh_hash, series.algorithm, series.variant, p))
             for p in ([policy] if policy else self.policies)
         ]
         there = [record for record in held if record is not None]
@@ -229,7 +239,7 @@ class Evidence:
         """
         reference = self.series_of(REFERENCE)
         base = reference and self._index.get(
-            (record.cell.mesh_hash, REFERENCE, reference.parameters, record.cell.solves)
+            (record.cell.mesh_hash, REFERENCE, reference.variant, record.cell.solves)
         )
         if not base or base.cell.key == record.cell.key:
             return None
@@ -285,20 +295,19 @@ def _place(algorithm: str) -> int:
     return paper.ALGORITHMS.index(algorithm) if known else len(paper.ALGORITHMS)
 
 
-def _variant(cell: Cell) -> str:
-    """What else than surface and policy tells two cells of an algorithm apart, in words."""
-    chosen = [f"{name}={value}" for name, value in sorted(cell.parameters.items())]
-    return ", ".join([*chosen, f"backend={cell.backend}", f"threads={cell.threads}"])
+def _variant(cell: Cell) -> Variant:
+    chosen = [(name, str(value)) for name, value in sorted(cell.parameters.items())]
+    return (*chosen, ("backend", cell.backend), ("threads", str(cell.threads)))
 
 
-def _difference(choice: str, main: str) -> str:
-    usual = set(main.split(", "))
-    return ", ".join(part for part in choice.split(", ") if part not in usual) or choice
+def _difference(choice: Variant, main: Variant) -> str:
+    other = [pair for pair in choice if pair not in main] or choice
+    return ", ".join(f"{name}={value}" for name, value in other)
 
 
 def _latest(records: Sequence[Record]) -> list[Record]:
     """Of records that differ in code or rounds alone: one that ended ok first, then the later."""
-    best: dict[tuple[str, str, str, str], Record] = {}
+    best: dict[tuple[str, str, Variant, str], Record] = {}
     for record in records:
         cell = record.cell
         key = (cell.mesh_hash, cell.algorithm, _variant(cell), cell.solves)

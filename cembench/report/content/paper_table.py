@@ -43,12 +43,12 @@ def three_kinds(
     tables = []
     if evidence.models:
         left_out = absent_models(evidence)
-        said = [*notes, f"not in this run: {', '.join(left_out)}"] if left_out else list(notes)
+        absent = f"not in this run: {', '.join(left_out)}" if left_out else ""
         columns = [q for a in algorithms for q in quantities(evidence.series_of(a), a)]
         tables.append(
             table_beside(
                 evidence, name, f"Table {number}: {title}{add}", evidence.models, columns,
-                policy=policy, caption=caption, footers=footers, notes=said,
+                policy=policy, caption=caption, footers=footers, notes=notes, absent=absent,
             )
         )  # fmt: skip
     others = [s for s in evidence.disk_series if not (s.algorithm in paper.ALGORITHMS and s.main)]

@@ -113,6 +113,7 @@ def table_beside(
     caption: str = "",
     footers: Sequence[Footer] = (),
     notes: Sequence[str] = (),
+    absent: str = "",
 ) -> Table:
     """One row a surface, two columns a quantity that the paper prints, one for others.
 
@@ -127,7 +128,7 @@ def table_beside(
     rows = [_row(evidence, surface, quantities, policy) for surface in surfaces]
     counted = [r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.set_aside]
     last = _footer_rows(counted, len(columns), footers)
-    remarks = [*notes, *_remarks(columns, rows), *_sizes(surfaces)]
+    remarks = [*notes, *([absent] if absent else []), *_remarks(columns, rows), *_sizes(surfaces)]
     return Table(
         name=name,
         title=title,
@@ -135,6 +136,7 @@ def table_beside(
         rows=(*rows, *last),
         caption=caption,
         notes=tuple(remarks),
+        absent=absent,
         footer_rows=len(last),
     )
 

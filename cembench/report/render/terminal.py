@@ -259,7 +259,7 @@ def figures_table(record: Record) -> Table:
             f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
         )
     for note in outcome.notes:
-        table.add_row("note", note)
+        table.add_row("note", str(note))
     return table
 
 

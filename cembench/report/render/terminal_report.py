@@ -16,7 +16,6 @@ SHOWN = ("table-1", "table-2", "table-3", "table-4")
 _BESIDE = ("printed", "here")
 #: Characters of a line, and the fewest that are left for a surface's name.
 WIDTH, NAME = 80, 12
-_ABSENT = "not in this run: "
 
 
 def paper_tables(report: Report) -> RenderableType:
@@ -30,10 +29,10 @@ def paper_tables(report: Report) -> RenderableType:
     parts: list[RenderableType] = []
     for table in chosen:
         parts += [Text(table.title, style="bold"), _folded(table)]
-        notes = [note for note in table.notes if not note.startswith(_ABSENT)]
+        notes = [note for note in table.notes if note != table.absent]
         parts += [Padding(Text(note, style="dim"), (0, 0, 0, 2)) for note in notes]
         parts.append(Text(""))
-    absent = {note for table in chosen for note in table.notes if note.startswith(_ABSENT)}
+    absent = {table.absent for table in chosen if table.absent}
     parts += [Text(note, style="dim") for note in sorted(absent)]
     marks = [f"{mark} {words}" for words, mark in ORIGINS.values() if mark and mark != "ᵖ"]
     return Group(*parts, Text(f"{'; '.join(marks)}; † misprint; ! unstable", style="dim"))

@@ -87,8 +87,8 @@ def iteration_lowers_energy(evidence: Evidence, inspections: Inspections) -> Cla
 def inversion_converges_better(evidence: Evidence, inspections: Inspections) -> Claim:
     """Does iteration (30) converge better than (23)?"""
     variants = [s for s in evidence.series if s.algorithm == REFERENCE]
-    with_it = [s for s in variants if "inversion=True" in s.parameters]
-    without = [s for s in variants if "inversion=False" in s.parameters]
+    with_it = [s for s in variants if s.parameters.get("inversion") is True]
+    without = [s for s in variants if s.parameters.get("inversion") is False]
     better = tested = 0
     tested_surfaces = []
     for surface in evidence.surfaces:

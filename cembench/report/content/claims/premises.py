@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from cembench.conformal.laplacian import cotangent_laplacian
+from cembench.core.notices import Notice, NoticeKind, of_kind
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.claims.verdicts import tested_on, verdict_of
 from cembench.report.content.evidence import Evidence
@@ -39,12 +40,11 @@ def delaunay(evidence: Evidence, inspections: Inspections) -> Claim:
 
 def well_conditioned(evidence: Evidence, inspections: Inspections) -> Claim:
     """Do the meshes satisfy Definition 1?"""
-    notices: dict[str, tuple[str, ...]] = {}
+    notices: dict[str, tuple[Notice, ...]] = {}
     for record in evidence.records:
         notices[record.cell.mesh_hash] = record.mesh.notices
     bad = {
-        s.title: [n for n in notices[s.mesh_hash] if n.startswith("Definition 1")]
-        for s in evidence.surfaces
+        s.title: of_kind(NoticeKind.DEFINITION_1, notices[s.mesh_hash]) for s in evidence.surfaces
     }
     broken = {title: found for title, found in bad.items() if found}
     n = len(evidence.surfaces)
@@ -55,7 +55,7 @@ def well_conditioned(evidence: Evidence, inspections: Inspections) -> Claim:
         "Section 4, before Corollary 1",
         "Each surface satisfies (i) to (iv) of Definition 1.",
         f"{n - len(broken)} of {n} surfaces of the run"
-        + "".join(f"; {title}: {', '.join(found)}" for title, found in broken.items()),
+        + "".join(f"; {title}: {', '.join(map(str, found))}" for title, found in broken.items()),
         verdict_of(n - len(broken), n),
         tested_on(evidence.surfaces),
     )
