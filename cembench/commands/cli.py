@@ -64,13 +64,34 @@ if TYPE_CHECKING:
 app = typer.Typer(
     cls=Verbs,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
 )
 Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from cembench import __version__
+
+        out.print(f"cembench {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _global_options(
+    *,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Take the options that belong to no verb."""
 
 
 #: What `map` takes where the user names no algorithm: the first that takes the surface.
