@@ -23,6 +23,8 @@ from cembench.workflows.theory import (
 
 #: The algorithm whose course is shown beside CEM's, where it is installed.
 RIVAL = "direct-cem"
+#: The least E_C, with the weights that K has: those of the mesh's own edges.
+RIVAL_PARAMETERS = {"delaunay": False, "back": 0.0}
 #: After how many iterations the table of energies looks.
 LOOKS = (0, 20, 200)
 #: K is formed, for the statements on its entries, up to so many boundary vertices.
@@ -138,7 +140,7 @@ def _rival_history(
     if rival is None or not isinstance(mesh, rival.mesh_type):
         return {}, f"{RIVAL} is not installed here." if rival is None else ""
     try:
-        result = rival.function(mesh.fresh(), **rival.arguments({}))
+        result = rival.function(mesh.fresh(), **rival.arguments(RIVAL_PARAMETERS))
     except AlgorithmFailed as error:
         return {}, f"{rival.title} failed: {error}."
     if not result.energy_history:
