@@ -31,8 +31,8 @@ def check(mesh, algorithm):
         assert after["flipped_triangles"] == 0
         return False, False
     assert before["flipped_triangles"] > 0
-    for figure in ("conformal_energy", "angle_error_mean_deg"):
-        assert after[figure] <= 1.25 * before[figure]
+    assert after["conformal_energy"] <= 1.25 * before["conformal_energy"]
+    assert after["angle_error_mean_deg"] <= 1.5 * before["angle_error_mean_deg"]
     return True, after["flipped_triangles"] > 0
 
 
@@ -62,7 +62,7 @@ def test_a_repair_that_costs_too_much_is_refused_and_its_figures_recorded():
     taken, extras = accepted_repair(mesh, good, (bad, 2))
     assert taken is good
     refused, before = extras["refused_repair"], extras["before_repair"]
-    assert refused["angle_error_mean_deg"] > MOST_COST * before["angle_error_mean_deg"]
+    assert any(refused[figure] > most * before[figure] for figure, most in MOST_COST.items())
 
 
 @pytest.mark.parametrize("seed", range(12))
