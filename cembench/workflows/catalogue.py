@@ -59,8 +59,8 @@ def surface(name: str, faces: int | None = None, **parameters: Any) -> TriangleM
     Examples
     --------
     >>> import cembench
-    >>> cembench.surface("flat-disk", 200).m
-    200
+    >>> cembench.surface("flat-disk", 200).name
+    'flat-disk'
 
     """
     family = load_registry().surface(name)
