@@ -204,8 +204,7 @@ def merge(
         sound_records(Store(run), depth)
     if (output / "records").is_dir():
         sound_records(into, depth)
-    with into.locked():
-        count = merged([Store(run) for run in runs], into)
+    count = merged([Store(run) for run in runs], into)
     machines = sorted({record.environment for record in into.records()})
     if as_json:
         print_json({"output": str(output), "cells": count, "environments": machines})

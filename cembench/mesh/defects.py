@@ -162,6 +162,8 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
     points, faces = np.asarray(V), np.asarray(F)
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), one row a vertex.")
+    if points.dtype.kind not in "fiub":
+        raise MeshError(f"coordinates are of type {points.dtype}; allowed are real numbers.")
     if faces.size == 0:
         raise MeshError(
             f"the mesh has {len(points)} vertices but no faces; a surface needs triangles. "

@@ -74,6 +74,8 @@ def test_parameters_are_checked_as_on_the_command_line(disk):
 
 
 V, F = gallery.flat_rectangle()
+#: An edge of two triangles.
+INNER = next(e for t in F for e in (t[:2], t[1:]) if (np.isin(F, e).sum(axis=1) == 2).sum() == 2)
 BAD = {
     "swapped": ((F, V), "must|integer|whole"),
     "two columns": ((V[:, :2], F), r"\(n, 3\)|shape"),
@@ -87,9 +89,9 @@ BAD = {
     "fractions": ((V, F + 0.5), "integer|whole"),
     "isolated": ((np.vstack([V, [[9, 9, 9]]]), F), "isolated"),
     "degenerate": ((V, np.vstack([F, [[0, 0, 1]]])), "degenerate|repeat|twice"),
-    "words": ((V.astype(str) + "x", F), "."),
-    "complex": ((V + 1j, F), "."),
-    "fin": ((np.vstack([V, [[0, 0, 9]]]), np.vstack([F, [[*F[0, :2], len(V)]]])), "non-manifold"),
+    "words": ((V.astype(str), F), "of type"),
+    "complex": ((V + 1j, F), "of type complex128"),
+    "fin": ((np.vstack([V, [[0, 0, 9]]]), np.vstack([F, [[*INNER, len(V)]]])), "non-manifold"),
     "doubled": ((V, np.vstack([F, F[:1]])), "non-manifold|duplicate"),
     "huge": ((V * 1e200, F), "1e\\+60"),
     "tiny": ((V * 1e-200, F), "1e-60"),

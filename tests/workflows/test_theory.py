@@ -7,7 +7,6 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh, Parameterization, algorithm
-from cembench.commands.theory import _rival_history
 from cembench.core.errors import AlgorithmFailed
 from cembench.results.exhibits import read_exhibits
 from cembench.workflows.theory import (
@@ -18,6 +17,7 @@ from cembench.workflows.theory import (
     statements,
     trajectory,
 )
+from cembench.workflows.theory_facts import _rival_history
 from tests import gallery
 from tests.real_meshes import real_mesh
 

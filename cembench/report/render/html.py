@@ -66,7 +66,7 @@ VERDICTS: Mapping[str, str] = {
 #: Bytes up to which a figure's data is a part of the page; beyond, only the file beside it.
 DATA_BYTES = 200_000
 _PIXELS = (".png", ".jpg", ".jpeg", ".webp")
-_TEMPLATES = Path(__file__).with_name("templates")
+_TEMPLATES = Path(__file__).parents[1] / "templates"
 
 
 def write_html(report: Report, folder: Path) -> Path:
