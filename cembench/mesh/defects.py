@@ -164,6 +164,8 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
         raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), one row a vertex.")
     if points.dtype.kind not in "fiub":
         raise MeshError(f"coordinates are of type {points.dtype}; allowed are real numbers.")
+    if not len(points):
+        raise MeshError("the mesh has no vertices; a surface needs some.")
     if faces.size == 0:
         raise MeshError(
             f"the mesh has {len(points)} vertices but no faces; a surface needs triangles. "

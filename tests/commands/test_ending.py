@@ -110,7 +110,7 @@ def test_an_ignored_signal_stays_ignored(cli):
 
 
 def test_a_fault_of_our_own_is_asked_to_be_reported_with_its_traceback(cli, monkeypatch):
-    def broken(plugins):
+    def broken(plugins=()):
         raise EOFError("in the middle")
 
     monkeypatch.setattr("cembench.registry.load_registry", broken)
