@@ -31,7 +31,8 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
     from cembench.results.verify import Depth, Kind
     from cembench.results.verify import verify as verify_run
 
-    store = _existing(Store(run))
+    store = Store(run)
+    store.check_is_there()
     verified = verify_run(store, Depth.everything if verify else Depth.sample)
     held = {record.cell.label: record for record in verified.records}
     damaged = {f.file.stem for f in verified.findings if f.kind is Kind.damaged} - held.keys()
@@ -240,14 +241,6 @@ def export(
         print_json({"output": str(path), "rows": len(found)})
     else:
         out.print(f"{len(found)} rows in {path}", soft_wrap=True)
-
-
-def _existing(store: Store) -> Store:
-    if not store.folder.is_dir():
-        raise RecordError(
-            f"{store.folder} holds no run: there is no such folder. Make one with `cembench run`."
-        )
-    return store
 
 
 def _state(store: Store, record: Record | None, cell: Cell) -> str:
