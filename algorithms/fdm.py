@@ -68,10 +68,10 @@ def fdm(
     surface's cotangents, the limit of what their coefficients give; a vertex at the centre is
     reflected to a modulus of 1e8. Where the last map folds, boundary vertices that changed places
     are put in order, and patches around the folds are laid out anew (`fold_repairs` counts the
-    rounds). On meshes of a few hundred triangles, where the vertices held are a large share of all,
-    the iteration can diverge: the map returned is the iterate of the least mean |mu|, and
-    `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes the weights of the
-    intrinsic Delaunay triangulation where a solver's matrix is the surface's own
+    rounds). On meshes of a few hundred triangles, where the vertices
+    held are a large share of all, the iteration can diverge: the map returned is the iterate of the
+    least mean |mu|, and `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes
+    the weights of the intrinsic Delaunay triangulation where a solver's matrix is the surface's own
     Laplacian: in all solves but that of the reflected map.
     """
     if not len(mesh.interior):

@@ -19,7 +19,9 @@ from cembench.surfaces.catalogue import stand_in
 from cembench.surfaces.rows import ROWS
 
 from cembench.conformal.metrics import all_metrics
-from cembench.mesh.files import is_mesh_file, read_mesh
+from cembench.core.atomic import write_text
+from cembench.mesh.files import read_mesh
+from cembench.mesh.reading import is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 
 PAGE = Path(__file__).parents[1] / "docs/algorithms.md"
@@ -41,7 +43,7 @@ def main() -> None:
     after = rest.partition(END)[2]
     table = "\n".join(text for _, text in sorted(lines))
     text = f"{before}{BEGIN}\n\n{HEADING}\n{table}\n\n{END}{after}"
-    PAGE.write_text(text, encoding="utf-8")
+    write_text(PAGE, text)
 
 
 HEADING = """\
@@ -52,7 +54,7 @@ HEADING = """\
 def surfaces(folder: Path | None, most_faces: int) -> Iterator[tuple[str, DiskMesh]]:
     """The stand-ins up to a size, and the meshes of a folder, marked with a star."""
     for path in sorted(folder.iterdir()) if folder else ():
-        if is_mesh_file(path):
+        if is_named_like_a_mesh(path):
             yield f"{path.name}*", read_mesh(path)
     for name, row in ROWS.items():
         if row.faces <= most_faces:

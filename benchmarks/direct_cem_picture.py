@@ -22,7 +22,9 @@ import matplotlib.pyplot as plt
 def main() -> None:
     """Draw both panels and write the picture of the page."""
     mesh = hemi_ellipsoid(3000, x=2.5)
-    start, end = direct_cem(mesh, max_iterations=0), direct_cem(mesh, back=0)
+    weights = {"delaunay": False}  # as CEM has them
+    start = direct_cem(mesh, max_iterations=0, **weights)
+    end = direct_cem(mesh, back=0, **weights)
     by_length = np.exp(2j * np.pi * travelled(mesh.V[mesh.boundary]))
     figure, (ring, fall) = plt.subplots(1, 2, figsize=(9, 4.2), width_ratios=[1, 1.15])
 

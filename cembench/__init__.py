@@ -1,31 +1,115 @@
-"""cembench: benchmarking and reproducibility suite for conformal surface parameterization."""
+"""cembench: benchmarking and reproducibility suite for conformal surface parameterization.
 
+Map a surface and look at the result::
+
+    import cembench
+
+    result = cembench.parameterize("face.obj")
+    result.uv, result.metrics, result.save("face_uv.obj")
+
+Names are loaded when they are first used, so that importing the package costs little.
+"""
+
+from __future__ import annotations
+
+import importlib
 from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
 
-from cembench.core.errors import (
-    AlgorithmFailed,
-    CembenchError,
-    MeshError,
-    ParameterError,
-    RegistryError,
-)
-from cembench.core.parameterization import Parameterization
-from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.registry import algorithm, surface
+if TYPE_CHECKING:
+    from cembench.core.errors import (
+        AlgorithmFailed,
+        CembenchError,
+        DatasetError,
+        MeshError,
+        NotPositiveDefinite,
+        ParameterError,
+        RecordError,
+        RegistryError,
+        RenderError,
+    )
+    from cembench.core.parameterization import MapStep, Parameterization
+    from cembench.mesh.files import read_mesh, write_mesh
+    from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+    from cembench.registry import algorithm, surface_family
+    from cembench.workflows.benchmark import Run, benchmark
+    from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
+    from cembench.workflows.holes import holes
+    from cembench.workflows.morph_surfaces import morph
+    from cembench.workflows.parameterize import Result, parameterize
+    from cembench.workflows.theory_facts import theory
+    from cembench.workflows.validate import validate
 
-__version__ = version("cembench")
+#: Where each public name lies.
+_PLACES = {
+    "cembench.core.errors": (
+        "AlgorithmFailed",
+        "CembenchError",
+        "DatasetError",
+        "MeshError",
+        "NotPositiveDefinite",
+        "ParameterError",
+        "RecordError",
+        "RegistryError",
+        "RenderError",
+    ),
+    "cembench.core.parameterization": ("MapStep", "Parameterization"),
+    "cembench.mesh.files": ("read_mesh", "write_mesh"),
+    "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
+    "cembench.registry": ("algorithm", "surface_family"),
+    "cembench.workflows.benchmark": ("Run", "benchmark"),
+    "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
+    "cembench.workflows.holes": ("holes",),
+    "cembench.workflows.morph_surfaces": ("morph",),
+    "cembench.workflows.parameterize": ("Result", "parameterize"),
+    "cembench.workflows.theory_facts": ("theory",),
+    "cembench.workflows.validate": ("validate",),
+}
+_PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __all__ = [
     "AlgorithmFailed",
     "CembenchError",
+    "DatasetError",
     "DiskMesh",
     "HoledMesh",
+    "MapStep",
     "MeshError",
+    "NotPositiveDefinite",
     "ParameterError",
     "Parameterization",
+    "RecordError",
     "RegistryError",
+    "RenderError",
+    "Result",
+    "Run",
     "TriangleMesh",
     "__version__",
     "algorithm",
+    "benchmark",
+    "holes",
+    "list_algorithms",
+    "list_surfaces",
+    "morph",
+    "parameterize",
+    "read_mesh",
     "surface",
+    "surface_family",
+    "theory",
+    "validate",
+    "write_mesh",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("cembench")
+    if name not in _PLACE_OF:
+        raise AttributeError(f"module 'cembench' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_PLACE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -129,7 +129,7 @@ class Algorithm(_Registered):
 
 @dataclass(frozen=True)
 class Surface(_Registered):
-    """A surface family: see :func:`surface`."""
+    """A surface family: see :func:`surface_family`."""
 
     source: str = ""
     paper_row: str = ""
@@ -209,7 +209,7 @@ def algorithm(
     return mark
 
 
-def surface(
+def surface_family(
     name: str,
     *,
     title: str,
@@ -345,6 +345,7 @@ class Registry:
 
 R = TypeVar("R", Algorithm, Surface, Dataset)
 
+_DECORATORS: Mapping[type, str] = {Algorithm: "algorithm", Surface: "surface_family"}
 _GROUPS: Mapping[type, str] = {
     Algorithm: "cembench.algorithms",
     Surface: "cembench.surfaces",
@@ -417,7 +418,7 @@ def _declared_at(entry: Any, kind: type[R]) -> R:
         remedy = (
             f"make it a Dataset({entry.name!r}, ...)"
             if kind is Dataset
-            else f"decorate it with @{noun}({entry.name!r}, ...)"
+            else f"decorate it with @{_DECORATORS[kind]}({entry.name!r}, ...)"
         )
         raise RegistryError(
             f"entry point {entry.name} = {entry.value!r} of group {entry.group!r} is no {noun} of "
@@ -465,7 +466,7 @@ def declared_by(plugin: str) -> list[_Registered]:
     if not found:
         raise RegistryError(
             f"plug-in {plugin!r} declares nothing; decorate a function with @algorithm(...) or "
-            "@surface(...) from cembench."
+            "@surface_family(...) from cembench."
         )
     return found
 

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from cembench.core.errors import RegistryError
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .brain import human_brain_body
 from .bunny import stanford_bunny_body
@@ -148,7 +148,7 @@ def _registered(name: str) -> Callable[..., DiskMesh]:
 
     make.__name__ = make.__qualname__ = name.replace("-", "_")
     make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."
-    declare = surface(
+    declare = surface_family(
         name,
         title=row.model,
         source="procedural stand-in",

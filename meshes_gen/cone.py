@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .disk_grid import disk_grid
 
@@ -21,7 +21,7 @@ def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex
     return slant ** (1 / np.sin(np.deg2rad(angle))) * np.exp(1j * around)
 
 
-@surface("cone", title="Cone", source="closed form", exact_map=exact_map)
+@surface_family("cone", title="Cone", source="closed form", exact_map=exact_map)
 def cone(
     faces: Annotated[int, Field(ge=24)] = 20_000,
     *,

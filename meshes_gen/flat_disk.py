@@ -8,12 +8,12 @@ import numpy as np
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .disk_grid import disk_grid
 
 
-@surface("flat-disk", title="Flat disk", source="closed form")
+@surface_family("flat-disk", title="Flat disk", source="closed form")
 def flat_disk(
     faces: Annotated[int, Field(ge=24)] = 5_000,
     *,

@@ -8,12 +8,12 @@ import numpy as np
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .spherical_cap import spherical_cap
 
 
-@surface("hemi-ellipsoid", title="Half ellipsoid", source="closed form")
+@surface_family("hemi-ellipsoid", title="Half ellipsoid", source="closed form")
 def hemi_ellipsoid(
     faces: Annotated[int, Field(ge=24)] = 50_000,
     *,

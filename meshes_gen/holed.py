@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import HoledMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .cache import cached
 from .faces import HO, face_body, mask
@@ -51,7 +51,9 @@ def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
     return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(CAP) / 2)
 
 
-@surface("holed-cap", title="Spherical cap with holes", source="closed form", exact_map=exact_map)
+@surface_family(
+    "holed-cap", title="Spherical cap with holes", source="closed form", exact_map=exact_map
+)
 def holed_cap(
     faces: Annotated[int, Field(ge=2_000, le=4_000_000)] = 20_000,
     *,
@@ -76,7 +78,7 @@ def holed_cap(
     )
 
 
-@surface(
+@surface_family(
     "ho-face-with-holes", title="Ho's Face with Holes", source="procedural stand-in for the model"
 )
 def ho_face_with_holes(

@@ -10,7 +10,7 @@ from pydantic import Field
 from scipy.spatial import Delaunay
 
 from cembench.mesh.triangle_mesh import HoledMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -21,7 +21,7 @@ CLEAR = 0.6
 TURN = np.pi * (3 - np.sqrt(5))
 
 
-@surface("holed-disk", title="Flat disk with holes", source="closed form")
+@surface_family("holed-disk", title="Flat disk with holes", source="closed form")
 def holed_disk(
     faces: Annotated[int, Field(ge=500, le=4_000_000)] = 20_000,
     *,

@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .rectangle import rectangle_grid, rectangle_to_disk
 
@@ -23,7 +23,7 @@ Faces = Annotated[int, Field(ge=24)]
 Complex = NDArray[np.complex128]
 
 
-@surface("cylinder-sheet", title="Cylinder sheet", source="closed form")
+@surface_family("cylinder-sheet", title="Cylinder sheet", source="closed form")
 def cylinder_sheet(
     faces: Faces = 20_000,
     *,
@@ -42,7 +42,7 @@ def cylinder_sheet(
     return DiskMesh.from_arrays(V, F, name="cylinder-sheet")
 
 
-@surface("swiss-roll", title="Swiss roll", source="closed form")
+@surface_family("swiss-roll", title="Swiss roll", source="closed form")
 def swiss_roll(
     faces: Faces = 20_000,
     *,
@@ -65,7 +65,7 @@ def swiss_roll(
     return DiskMesh.from_arrays(V, F, name="swiss-roll")
 
 
-@surface("catenoid-sheet", title="Catenoid sheet", source="closed form")
+@surface_family("catenoid-sheet", title="Catenoid sheet", source="closed form")
 def catenoid_sheet(
     faces: Faces = 20_000,
     *,
@@ -88,7 +88,7 @@ def ring_map(V: NDArray[np.float64]) -> Complex:
     return np.exp(-V[:, 2] + 1j * np.arctan2(V[:, 1], V[:, 0]))
 
 
-@surface("catenoid-ring", title="Catenoid", source="closed form", exact_map=ring_map)
+@surface_family("catenoid-ring", title="Catenoid", source="closed form", exact_map=ring_map)
 def catenoid_ring(
     faces: Faces = 20_000, *, height: Annotated[float, Field(gt=0, le=6)] = 1.0
 ) -> HoledMesh:

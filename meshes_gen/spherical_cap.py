@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface
+from cembench.registry import surface_family
 
 from .disk_grid import disk_grid
 
@@ -19,7 +19,7 @@ def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex
     return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(angle) / 2)
 
 
-@surface("spherical-cap", title="Spherical cap", source="closed form", exact_map=exact_map)
+@surface_family("spherical-cap", title="Spherical cap", source="closed form", exact_map=exact_map)
 def spherical_cap(
     faces: Annotated[int, Field(ge=24)] = 20_000,
     *,

@@ -2,13 +2,20 @@ import textwrap
 
 import pytest
 
-from cembench import DiskMesh, ParameterError, Parameterization, RegistryError, algorithm, surface
+from cembench import (
+    DiskMesh,
+    ParameterError,
+    Parameterization,
+    RegistryError,
+    algorithm,
+    surface_family,
+)
 from cembench.registry import load_algorithm, load_registry
 
 GOOD = """
     from typing import Annotated
     from pydantic import Field
-    from cembench import DiskMesh, Parameterization, algorithm, surface
+    from cembench import DiskMesh, Parameterization, algorithm, surface_family
 
     @algorithm("mine", title="Mine", target="disk")
     def mine(mesh: DiskMesh, *, steps: Annotated[int, Field(ge=0)] = 3) -> Parameterization:
@@ -18,7 +25,7 @@ GOOD = """
         '''
         raise NotImplementedError
 
-    @surface("plate", title="Plate")
+    @surface_family("plate", title="Plate")
     def plate(faces: int = 100, *, seed: int = 0) -> DiskMesh:
         raise NotImplementedError
 """
@@ -109,7 +116,7 @@ def test_decorators_leave_the_function_alone():
         """Is it called?"""
         return "called"  # type: ignore[return-value]
 
-    @surface("here", title="Here")
+    @surface_family("here", title="Here")
     def here(faces: int = 10) -> DiskMesh:
         """Is it called?"""
         return faces  # type: ignore[return-value]

@@ -18,18 +18,12 @@ from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
-from cembench.conformal.metrics import SampledAngleError
 from cembench.core.clock import phase
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
-from .gauge_walk import STEPS, gauge_walk
-
 Real = NDArray[np.float64]
-
-#: What share of E_C the way back towards harmonic measure may cost.
-MOST_COST = 0.01
 
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
@@ -39,32 +33,29 @@ def direct_cem(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=0, le=1_000_000)] = 50,
     gauge: Gauge = "boundary",
-    back: Annotated[float, Field(ge=0, le=1)] = 0.3,
-    delaunay: bool = False,
+    back: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.01,
+    delaunay: bool = True,
 ) -> Parameterization:
-    """Which boundary on the unit circle has the least conformal energy? Newton's method finds it.
+    """Minimise the conformal energy over where the boundary lies on the circle, by Newton's method.
 
     E_C of the harmonic map (Eqs. 5, 7, 8) is a function of the boundary's angles alone,
     z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first,
     boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block:
     Newton steps (trust region, preconditioned by S^-1) touch nothing but the boundary.
 
-    Decided here: the start is the harmonic measure of the boundary from the triangle nearest to the
-    mean vertex, or arc length where that has lower energy (`start`); it is brought into the
-    `gauge`, that is, a mean comes to lie at 0: of the boundary by length, of that triangle, or of
-    the surface by area; from there Moebius maps are held by the start's arcs. Iteration ends when
-    the gradient, whose squared norm is about twice what E_C can still fall, says that this is at
-    most the share `tolerance` of E_C (`stopped`: "gradient"), when nothing is left but rounding
-    ("rounding"), after `max_iterations` ("iterations"), or when too many arcs would fall below a
-    tenth of their length at the start ("crowded"; `held_arcs` counts those held). Near its minimum
-    E_C is flat, angles are not: so the boundary then goes the share `back` of the way to harmonic
-    measure, whose angles are better on coarse boundaries. Of what E_C fell that costs the share
-    back^2; less of the way is gone where that would be more than 1 % of E_C, and none with 0. With
-    the gauge "boundary" the mean then leaves 0, by 0.05 at a time and five times at most
-    (`gauge_steps`), while E_C falls by 0.15 % at least, and by twenty times the share by which the
-    mean angle error grows. Folds are mended as in CEM (`fold_repairs`). `delaunay` takes the
-    weights of the intrinsic Delaunay triangulation, in the energy history too;
-    `folded_before_repair` then counts the folds that the original edges force, and they stay.
+    Decided here: weights are those of the intrinsic Delaunay triangulation, of which none is
+    negative; with `delaunay` off they are the cotangents of the mesh's own edges, as in CEM. The
+    energies recorded are with the weights used. The start is the harmonic measure of the boundary
+    from the triangle nearest to the mean vertex, or arc length where that has lower energy
+    (`start`); it is brought into the `gauge`, that is, a mean comes to lie at 0: of the boundary by
+    length, of that triangle, or of the surface by area; from there Moebius maps are held by the
+    start's arcs. Iteration ends when the gradient, whose squared norm is about twice what E_C can
+    still fall, says that this is at most the share `tolerance` of E_C (`stopped`: "gradient"), when
+    nothing is left but rounding ("rounding"), after `max_iterations` ("iterations"), or when too
+    many arcs would fall below a tenth of their length at the start ("crowded"; `held_arcs` counts
+    those held). Near its minimum E_C is flat, angles are not, and harmonic measure has better ones:
+    so the boundary then goes back towards it as far as that costs no more than the share `back` of
+    E_C; 0 leaves the least E_C. Folds are repaired as in CEM (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
@@ -82,15 +73,12 @@ def direct_cem(
     if share:
         here = here.at(in_gauge(here.domain.towards(start, share), held))
         energies += (here.energy,)
-    steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(here, bordered.harmonic_extension, SampledAngleError(mesh), steps)
-    energies += walked
+    uv = bordered.harmonic_extension(here.domain.points)
     uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
         "start": begun,
-        "gauge_steps": len(walked),
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
         **repair,
@@ -98,16 +86,16 @@ def direct_cem(
     return Parameterization(uv, len(energies) - 1, energies, extras)
 
 
-def _share(back: float, energies: tuple[float, ...]) -> float:
-    """Which share of the way back costs no more than it may, E_C being a parabola on it?"""
+def _share(cost: float, energies: tuple[float, ...]) -> float:
+    """Return the share of the way back that raises E_C by `cost`, E_C being a parabola on it."""
     fallen = energies[0] - energies[-1]
-    return min(back, (MOST_COST * energies[-1] / fallen) ** 0.5) if fallen > 0 else 0.0
+    return min(1.0, (cost * energies[-1] / fallen) ** 0.5) if fallen > 0 else 0.0
 
 
 def _start(
     mesh: DiskMesh, S: DirichletToNeumann, seen: Real, weights: Real
 ) -> tuple[CircleDomain, str]:
-    """Which start has the lower energy in the gauge: harmonic measure, or arc length? And its name.
+    """Return the start of lower energy in the gauge, harmonic measure or arc length, and its name.
 
     `seen` is the harmonic measure from the middle triangle.
     """

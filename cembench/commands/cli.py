@@ -16,9 +16,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
+from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
 from cembench.commands import morph as morph_verbs
+from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
 from cembench.commands import theory as theory_verbs
@@ -41,13 +43,14 @@ from cembench.commands.options import (
     Memory,
     Parameters,
     Plugins,
+    Repair,
     Repeats,
     Seed,
     Threads,
     Timeout,
     memory_bytes,
 )
-from cembench.core.errors import ParameterError
+from cembench.core.errors import MeshError, ParameterError
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
 
@@ -64,13 +67,34 @@ if TYPE_CHECKING:
 app = typer.Typer(
     cls=Verbs,
     no_args_is_help=True,
-    add_completion=False,
+    add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
 )
 Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from cembench import __version__
+
+        out.print(f"cembench {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _global_options(
+    *,
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Take the options that belong to no verb."""
 
 
 #: What `map` takes where the user names no algorithm: the first that takes the surface.
@@ -157,11 +181,16 @@ def list_(
 @app.command(
     "map",
     epilog="Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
-    "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand",
+    "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand  ·  "
+    "cembench map scan.obj --repair -o scan_uv.obj  ·  cembench map head.obj --cut -o uv.obj  ·  "
+    "cembench map a.obj b.obj -o maps/",
 )
 def map_(
-    mesh: Annotated[
-        Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`.")
+    meshes: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="MESH...", help="Surfaces: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`."
+        ),
     ],
     *,
     algorithm: Annotated[
@@ -174,7 +203,10 @@ def map_(
     ] = None,
     parameter: Parameters = [],  # noqa: B006
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Surface with UVs: OBJ or PLY.")
+        Path | None,
+        typer.Option(
+            "-o", "--output", help="Surface with UVs: OBJ or PLY. Of several surfaces: a folder."
+        ),
     ] = None,
     preview: Annotated[
         bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
@@ -186,7 +218,15 @@ def map_(
         ),
     ] = False,
     force: Annotated[
-        bool, typer.Option("--force", help="Write over the input, or a picture not made here.")
+        bool,
+        typer.Option(
+            "--force", help="Write over the input, a picture not made here, or FOLDER's files."
+        ),
+    ] = False,
+    mend: Repair = False,
+    cut: Annotated[
+        bool,
+        typer.Option("--cut", help="Cut the surface into a disk first, as `cembench cut` does."),
     ] = False,
     plugin: Plugins = [],  # noqa: B006
     solves: SolvesOption = Solves.reuse,
@@ -196,68 +236,87 @@ def map_(
     memory: Memory = None,
     as_json: Json = False,
 ) -> None:
-    """Map one surface, check the map, and write it.
+    """Map surfaces, check the maps, and write them.
 
-    The UVs are the map itself (the unit disk for target "disk"), with 17 significant digits.
+    The UVs are the map itself (the unit disk for target "disk"), as the shortest decimals that read
+    back as the same numbers. An OBJ file keeps what else it has: groups, materials, normals,
+    colours, polygons. Of a surface that is --cut, the uncut one is written, with a UV per corner.
     """
-    from cembench.core.names import file_name
-    from cembench.core.outputs import refuse_inputs
+    from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.drawing.own_pictures import check_replaceable
-    from cembench.mesh.files import check_writable_format, write_mesh
     from cembench.report.render.terminal import figures_table
     from cembench.results.record_rows import row
     from cembench.running.local import Options, map_once
-    from cembench.running.plan import (
-        MeasurementSettings,
-        paper_role_of_file,
-        plan_cells,
-        read_mesh_for,
-    )
+    from cembench.running.plan import MeasurementSettings, paper_role_of_file, plan_cells
+    from cembench.running.surface_file import read_surface_file, write_map
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     registry = registry_with(plugin)
     candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
-    if output is not None:
-        check_writable_format(output, with_uv=True)
-    if not mesh.exists() and str(mesh) in registry.datasets:
-        mesh = fetch_verbs.fetched(registry.dataset(str(mesh)))
-    if output is not None:
-        refuse_inputs(output, [mesh], force=force)
-    with err.status("reading", spinner="line"):
-        surface = read_mesh_for(mesh, candidates)
-        chosen = next(a for a in candidates if isinstance(surface, a.mesh_type))
-        usual = Path(f"{file_name(f'{mesh.stem}_{chosen.name}')}.png")
-        picture = usual if output is None else output.with_suffix(".png")
-        if preview and not force:
+    if cut:
+        _check_takes_disks(candidates)
+    outputs = _outputs(meshes, output, cut=cut)
+    known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
+    fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
+    sources = [fetched.get(path, path) for path in meshes]
+    targets = [target for target in outputs if target is not None]
+    for target in targets:
+        refuse_inputs(target, sources, force=force)
+    if output not in outputs:
+        refuse_present(targets, force=force)
+    found = []
+    for source in sources:
+        with err.status(f"reading {source}", spinner="line"):
+            found.append(read_surface_file(source, candidates, mend=mend, cut=cut))
+    chosen = [next(a for a in candidates if isinstance(file.mesh, a.mesh_type)) for file in found]
+    pictures: list[Path] = []
+    if preview:
+        pictures = _pictures(sources, chosen, outputs)
+        for picture in pictures if not force else ():
             check_replaceable(picture)
-        standing = {surface.name: paper_role_of_file(registry, mesh, surface)}
     how = MeasurementSettings(solves.value, _installed(backend), threads, repeats=1)
-    tasks = plan_cells([chosen], [surface], assignments(parameter), how, plugin, standing)
-    with err.status(f"{chosen.title} on {surface.m:,} triangles", spinner="line"):
-        record, uv = map_once(tasks[0], options)
-    ok = record.outcome.status == "ok"
-    written: dict[str, str] = {}
-    if uv is not None and (ok or keep_invalid):
-        if output is not None:
-            write_mesh(output, surface, uv)
-            written["output"] = str(output)
-        if preview:
-            with err.status("drawing", spinner="line"):
-                written["preview"] = str(picture)
-                _draw(surface, uv, picture, record)
+    tasks = []
+    for file, taken in zip(found, chosen, strict=True):
+        standing = {file.mesh.name: paper_role_of_file(registry, file.path, file.mesh)}
+        given = assignments(parameter)
+        tasks += plan_cells([taken], [file.mesh], given, how, plugin, standing)
+    for folder in {target.parent for target in targets}:
+        folder.mkdir(exist_ok=True)
+    rows, failures = [], []
+    for k, (file, task) in enumerate(zip(found, tasks, strict=True)):
+        with err.status(f"{task.algorithm.title} on {file.mesh.m:,} triangles", spinner="line"):
+            record, uv = map_once(task, options)
+        ok = record.outcome.status == "ok"
+        written: dict[str, str] = {}
+        if uv is not None and (ok or keep_invalid):
+            where_to = outputs[k]
+            if where_to is not None:
+                write_map(where_to, file, uv)
+                written["output"] = str(where_to)
+            if preview:
+                with err.status("drawing", spinner="line"):
+                    written["preview"] = str(pictures[k])
+                    _draw(file.mesh, uv, pictures[k], record)
+        repaired = {"repair": file.repaired.counts} if file.repaired else {}
+        rows.append(row(record) | repaired | written)
+        if not as_json:
+            _print_notices([file.mesh])
+            out.print(figures_table(record))
+            for what, where in written.items():
+                print_pair(what, where)
+            if uv is not None and not written:
+                more = "" if ok or keep_invalid else " --keep-invalid"
+                hint = f"Nothing was written; add{more} -o FILE.obj to keep the map."
+                out.print(hint, style="dim")
+        if not ok:
+            kept = " (this map was written all the same: --keep-invalid)" if written else ""
+            which = f"{file.path}: " if len(found) > 1 else ""
+            failures.append(f"{which}{record.outcome.status}: {record.outcome.cause}{kept}")
     if as_json:
-        print_json(row(record) | written)
-    else:
-        _print_notices([surface])
-        out.print(figures_table(record))
-        for what, where in written.items():
-            print_pair(what, where)
-        if uv is not None and not written:
-            more = "" if ok or keep_invalid else " --keep-invalid"
-            out.print(f"Nothing was written; add{more} -o FILE.obj to keep the map.", style="dim")
-    if not ok:
-        kept = " (this map was written all the same: --keep-invalid)" if written else ""
-        complain(f"{record.outcome.status}: {record.outcome.cause}{kept}")
+        print_json(rows if len(rows) > 1 else rows[0])
+    for failure in failures:
+        complain(failure)
+    if failures:
         raise typer.Exit(1)
 
 
@@ -309,6 +368,7 @@ def run(
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
     ] = Path("results/run"),
+    mend: Repair = False,
     fresh: Fresh = False,
     rerun_failed: Annotated[
         bool, typer.Option("--rerun-failed", help="Measure again what did not end ok.")
@@ -346,7 +406,7 @@ def run(
             "`cembench fetch`) or --surfaces NAME (see `cembench list surfaces`)."
         )
     with err.status("reading surfaces", spinner="line"):
-        found, standing = gather_surfaces(registry, chosen, files, generated, faces)
+        found, standing = gather_surfaces(registry, chosen, files, generated, faces, mend=mend)
     tasks = []
     for policy in policies:
         how = MeasurementSettings(policy, _installed(backend), threads, repeats)
@@ -443,9 +503,85 @@ _MORE = (
     theory_verbs,
     morph_verbs,
     fetch_verbs,
+    repair_verbs,
+    cut_verbs,
 )
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
+
+
+def _check_takes_disks(candidates: Sequence[Algorithm]) -> None:
+    """Raise :class:`ParameterError` where no algorithm maps what a cut makes."""
+    from cembench.mesh.triangle_mesh import DiskMesh
+
+    if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
+        raise ParameterError(
+            f"--cut makes a disk, which {candidates[0].name} does not take; name an algorithm for "
+            "disks (see `cembench list algorithms`)."
+        )
+
+
+def _pictures(
+    sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
+) -> list[Path]:
+    """Return where the picture of each surface goes: beside its output, or here.
+
+    Raises
+    ------
+    ParameterError
+        Two would have one name.
+
+    """
+    from cembench.core.names import file_name
+
+    pictures = [
+        Path(f"{file_name(f'{source.stem}_{algorithm.name}')}.png")
+        if target is None
+        else target.with_suffix(".png")
+        for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
+    ]
+    twice = [picture for picture in pictures if pictures.count(picture) > 1]
+    if twice:
+        raise ParameterError(f"two pictures would be {twice[0]}; draw them one after another.")
+    return pictures
+
+
+def _outputs(meshes: Sequence[Path], output: Path | None, *, cut: bool) -> list[Path | None]:
+    """Return where the map of each surface goes: a file, or files of a folder for several.
+
+    Raises
+    ------
+    MeshError
+        A format that cannot hold the UVs, or a folder that is not there.
+    ParameterError
+        Two surfaces of one name, or a file for several surfaces.
+
+    """
+    from cembench.mesh.files import check_writable_format
+    from cembench.running.surface_file import check_map_format
+
+    if output is None:
+        return [None] * len(meshes)
+    if len(meshes) == 1 and not output.is_dir():
+        check_writable_format(output, with_uv=True)
+        check_map_format(output, cut=cut)
+        return [output]
+    if output.is_file() or output.suffix:
+        raise ParameterError(
+            f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with -o."
+        )
+    if not output.parent.is_dir():
+        raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")
+    files = [
+        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' and not cut else '.obj'}"
+        for path in meshes
+    ]
+    twice = [file for file in files if files.count(file) > 1]
+    if twice:
+        raise ParameterError(
+            f"two surfaces would be written to {twice[0]}; map them into different folders."
+        )
+    return list(files)
 
 
 def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:

@@ -56,6 +56,28 @@ Repeats = Annotated[
 Seed = Annotated[
     int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random order within a round.")
 ]
+Repair = Annotated[
+    bool, typer.Option("--repair", help="Mend the mesh files first, as `cembench repair` does.")
+]
+Weld = Annotated[
+    float,
+    typer.Option(
+        metavar="TOLERANCE",
+        min=0.0,
+        max=1e60,
+        callback=finite,
+        help="Weld vertices at most this far apart, in the file's units; 0: equal ones.",
+    ),
+]
+FillHoles = Annotated[
+    int,
+    typer.Option(
+        metavar="N",
+        min=0,
+        max=MOST_FACES,
+        help="Fill holes of at most N edges; the longest loop stays.",
+    ),
+]
 Verify = Annotated[
     bool,
     typer.Option("--verify", help="Recompute the figures of all maps, not only of a sample."),

@@ -31,7 +31,8 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
     from cembench.results.verify import Depth, Kind
     from cembench.results.verify import verify as verify_run
 
-    store = _existing(Store(run))
+    store = Store(run)
+    store.check_is_there()
     verified = verify_run(store, Depth.everything if verify else Depth.sample)
     held = {record.cell.label: record for record in verified.records}
     damaged = {f.file.stem for f in verified.findings if f.kind is Kind.damaged} - held.keys()
@@ -204,8 +205,7 @@ def merge(
         sound_records(Store(run), depth)
     if (output / "records").is_dir():
         sound_records(into, depth)
-    with into.locked():
-        count = merged([Store(run) for run in runs], into)
+    count = merged([Store(run) for run in runs], into)
     machines = sorted({record.environment for record in into.records()})
     if as_json:
         print_json({"output": str(output), "cells": count, "environments": machines})
@@ -241,14 +241,6 @@ def export(
         print_json({"output": str(path), "rows": len(found)})
     else:
         out.print(f"{len(found)} rows in {path}", soft_wrap=True)
-
-
-def _existing(store: Store) -> Store:
-    if not store.folder.is_dir():
-        raise RecordError(
-            f"{store.folder} holds no run: there is no such folder. Make one with `cembench run`."
-        )
-    return store
 
 
 def _state(store: Store, record: Record | None, cell: Cell) -> str:

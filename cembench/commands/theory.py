@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -13,15 +14,9 @@ from cembench.commands.run import DEFAULT_RUN
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import DiskMesh
+    from cembench.registry import Algorithm
     from cembench.results.exhibits import Exhibit
     from cembench.workflows.theory import Check
-
-#: The algorithm whose course is shown beside CEM's, where it is installed.
-RIVAL = "direct-cem"
-#: After how many iterations the table of energies looks.
-LOOKS = (0, 20, 200)
-#: K is formed, for the statements on its entries, up to so many boundary vertices.
-DENSE = 1200
 
 
 def theory(
@@ -54,6 +49,8 @@ def theory(
     registry = load_registry()
     surfaces = [surface_named(registry, name, DiskMesh, faces) for name in meshes]
     found: list[tuple[dict[str, Any], Exhibit]] = []
+    from cembench.workflows.theory_facts import RIVAL
+
     rival = registry.algorithms.get(RIVAL)
     size = "" if faces is None else f" --faces {faces}"
     for name, mesh in zip(meshes, surfaces, strict=True):
@@ -70,61 +67,28 @@ def theory(
 
 
 def _examine(
-    mesh: DiskMesh, rival: Any, iterations: int, run: Path, command: str
+    mesh: DiskMesh, rival: Algorithm | None, iterations: int, run: Path, command: str
 ) -> tuple[dict[str, Any], Exhibit]:
     from cembench.results.exhibits import Exhibit, ExhibitPicture, exhibit_folder, write_exhibit
-    from cembench.workflows.theory import (
-        BoundaryOperator,
-        predicted_rate,
-        premises,
-        statements,
-        trajectory,
-    )
+    from cembench.workflows.theory_facts import theory_facts
     from cembench.workflows.theory_plot import write_theory_plot
 
     name = f"theory-{mesh.name}"
     folder = exhibit_folder(run, name)  # complains now of what it could not write in the end
-    K = BoundaryOperator(mesh)
-    dense = K.size <= DENSE
-    paths = {
-        "CEM, step (23)": trajectory(K, iterations, inversion=False),
-        "CEM, step (30)": trajectory(K, iterations, inversion=True),
-    }
-    plain, inverse = paths.values()
-    given, said = premises(K), statements(K, plain, inverse, dense=dense)
-    leading, _ = K.leading_eigenpairs()
-    others, missing = _rival_history(rival, mesh)
-    rate = predicted_rate(leading)
-    facts: dict[str, Any] = {
-        "mesh": mesh.name,
-        "vertices": mesh.n,
-        "boundary_vertices": K.size,
-        "premises_hold": all(check.holds for check in given),
-        # The first claims nothing: see the check's source.
-        "statements_hold": all(c.holds for c in said if c.source != "not claimed"),
-        "premises": [_as_dict(check) for check in given],
-        "statements": [_as_dict(check) for check in said],
-        "eigenvalues": leading.tolist(),
-        "gap": float(1 - leading[1]),
-        "rate_predicted": rate,
-        "rate_23": plain.rate,
-        "rate_30": inverse.rate,
-        "rises_23": _rises(plain),
-        "rises_30": _rises(inverse),
-        "energies": _energies(paths, others),
-    }
+    found = theory_facts(mesh, rival, iterations)
+    facts = dict(found.facts)
     write_theory_plot(
         folder / "theory.png",
-        f"{mesh.name}: {mesh.n:,} vertices, {K.size} on the boundary",
-        (K.spectrum() if dense else leading).tolist(),
-        paths,
-        others,
-        rate,
+        f"{mesh.name}: {mesh.n:,} vertices, {facts['boundary_vertices']} on the boundary",
+        found.spectrum,
+        found.trajectories,
+        found.others,
+        facts["rate_predicted"],
     )
     exhibit = Exhibit(
         name=name,
         title=f"Section 4 on {mesh.name}",
-        text=_summary(facts) + (f" {missing}" if missing else ""),
+        text=_summary(facts) + (f" {found.missing}" if found.missing else ""),
         command=command,
         origin="surface",
         pictures=(
@@ -134,55 +98,11 @@ def _examine(
                 alternative=_summary(facts),
             ),
         ),
-        tables=_tables(given, said, facts["energies"]),
+        tables=_tables(found.premises, found.statements, facts["energies"]),
         facts=facts,
     )
     write_exhibit(run, exhibit)
     return facts, exhibit
-
-
-def _as_dict(check: Check) -> dict[str, Any]:
-    from dataclasses import asdict
-
-    return asdict(check)
-
-
-def _rises(path: Any) -> dict[str, float | int]:
-    """How often E_C rises by more than rounding, and by how much together and at most."""
-    from cembench.workflows.theory import TOLERANCE
-
-    rises = path.rises[path.rises > TOLERANCE * abs(path.energies[0])]
-    return {
-        "count": len(rises),
-        "largest": float(rises.max(initial=0.0)),
-        "together": float(rises.sum()),
-    }
-
-
-def _rival_history(rival: Any, mesh: DiskMesh) -> tuple[dict[str, tuple[float, ...]], str]:
-    """The energies of the algorithm beside CEM; or why there are none."""
-    from cembench.core.errors import AlgorithmFailed
-
-    if rival is None or not isinstance(mesh, rival.mesh_type):
-        return {}, f"{RIVAL} is not installed here." if rival is None else ""
-    try:
-        result = rival.function(mesh.fresh(), **rival.arguments({}))
-    except AlgorithmFailed as error:
-        return {}, f"{rival.title} failed: {error}."
-    if not result.energy_history:
-        return {}, f"{rival.title} tells no energies."
-    return {rival.title: result.energy_history}, ""
-
-
-def _energies(paths: Any, others: Any) -> list[dict[str, Any]]:
-    """E_C at the start, after 20 and after 200 iterations, and the lowest; None where none is."""
-    curves = {name: path.energies.tolist() for name, path in paths.items()}
-    curves |= {name: list(history) for name, history in others.items()}
-    rows = []
-    for name, curve in curves.items():
-        at = {f"after_{k}": curve[k] if k < len(curve) else None for k in LOOKS}
-        rows.append({"name": name} | at | {"last": curve[-1], "iterations": len(curve) - 1})
-    return rows
 
 
 def _summary(facts: dict[str, Any]) -> str:
@@ -203,10 +123,11 @@ def _summary(facts: dict[str, Any]) -> str:
     return words + speed
 
 
-def _tables(given: list[Check], said: list[Check], energies: list[dict[str, Any]]) -> Any:
+def _tables(given: Sequence[Check], said: Sequence[Check], energies: list[dict[str, Any]]) -> Any:
     from cembench.results.exhibits import ExhibitTable
+    from cembench.workflows.theory_facts import LOOKS
 
-    def of(title: str, checks: list[Check]) -> ExhibitTable:
+    def of(title: str, checks: Sequence[Check]) -> ExhibitTable:
         rows = tuple(
             (c.name, c.source, "yes" if c.holds else "NO", c.figure, c.meaning) for c in checks
         )
@@ -229,6 +150,7 @@ def _show(facts: dict[str, Any], exhibit: Exhibit, run: Path) -> None:
     from rich.text import Text
 
     from cembench.results.exhibits import place_of
+    from cembench.workflows.theory_facts import LOOKS
 
     vertices = f"{facts['vertices']:,} vertices, {facts['boundary_vertices']} on the boundary"
     out.print(f"{facts['mesh']}: {vertices}", style="bold", markup=False)

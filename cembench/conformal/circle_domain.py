@@ -31,7 +31,7 @@ _ROUNDING, _WIDE = 1e-9, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Rims:
+class BoundaryLoops:
     """Which of B boundary vertices lie on which of K circles, loop behind loop; one is outside.
 
     Parameters
@@ -101,7 +101,7 @@ class CircleDomain:
 
     Parameters
     ----------
-    rims : Rims
+    rims : BoundaryLoops
         Which vertices lie on which circle.
     arcs : float (B,)
         From each vertex to the next of its loop, radians, positive.
@@ -114,7 +114,7 @@ class CircleDomain:
 
     """
 
-    rims: Rims
+    rims: BoundaryLoops
     arcs: Real
     turns: Real
     centres: Complex
@@ -125,7 +125,7 @@ class CircleDomain:
     def of_arcs(cls, arcs: Real) -> CircleDomain:
         """The unit disk, with such arcs in proportion, all positive, from 1 on; (B,)."""
         arcs = arcs * (2 * np.pi / arcs.sum())
-        rims, least = Rims((len(arcs),)), LEAST_SHARE * arcs
+        rims, least = BoundaryLoops((len(arcs),)), LEAST_SHARE * arcs
         return cls(rims, arcs, np.zeros(1), np.zeros(1, complex), np.ones(1), least)
 
     @property
@@ -218,7 +218,7 @@ class CircleDomain:
             Moebius(0, self.radii[k], 1, -self.centres[k]), replace(self.rims, outer=k)
         )
 
-    def _image(self, phi: Moebius, rims: Rims) -> CircleDomain:
+    def _image(self, phi: Moebius, rims: BoundaryLoops) -> CircleDomain:
         """The image by a Moebius map that takes the outer circle of `rims` to the unit circle.
 
         Circles go to circles; arcs stay as exact as they are, however short.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.boundary_energy import EnergyModel
-from cembench.conformal.circle_domain import LEAST_SHARE, CircleDomain, Rims
+from cembench.conformal.circle_domain import LEAST_SHARE, BoundaryLoops, CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.patches import disk_patch
 from cembench.conformal.planar import backward_arcs, polygon_area
@@ -65,7 +65,7 @@ def filled_start(
         Which loop goes to the unit circle.
 
     """
-    rims = Rims(tuple(len(along) for along in lengths), outer)
+    rims = BoundaryLoops(tuple(len(along) for along in lengths), outer)
     own = equilibrium_measures(S, rims)
     arcs = np.empty(len(own))
     for k, part in enumerate(_parts(rims)):
@@ -89,14 +89,14 @@ def filled_start(
     return min(domains, key=lambda domain: EnergyModel(S, domain, domain.outer_measure).energy)
 
 
-def equilibrium_measures(S: DirichletToNeumann, rims: Rims) -> Real:
+def equilibrium_measures(S: DirichletToNeumann, rims: BoundaryLoops) -> Real:
     """Return the equilibrium measure of each loop, the others held at 0; (B,), each 1 in sum."""
     potentials = (rims.loop[:, None] == np.arange(len(rims.sizes))).astype(np.float64)
     fluxes = S(potentials)[np.arange(len(rims.loop)), rims.loop]
     return fluxes / rims.sums(fluxes)[rims.loop]
 
 
-def _parts(rims: Rims) -> list[slice]:
+def _parts(rims: BoundaryLoops) -> list[slice]:
     """Return where each loop lies in the boundary."""
     return [slice(a, a + size) for a, size in zip(rims.starts, rims.sizes, strict=True)]
 
@@ -106,7 +106,7 @@ def _of_circle(arcs: Real) -> Real:
     return arcs * (2 * np.pi / arcs.sum())
 
 
-def _fitted(rims: Rims, arcs: Real, outside: Real, to_holes: Real) -> CircleDomain:
+def _fitted(rims: BoundaryLoops, arcs: Real, outside: Real, to_holes: Real) -> CircleDomain:
     """Return the domain with arcs `outside` on the outer circle, and the holes where they then go.
 
     `to_holes` takes values on the outer boundary to the holes' vertices. The centre of a circle is

@@ -180,9 +180,7 @@ class _Patches:
         scale = sparse.diags_array(1 / np.sqrt(A.diagonal()))
         A = scale @ A @ scale + REGULAR * sparse.eye_array(2 * k)
         step = -(scale @ Cholesky(sparse.csc_array(A)).solve(scale @ gradient))
-        move: Complex = step[:k] + 1j * step[k:]
-        uphill: Complex = gradient[:k] + 1j * gradient[k:]
-        return move, uphill
+        return step[:k] + 1j * step[k:], gradient[:k] + 1j * gradient[k:]
 
     def line_search(
         self, moving: Complex, step: Complex, slope: Real, eps: Real
@@ -208,8 +206,9 @@ def _derivatives(V: Real, T: Indices) -> tuple[Complex, Complex, Real]:
     flat[:, 1], flat[:, 2] = length, (dots[:, 0] + 1j * double_area) / length
     opposite = np.roll(flat, -2, axis=1) - np.roll(flat, -1, axis=1)
     gradient: Complex = 1j * opposite / double_area[:, None]
-    conjugate: Complex = np.conj(gradient)
-    return conjugate / 2, gradient / 2, double_area / 2
+    to_zbar: Complex = gradient / 2
+    area: Real = double_area / 2
+    return np.conj(to_zbar), to_zbar, area
 
 
 def _ratio(f_z: Complex, f_zbar: Complex, eps: Real) -> tuple[Real, Real, Real]:

@@ -17,6 +17,9 @@ class NoticeKind(StrEnum):
     #: Lines of a file that its format does not know were ignored.
     LINES_IGNORED = "lines_ignored"
     POLYGONS_CUT = "polygons_cut"
+    #: Something was mended on request.
+    REPAIRED = "repaired"
+    CUT_OPEN = "cut_open"
     ORIENTATION_REPAIRED = "orientation_repaired"
     #: Triangles so thin that cotangents lose digits.
     SLIVERS = "slivers"

@@ -27,3 +27,16 @@ def refuse_existing(output: Path, *, overwrite: bool) -> None:
         raise ParameterError(
             f"{output} is there already. Name another place, or pass overwrite=True to replace it."
         )
+
+
+def refuse_present(outputs: Iterable[Path], *, force: bool) -> None:
+    """Raise :class:`ParameterError` where a file is in the way of one that the user did not name.
+
+    Such names are made from those that the user gave.
+    """
+    for output in outputs:
+        if not force and (output.exists() or output.is_symlink()):
+            raise ParameterError(
+                f"{output} is there already. Name another place with -o, or add --force to write "
+                "over it."
+            )

@@ -20,8 +20,11 @@ from numpy.typing import ArrayLike, NDArray
 from cembench.core.atomic import write_by
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.defects import located
+from cembench.mesh.obj_text import obj_text
 from cembench.mesh.reading import READERS as _READERS
 from cembench.mesh.reading import read_soup
+from cembench.mesh.repair import Repaired, repair
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
@@ -40,15 +43,30 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
         The file is missing, empty, of unknown format or damaged, or its mesh fails a check.
 
     """
+    return checked(read_soup(path), mesh_type, Path(path))
+
+
+def read_repaired(path: Path) -> tuple[Soup, Repaired]:
+    """Read a file and repair it: the largest surface in it, and what was done.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or nothing is left of its mesh.
+
+    """
     soup = read_soup(path)
     try:
-        return checked(soup, mesh_type)
+        repaired = repair(soup.V, soup.polygons)
     except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
+        raise located(error, path) from None
+    V, F = repaired.surfaces[0]
+    notices = soup.notices + repaired.notices
+    return Soup(V, F.ravel(), np.full(len(F), 3), soup.name, notices), repaired
 
 
-def checked(soup: Soup, mesh_type: type[M]) -> M:
-    """Check polygons as a surface of this kind, cut into triangles.
+def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
+    """Check the polygons of a file as a surface of this kind, cut into triangles.
 
     Raises
     ------
@@ -61,7 +79,10 @@ def checked(soup: Soup, mesh_type: type[M]) -> M:
     if polygons:
         told = f"{polygons} polygons were cut into triangles"
         notices += (Notice(NoticeKind.POLYGONS_CUT, told),)
-    return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
+    try:
+        return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
+    except MeshError as error:
+        raise located(error, path) from None
 
 
 def write_mesh(
@@ -70,9 +91,9 @@ def write_mesh(
     """Write the surface, and the map as its texture coordinates, in full precision.
 
     The file appears whole or not at all, and only if it holds every coordinate and every triangle
-    when it is read back: libraries that write do not all report a full disk. UVs have 17
-    significant digits (OBJ) or are float64 (PLY): with fewer, triangles fold where the map shrinks
-    the surface. They are the map itself, not moved into the unit square.
+    when it is read back: libraries that write do not all report a full disk. UVs are the shortest
+    decimals that read back as the same numbers (OBJ) or float64 (PLY): with fewer digits, triangles
+    fold where the map shrinks the surface. They are the map itself, not moved into the unit square.
 
     Raises
     ------
@@ -108,11 +129,8 @@ def check_writable_format(path: Path, *, with_uv: bool) -> None:
 
 
 def _write_obj(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
-    nothing, none = np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
-    if UV is None:
-        igl.writeOBJ(path, mesh.V, mesh.F)
-    else:
-        igl.writeOBJ(path, mesh.V, mesh.F, nothing, none, UV, mesh.F)
+    uv = None if UV is None else np.asarray(UV) @ np.array([1, 1j])
+    path.write_text(obj_text(mesh.V, mesh.F, uv), encoding="utf-8")
 
 
 def _write_ply(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:

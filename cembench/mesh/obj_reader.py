@@ -31,11 +31,9 @@ def read_obj(path: Path) -> Soup:
     with path.open(encoding="latin-1") as file:
         lines = enumerate(file, 1)
         for number, line in lines:
-            words = words_of(line)
+            words = statement_words(number, line, lines)
             if not words or words[0] in _NAMED:
                 continue
-            if "#" in line or "\\" in line or number == 1:
-                words = _whole_statement(line, lines)
             try:
                 if words[0] == "v":
                     coordinates.extend(_point(words))
@@ -50,6 +48,14 @@ def read_obj(path: Path) -> Soup:
     return Soup.from_arrays(
         coordinates, corners, sizes, counted_from=1, notices=_unknown_notice(unknown)
     )
+
+
+def statement_words(number: int, line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
+    """Return the words of the statement that begins in a line; what continues it is taken too."""
+    words = words_of(line)
+    if words and words[0] not in _NAMED and ("#" in line or "\\" in line or number == 1):
+        return _whole_statement(line, lines)
+    return words
 
 
 def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:

@@ -98,6 +98,16 @@ class Soup:
         return replace(self, name=name)
 
     @property
+    def polygons(self) -> list[NDArray[np.int64]]:
+        """The polygons in order, as blocks (k, c) of k successive ones with c corners each."""
+        ends = np.cumsum(self.sizes)
+        last = np.flatnonzero(np.diff(self.sizes, append=0))
+        blocks = np.split(self.corners, ends[last[:-1]])
+        return [
+            block.reshape(-1, c) for block, c in zip(blocks, self.sizes[last].tolist(), strict=True)
+        ]
+
+    @property
     def triangles(self) -> NDArray[np.int64]:
         """The polygons cut into triangles by fans from their first corners, (m, 3), in order."""
         if (self.sizes == 3).all():

@@ -21,14 +21,17 @@ from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import printable
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
-
-#: A triangle counts as degenerate when its area is below this share of its longest edge squared.
-DEGENERATE_AREA = 1e-15
-#: Below this share a triangle is kept, with a notice: cotangents lose digits with its square.
-SLIVER_AREA = 1e-6
-#: Coordinates and edges in between: the fourth powers of lengths are computed with.
-LARGEST_LENGTH = 1e60
-SMALLEST_LENGTH = 1e-60
+from cembench.mesh.defects import (
+    Defect,
+    Problem,
+    Remedy,
+    UnusableMeshError,
+    as_arrays,
+    coincident,
+    examine,
+    some,
+)
+from cembench.mesh.repair import repair
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -60,21 +63,26 @@ class TriangleMesh:
 
         Raises
         ------
+        UnusableMeshError
+            NaN or infinite coordinates, an index out of range, isolated vertices, degenerate
+            triangles, non-manifold edges or vertices, a one-sided surface; for the subclasses also
+            the wrong topology. The error holds all of these problems.
         MeshError
-            Arrays of the wrong shape or type, NaN or infinite coordinates, an index out of range,
-            isolated vertices, degenerate triangles, non-manifold edges or vertices, a surface that
-            cannot be oriented; for the subclasses also the wrong topology.
+            Arrays of the wrong shape or type.
 
         """
-        V, F = _as_arrays(V, F)
-        notices += _check_values(V, F)
-        _check_edges(F)
-        F, flipped = _oriented(F)
-        if flipped:
-            told = f"orientation repaired: {flipped} of {len(F)} triangles were turned over"
-            notices += (Notice(NoticeKind.ORIENTATION_REPAIRED, told),)
-        _check_vertex_stars(F)
-        notices += self._check_topology(V, F)
+        kind = type(self)
+        V, F = as_arrays(V, F)
+        F, found, problems = examine(V, F, connected=kind is not TriangleMesh)
+        if problems:
+            raise UnusableMeshError([*problems, *_problems_when_repaired(kind, V, F, problems)])
+        try:
+            notices += found + kind._check_topology(V, F)
+        except UnusableMeshError as error:
+            open_seams = coincident(V)
+            raise UnusableMeshError(
+                [*([open_seams] if open_seams else []), *error.problems]
+            ) from None
         V.setflags(write=False)
         F.setflags(write=False)
         self._set(V, F, printable(name), notices)
@@ -166,16 +174,12 @@ class DiskMesh(TriangleMesh):
 
     @classmethod
     def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
-        loops = _loops_of_connected_open_surface(F, len(V))
+        loops = _checked_loops(V, F)
+        problems = _handles(F, len(V), len(loops))
         if len(loops) > 1:
-            sizes = ", ".join(str(len(loop)) for loop in sorted(loops, key=len, reverse=True)[:5])
-            raise MeshError(
-                f"the surface has {len(loops)} boundary loops (of {sizes}"
-                f"{', ...' if len(loops) > 5 else ''} vertices); this needs a topological disk, "
-                "with exactly one. Fill the holes, or use an algorithm for surfaces with holes "
-                "(see `cembench list algorithms`)."
-            )
-        _check_genus(F, len(V), 1)
+            problems.insert(0, _holes(V, loops))
+        if problems:
+            raise UnusableMeshError(problems)
         return definition_1_notices(F, len(V), loops)
 
 
@@ -220,13 +224,16 @@ class HoledMesh(TriangleMesh):
 
     @classmethod
     def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
-        loops = _loops_of_connected_open_surface(F, len(V))
+        loops = _checked_loops(V, F)
+        problems = _handles(F, len(V), len(loops))
         if len(loops) == 1:
-            raise MeshError(
+            text = (
                 "the surface has a single boundary loop; this needs an outer boundary and at least "
-                "one hole. Use an algorithm for disks (see `cembench list algorithms`)."
+                "one hole"
             )
-        _check_genus(F, len(V), len(loops))
+            problems.insert(0, Problem(Defect.no_hole, 1, text))
+        if problems:
+            raise UnusableMeshError(problems)
         return definition_1_notices(F, len(V), loops)
 
 
@@ -238,164 +245,58 @@ def _width(loop: NDArray[np.float64]) -> float:
     return float(np.average((away**2).sum(axis=1), weights=lengths))
 
 
-def _as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    points, faces = np.asarray(V), np.asarray(F)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), one row a vertex.")
-    if faces.size == 0:
-        raise MeshError(
-            f"the mesh has {len(points)} vertices but no faces; a surface needs triangles. "
-            "If this is a point cloud, reconstruct a surface from it first."
-        )
-    if faces.ndim != 2 or faces.shape[1] != 3:
-        raise MeshError(
-            f"faces have shape {faces.shape}; allowed is (m, 3), three vertex indices a triangle."
-        )
-    if not np.issubdtype(faces.dtype, np.integer):
-        raise MeshError(f"face indices are of type {faces.dtype}; allowed are integers.")
-    return np.array(points, dtype=np.float64), np.array(faces, dtype=np.int64)
-
-
-def _some(indices: NDArray[np.int64], most: int = 5) -> str:
-    """The first few of many, for a message."""
-    shown = ", ".join(str(k) for k in indices[:most].tolist())
-    return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
-
-
-def _check_values(V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
-    """Raise for coordinates or indices that are no triangles; a notice of those hardly any."""
-    bad = np.flatnonzero(~np.isfinite(V).all(axis=1))
-    if len(bad):
-        raise MeshError(
-            f"coordinates that are NaN or infinite at vertex {_some(bad)} (counted from 0); "
-            "all must be finite. Repair or remove these vertices."
-        )
-    bad = np.flatnonzero(((F < 0) | (len(V) <= F)).any(axis=1))
-    if len(bad):
-        raise MeshError(
-            f"triangle {_some(bad)} (counted from 0) has a vertex index out of range, the first "
-            f"being {F[bad[0]].tolist()}; allowed is 0 to {len(V) - 1}. "
-            "The file is damaged or was cut short."
-        )
-    used = np.zeros(len(V), dtype=bool)
-    used[F] = True
-    bad = np.flatnonzero(~used)
-    if len(bad):
-        raise MeshError(
-            f"isolated vertices, in no triangle: {_some(bad)} (counted from 0). "
-            "Remove unreferenced vertices and save again."
-        )
-    _check_scale(V, F)
-    corners = V[F]
-    edges = corners[:, [1, 2, 0]] - corners
-    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    longest = (edges**2).sum(axis=2).max(axis=1)
-    bad = np.flatnonzero(double_area <= 2 * DEGENERATE_AREA * longest)
-    if len(bad):
-        raise MeshError(
-            f"degenerate triangles (zero area): {_some(bad)} (counted from 0), the first with "
-            f"vertices {F[bad[0]].tolist()}. Angles are not defined there; merge duplicate "
-            "vertices or collapse these triangles."
-        )
-    thin = np.flatnonzero(double_area <= 2 * SLIVER_AREA * longest)
-    if not len(thin):
+def _problems_when_repaired(
+    kind: type[TriangleMesh],
+    V: NDArray[np.float64],
+    F: NDArray[np.int64],
+    known: tuple[Problem, ...],
+) -> tuple[Problem, ...]:
+    """Return what would still keep the surface from being of this kind after a repair."""
+    if any(problem.remedy is Remedy.rescale for problem in known):
         return ()
-    told = (
-        f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
-        f"{_some(thin)}; energies and dilatations lose digits in rounding there"
-    )
-    return (Notice(NoticeKind.SLIVERS, told),)
+    try:
+        kind._check_topology(*repair(V, F).surfaces[0])
+    except UnusableMeshError as error:
+        return error.problems
+    except MeshError:  # nothing would be left of it, so its own defects are all there is to say
+        return ()
+    return ()
 
 
-def _check_scale(V: NDArray[np.float64], F: NDArray[np.int64]) -> None:
-    """Raise where products of lengths would overflow or vanish, whatever the surface's shape."""
-    advice = "Angles do not depend on the scale: divide all coordinates by the same number."
-    largest = np.abs(V).max()
-    if largest > LARGEST_LENGTH:
-        raise MeshError(
-            f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}. {advice}"
-        )
-    spans = np.abs(V[F[:, [1, 2, 0]]] - V[F]).max(axis=(1, 2))
-    tiny = np.flatnonzero((spans > 0) & (spans < SMALLEST_LENGTH))
-    if len(tiny):
-        raise MeshError(
-            f"triangle {_some(tiny)} (counted from 0) spans less than {SMALLEST_LENGTH:g}, the "
-            f"first {spans[tiny[0]]:.3g}. {advice}"
-        )
-
-
-def _check_edges(F: NDArray[np.int64]) -> None:
-    edges, faces = topology.undirected_edges(F)
-    bad = np.flatnonzero(faces > 2)
-    if len(bad):
-        i, j = edges[bad[0]].tolist()
-        raise MeshError(
-            f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
-            f"{i}-{j} with {faces[bad[0]]}. Delete the surplus triangles or cut the surface there."
-        )
-
-
-def _oriented(F: NDArray[np.int64]) -> tuple[NDArray[np.int64], int]:
-    """Orient all triangles alike, as most of them are; how many had to be turned over?"""
-    if not len(topology.repeated_half_edges(F)):
-        return F, 0
-    import igl  # here and below: every measured process would wait for it, and none needs it
-
-    turned, piece = igl.bfs_orient(F)
-    flipped = (turned != F).any(axis=1)
-    # The search keeps the first triangle it meets; keep the majority instead, piece by piece.
-    mostly = np.bincount(piece, weights=flipped) > np.bincount(piece) / 2
-    flipped ^= mostly[piece]
-    F = np.where(flipped[:, None], F[:, ::-1], F)
-    bad = topology.repeated_half_edges(F)
-    if len(bad):
-        i, j = bad[0].tolist()
-        raise MeshError(
-            "inconsistent orientation that cannot be repaired: the surface is one-sided (like a "
-            f"Moebius strip); the triangles at edge {i}-{j} contradict each other however they "
-            "are turned. Cut the surface along a curve that makes it two-sided."
-        )
-    return np.ascontiguousarray(F), int(flipped.sum())
-
-
-def _check_vertex_stars(F: NDArray[np.int64]) -> None:
-    import igl
-
-    bad = np.flatnonzero(~igl.is_vertex_manifold(F))
-    if len(bad):
-        raise MeshError(
-            f"non-manifold vertex {_some(bad)} (counted from 0): its triangles form more than one "
-            "fan, so the surface touches itself in a point. Split the vertex, one copy a fan."
-        )
-
-
-def _loops_of_connected_open_surface(F: NDArray[np.int64], n: int) -> list[NDArray[np.int64]]:
-    count, labels = topology.components(F, n)
-    if count > 1:
-        sizes = np.bincount(labels)
-        raise MeshError(
-            f"the mesh has {count} connected components (the largest with {sizes.max()} of {n} "
-            f"vertices; vertex {int(np.argmin(sizes[labels]))} lies in the smallest); this needs "
-            "exactly one. Keep one component and save it alone."
-        )
-    loops = topology.boundary_loops(F, n)
+def _checked_loops(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[NDArray[np.int64]]:
+    """Return the loops that bound a surface; :class:`UnusableMeshError` if there are none."""
+    loops = topology.boundary_loops(F, len(V))
     if not loops:
-        raise MeshError(
-            "the surface is closed: it has no boundary loop, and a map to the disk needs one. "
-            "Cut it open, or remove a patch of triangles."
-        )
+        text = "the surface is closed: it has no boundary loop, and a map to the disk needs one"
+        closed = Problem(Defect.closed, 1, text)
+        raise UnusableMeshError([closed, *_handles(F, len(V), 0)])
     return loops
 
 
-def _check_genus(F: NDArray[np.int64], n: int, loops: int) -> None:
+def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
+    sizes = sorted(map(len, loops), reverse=True)
+    lengths = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
+    longest = int(np.argmax(lengths))
+    return Problem(
+        Defect.holes,
+        len(loops) - 1,
+        f"the surface has {len(loops)} boundary loops (of {', '.join(map(str, sizes[:5]))}"
+        f"{', ...' if len(loops) > 5 else ''} vertices); this needs a topological disk, with "
+        "exactly one",
+        edges=max(len(loop) for k, loop in enumerate(loops) if k != longest),
+    )
+
+
+def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
     euler = topology.euler_characteristic(F, n)
     genus = (2 - loops - euler) // 2
-    if genus:
-        raise MeshError(
-            f"the surface has genus {genus} (Euler characteristic {euler} with {loops} boundary "
-            f"loop(s); allowed is {2 - loops}, genus 0): it has {genus} handle(s) like a torus. "
-            "Cut each handle open, or remove it."
-        )
+    if not genus:
+        return []
+    text = (
+        f"the surface has genus {genus} (Euler characteristic {euler} with {loops} boundary "
+        f"loop(s); allowed is {2 - loops}, genus 0): it has {genus} handle(s) like a torus"
+    )
+    return [Problem(Defect.handles, genus, text)]
 
 
 def definition_1_notices(
@@ -422,12 +323,12 @@ def _breaks_of_definition_1(
     for loop in loops:
         ears = loop[graph[loop][:, interior].sum(axis=1) == 0]
         if len(ears) and len(loops) == 1:
-            yield f"(iv) broken: boundary vertices without an interior neighbour: {_some(ears)}"
+            yield f"(iv) broken: boundary vertices without an interior neighbour: {some(ears)}"
         elif len(ears):
             yield (
-                f"(iv) broken: on the boundary of vertex {loop.min()} ({len(loop)} "
-                f"vertices), vertices without an interior neighbour: {_some(ears)}. If this is a "
-                "hole, their triangles fold in every map to a disk with round holes: a triangle "
-                "with all corners on a circle lies inside it. Remove these vertices, or divide "
-                "their triangles"
+                f"(iv) broken: on the boundary of vertex {loop.min()} ({len(loop)} vertices), "
+                f"vertices without an interior neighbour: {some(ears)}. If this is a hole, their "
+                "triangles fold in every map to a disk with round holes: a triangle with all "
+                "corners on a circle lies inside it. Remove these vertices, or divide their "
+                "triangles"
             )

@@ -113,10 +113,19 @@ class Store:
 
     def check_is_run(self) -> None:
         """Raise :class:`RecordError` where the folder holds no run."""
+        self.check_is_there()
         if not is_there(self.folder / "records"):
             raise RecordError(
                 f"{self.folder} holds no run: there is no folder {self.folder / 'records'}. "
                 "Make one with `cembench run`."
+            )
+
+    def check_is_there(self) -> None:
+        """Raise :class:`RecordError` where there is no such folder."""
+        if not self.folder.is_dir():
+            raise RecordError(
+                f"{self.folder} holds no run: there is no such folder. Make one with "
+                "`cembench run`, or `cembench reproduce`."
             )
 
     def finished(self) -> list[Record]:

@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
 from cembench.mesh.datasets import recognised
-from cembench.mesh.files import checked, read_mesh
+from cembench.mesh.files import checked, read_mesh, read_repaired
 from cembench.mesh.reading import is_named_like_a_mesh, read_soup
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
@@ -144,8 +145,14 @@ def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFac
     )
 
 
-def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
+def read_mesh_for(
+    path: Path, algorithms: Sequence[Algorithm], soup: Soup | None = None
+) -> TriangleMesh:
     """Read a file as the kind of surface that the algorithms take, the narrowest that it is.
+
+    With `soup`, that is taken for what the file holds.
+
+    With `repaired`, its first surface is taken for what the file holds.
 
     Raises
     ------
@@ -154,15 +161,15 @@ def read_mesh_for(path: Path, algorithms: Sequence[Algorithm]) -> TriangleMesh:
         of the first one's kind.
 
     """
-    soup = read_soup(path)
+    soup = read_soup(path) if soup is None else soup
     kinds = dict.fromkeys(a.mesh_type for a in algorithms)
     refused: dict[type[TriangleMesh], MeshError] = {}
     for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
         try:
-            return checked(soup, kind)
+            return checked(soup, kind, path)
         except MeshError as error:
             refused[kind] = error
-    raise MeshError(f"{path}: {refused[next(iter(kinds))]}")
+    raise refused[next(iter(kinds))]
 
 
 def gather_surfaces(
@@ -171,9 +178,16 @@ def gather_surfaces(
     files: Sequence[Path],
     names: Sequence[str],
     faces: int | None = None,
+    *,
+    mend: bool = False,
 ) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
-    """Read these files, generate these surfaces; and which rows of the paper do they stand for?"""
-    found = [read_mesh_for(path, algorithms) for path in files]
+    """Read these files, generate these surfaces; and which rows of the paper do they stand for?
+
+    With `mend`, the files are repaired first.
+    """
+    found = [
+        read_mesh_for(path, algorithms, read_repaired(path)[0] if mend else None) for path in files
+    ]
     standing = {
         mesh.name: paper_role_of_file(registry, path, mesh)
         for path, mesh in zip(files, found, strict=True)

@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 from cembench.algorithms.cem import cem
 from cembench.algorithms.direct_cem.disk import direct_cem
-from cembench.algorithms.direct_cem.gauge_walk import LEASH
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import spherical_cap
 
@@ -16,6 +15,8 @@ from cembench.linear_algebra.cholmod import CholmodFactor
 from cembench.mesh.files import read_mesh
 from tests import gallery
 from tests.real_meshes import DISKS, real_mesh
+
+DELAUNAY, OWN = {"delaunay": True}, {"delaunay": False}
 
 
 def uneven_half_ellipsoid(faces=1500):
@@ -34,22 +35,15 @@ def test_one_factorisation_half_a_solve_for_the_start_and_half_of_one_at_the_end
     assert [len(calls) for calls in (*halves, *whole)] == [1, 1, 0, 0]
 
 
-def test_a_gauge_that_may_move_takes_at_most_three_solves_more(count_calls):
-    halves = count_calls(CholmodFactor, "extended")
-    found = direct_cem(DiskMesh.from_arrays(*gallery.hill_in_a_corner()))
-    assert 0 < found.extras["gauge_steps"] < len(halves) <= 6
-
-
 @pytest.mark.parametrize("gauge", ["boundary", "triangle", "area"])
 def test_energy_falls_from_step_to_step_and_is_that_of_the_map(gauge):
     mesh = uneven_half_ellipsoid()
-    found = direct_cem(mesh, gauge=gauge, back=0)
+    found = direct_cem(mesh, gauge=gauge, back=0, delaunay=False)
     assert (np.diff(found.energy_history) < 0).all()
     energy = all_metrics(mesh, found.uv)["conformal_energy"]
     assert found.energy_history[-1] == pytest.approx(energy, abs=1e-12)
     assert found.extras["stopped"] == "gradient"
-    minimum = found.energy_history[-1 - found.extras["gauge_steps"]]
-    assert found.extras["gradient"] ** 2 <= 2e-6 * minimum
+    assert found.extras["gradient"] ** 2 <= 2e-6 * found.energy_history[-1]
 
 
 def test_where_it_stops_energy_could_hardly_fall():
@@ -61,35 +55,44 @@ def test_where_it_stops_energy_could_hardly_fall():
     assert 0 <= default / least - 1 <= 1e-6
 
 
-def test_the_way_back_to_harmonic_measure_costs_little_energy_and_mends_angles():
-    mesh = uneven_half_ellipsoid(600)
-    least, between = (
-        direct_cem(mesh, gauge="triangle", back=back, tolerance=1e-8) for back in (0, 0.3)
-    )
-    start, end = least.energy_history[0], least.energy_history[-1]
-    cost = between.energy_history[-1] - end
-    assert cost == pytest.approx(0.09 * (start - end), rel=0.1)
-    energy = all_metrics(mesh, between.uv)["conformal_energy"]
-    assert between.energy_history[-1] == pytest.approx(energy, abs=1e-12)
+@pytest.mark.parametrize("delaunay", [True, False])
+def test_the_way_back_costs_the_share_of_energy_that_it_may_and_mends_angles(delaunay):
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(8, 80))
+    least, between = (direct_cem(mesh, back=back, delaunay=delaunay) for back in (0, 0.01))
+    assert between.energy_history[-1] / least.energy_history[-1] == pytest.approx(1.01, abs=0.001)
     assert angle_errors(mesh, between.uv).mean() < angle_errors(mesh, least.uv).mean()
 
 
-def test_the_way_back_is_shorter_where_it_would_cost_more_than_a_hundredth():
-    V, F = gallery.flat_rectangle(8, 80)
-    mesh = DiskMesh.from_arrays(V, F)
-    least, between = (direct_cem(mesh, gauge="triangle", back=back) for back in (0, 1))
-    cost = between.energy_history[-1] / least.energy_history[-1] - 1
-    assert 0.005 < cost < 0.02
+def test_where_it_costs_less_the_way_back_leads_to_the_start():
+    mesh = uneven_half_ellipsoid(600)
+    start, back = direct_cem(mesh, max_iterations=0), direct_cem(mesh, back=10)
+    assert back.iterations > 1
+    turn = np.exp(1j * np.angle(np.vdot(back.uv, start.uv)))
+    assert abs(turn * back.uv - start.uv).max() < 1e-9
 
 
-def test_it_is_below_cem_however_many_iterations_cem_takes():
+def test_it_is_below_cem_with_the_same_weights_however_many_iterations_cem_takes():
     mesh = uneven_half_ellipsoid()
-    least, default = (all_metrics(mesh, direct_cem(mesh, **p).uv) for p in ({"back": 0}, {}))
+    least, default = (
+        all_metrics(mesh, direct_cem(mesh, delaunay=False, **p).uv) for p in ({"back": 0}, {})
+    )
     for iterations in (20, 400):
         other = all_metrics(mesh, cem(mesh, tolerance=0, max_iterations=iterations).uv)
         assert least["conformal_energy"] < 1.001 * other["conformal_energy"]
-        assert default["conformal_energy"] < 1.01 * other["conformal_energy"]
+        assert default["conformal_energy"] < 1.011 * other["conformal_energy"]
     assert default["angle_error_mean_deg"] < other["angle_error_mean_deg"]
+
+
+def test_on_the_chinese_lion_its_minimum_is_below_what_cem_converges_to():
+    mesh = read_mesh(real_mesh("chinese_lion.obj"))
+    least, other = (
+        all_metrics(mesh, uv)["conformal_energy"]
+        for uv in (
+            direct_cem(mesh, delaunay=False, back=0).uv,
+            cem(mesh, tolerance=0, max_iterations=200).uv,
+        )
+    )
+    assert least < other
 
 
 def test_the_gauge_brings_what_it_names_to_the_origin():
@@ -106,7 +109,7 @@ def test_the_gauge_brings_what_it_names_to_the_origin():
     uv = found.uv[mesh.boundary]
     lengths = edge_lengths(mesh, mesh.boundary)
     mean = (lengths * (uv + np.roll(uv, -1))).sum() / (2 * lengths.sum())
-    assert abs(mean) < 0.03 + LEASH * found.extras["gauge_steps"]
+    assert abs(mean) < 0.03
 
 
 def test_gauges_differ_by_nearly_a_moebius_map():
@@ -144,19 +147,22 @@ def test_no_iteration_leaves_the_start():
 def test_the_start_is_the_better_of_two(monkeypatch):
     mesh = uneven_half_ellipsoid()
     energy = direct_cem(mesh, max_iterations=0).energy_history[0]
-    uv = direct_cem(mesh, max_iterations=0).uv
-    assert energy == pytest.approx(all_metrics(mesh, uv)["conformal_energy"])
+    uv = direct_cem(mesh, max_iterations=0, delaunay=False).uv
+    assert direct_cem(mesh, max_iterations=0, delaunay=False).energy_history[0] == pytest.approx(
+        all_metrics(mesh, uv)["conformal_energy"]
+    )
     monkeypatch.setattr(
         "cembench.algorithms.direct_cem.disk.arcs_of_measure", lambda seen, lengths: lengths
     )
     assert energy <= direct_cem(mesh, max_iterations=0).energy_history[0]
 
 
-def test_intrinsic_delaunay_weights_are_an_option_that_tells_of_folds():
+def test_intrinsic_delaunay_weights_are_the_default():
     mesh = hemi_ellipsoid(3000, z=6.0)
-    found = direct_cem(mesh, delaunay=True)
-    assert abs(found.uv - direct_cem(mesh).uv).max() > 1e-6
-    assert found.extras["folded_before_repair"] == flipped_triangles(mesh, found.uv) == 0
+    default, delaunay, own = (direct_cem(mesh, **p) for p in ({}, DELAUNAY, OWN))
+    np.testing.assert_array_equal(default.uv, delaunay.uv)
+    assert abs(default.uv - own.uv).max() > 1e-6
+    assert all(flipped_triangles(mesh, found.uv) == 0 for found in (default, own))
 
 
 @pytest.mark.parametrize("gauge", ["boundary", "triangle", "area"])
@@ -173,11 +179,13 @@ def test_on_a_boundary_crowded_far_below_1e_6_vertices_keep_their_places(gauge):
     assert all_metrics(mesh, found.uv)["angle_error_mean_deg"] < 8  # coarse: eight cells across
 
 
-def test_with_intrinsic_delaunay_weights_folds_that_the_edges_force_stay_and_are_counted():
+@pytest.mark.parametrize("delaunay", [True, False])
+def test_folds_are_repaired_whatever_the_weights(delaunay):
     mesh = read_mesh(real_mesh("canonical_face.obj"))
-    found = direct_cem(mesh, delaunay=True)
-    assert found.extras["folded_before_repair"] == flipped_triangles(mesh, found.uv) > 0
-    assert found.extras["fold_repairs"] == 0
+    found = direct_cem(mesh, delaunay=delaunay)
+    assert found.extras["before_repair"]["flipped_triangles"] > 0
+    assert found.extras["fold_repairs"] > 0
+    assert flipped_triangles(mesh, found.uv) == 0
 
 
 def test_corners_and_boundary_triangles_without_interior_vertices_are_no_obstacle():
@@ -199,7 +207,9 @@ def test_on_real_disks_it_ends_below_cem_without_folds(name):
     found = direct_cem(mesh)
     figures, other = (all_metrics(mesh, uv) for uv in (found.uv, cem(mesh).uv))
     assert figures["flipped_triangles"] == 0
-    assert figures["conformal_energy"] < 1.001 * other["conformal_energy"]
+    assert figures["conformal_energy"] < 1.012 * other["conformal_energy"]
+    # Within 1 %: on the coarse hand arcs below a hundredth of the mean decide the last digit.
+    assert figures["angle_error_mean_deg"] < 1.01 * other["angle_error_mean_deg"]
     assert found.iterations <= 8
 
 

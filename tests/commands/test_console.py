@@ -97,7 +97,7 @@ def test_a_hostile_title_is_listed_and_mapped(cli):
     (cli.folder / "mine.py").write_text(
         "from cembench import DiskMesh, algorithm\n"
         "from cembench.conformal.harmonic import *\n"
-        "from algorithms.harmonic_circle import harmonic_circle as h\n"
+        "from cembench.algorithms.harmonic_circle import harmonic_circle as h\n"
         "@algorithm('fast', title='[/fast]', target='disk', notes='[/notes]', source='[/source]')\n"
         "def fast(mesh: DiskMesh, *, word: str = '[/word]'):\n"
         "    return h(mesh)\n"

@@ -1,5 +1,6 @@
 import json
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -153,7 +154,7 @@ def test_landmarks_that_cannot_meet_are_exit_code_1(coarse):
 def test_a_real_face_morphs_into_a_real_head(cli):
     """A mask into a whole head: five landmarks, no folds, and both ways near to the target."""
     face, head = real_mesh("human_face.obj"), real_mesh("max_planck_head.ply")
-    marks = gallery.__file__.replace("gallery.py", "morphing/human_face-max_planck_head.csv")
+    marks = Path(__file__).parents[1] / "workflows/morphing/human_face-max_planck_head.csv"
     code, out, _ = cli("morph", face, head, "--landmarks", marks, "--frames", 48, "--json")
     assert code == 0
     (row,) = json.loads(out)["registrations"]

@@ -150,12 +150,12 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
     (cli.folder / "meshes/notes.txt").touch()
     plugin = cli.folder / "stand_ins.py"
     plugin.write_text(
-        "from cembench import DiskMesh, surface\n"
+        "from cembench import DiskMesh, surface_family\n"
         "from cembench.results import paper\n"
         "from cembench.surfaces.flat_disk import flat_disk\n"
         "from dataclasses import replace\n"
         "def declare(k, row):\n"
-        "    @surface(f's{k}', title=row, paper_row=row)\n"
+        "    @surface_family(f's{k}', title=row, paper_row=row)\n"
         "    def plate(faces: int = 100 + 10 * k) -> DiskMesh:\n"
         "        return flat_disk(100 + 60 * k).renamed(f's{k}')\n"
         "    plate.__module__ = __name__\n"

@@ -2,10 +2,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cembench.algorithms.direct_cem import boundary_energy
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import AlgorithmFailed, HoledMesh
+from cembench.conformal import boundary_energy
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_energy import (
     EnergyModel,
@@ -13,7 +13,7 @@ from cembench.conformal.boundary_energy import (
     minimise,
     moebius_descent,
 )
-from cembench.conformal.circle_domain import CircleDomain, Rims
+from cembench.conformal.circle_domain import BoundaryLoops, CircleDomain
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
 from cembench.conformal.trust_region import newton_step
@@ -31,7 +31,7 @@ def ring():
     sizes = tuple(len(loop) for loop in loops)
     arcs = np.concatenate([a / a.sum() * 2 * np.pi for a in (rng.random(k) + 0.5 for k in sizes)])
     centres, radii = np.array([0, 0.1 + 0.2j]), np.array([1, 0.3])
-    domain = CircleDomain(Rims(sizes), arcs, rng.random(2), centres, radii, 0.1 * arcs)
+    domain = CircleDomain(BoundaryLoops(sizes), arcs, rng.random(2), centres, radii, 0.1 * arcs)
     weights = np.where(domain.rims.loop == 0, 1 / sizes[0], 0)
     return mesh, bordered, bordered.dirichlet_to_neumann(), domain, weights
 

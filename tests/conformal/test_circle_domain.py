@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cembench.conformal.boundary_energy import in_gauge
-from cembench.conformal.circle_domain import CircleDomain, Rims
+from cembench.conformal.circle_domain import BoundaryLoops, CircleDomain
 from cembench.conformal.moebius import Moebius
 
 
@@ -11,7 +11,7 @@ def ring_and_two_holes(seed=0):
     sizes = (9, 5, 6)
     arcs = np.concatenate([a / a.sum() * 2 * np.pi for a in (rng.random(k) + 0.1 for k in sizes)])
     centres, radii = np.array([0, 0.4 + 0.1j, -0.3j]), np.array([1.0, 0.2, 0.3])
-    return CircleDomain(Rims(sizes), arcs, rng.random(3), centres, radii, 0.1 * arcs)
+    return CircleDomain(BoundaryLoops(sizes), arcs, rng.random(3), centres, radii, 0.1 * arcs)
 
 
 def order_of(domain):

@@ -3,7 +3,7 @@ import pytest
 
 from cembench import HoledMesh
 from cembench.conformal.bordered import BorderedLaplacian
-from cembench.conformal.circle_domain import Rims
+from cembench.conformal.circle_domain import BoundaryLoops
 from cembench.conformal.filled_start import (
     CROWDED,
     arcs_of_measure,
@@ -62,7 +62,7 @@ def test_down_a_tube_another_loop_is_outside_at_first():
 
 def test_on_a_concentric_ring_each_loop_has_an_even_equilibrium_measure():
     S, _, lengths = pieces(HoledMesh.from_arrays(*gallery.annulus()))
-    rims = Rims(tuple(map(len, lengths)))
+    rims = BoundaryLoops(tuple(map(len, lengths)))
     own = equilibrium_measures(S, rims)
     np.testing.assert_allclose(own * np.array(rims.sizes)[rims.loop], 1, rtol=0.2)
     np.testing.assert_allclose(rims.sums(own), 1)

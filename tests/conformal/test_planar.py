@@ -7,6 +7,7 @@ from cembench.conformal.planar import (
     backward_arcs,
     crossing_polygons,
     fitted_circle,
+    folded_triangles,
     orientations,
     polygon_area,
     signed_areas,
@@ -28,6 +29,29 @@ def test_area_of_a_polygon_has_a_sign_and_no_origin():
 def test_signed_areas():
     z = np.array([0, 1, 1j, 1 + 1j])
     np.testing.assert_allclose(signed_areas(z, np.array([[0, 1, 2], [1, 2, 3]])), [0.5, -0.5])
+
+
+def test_folds_are_judged_by_the_exact_sign_of_the_area():
+    rng = np.random.default_rng(0)
+    a, b = rng.random((2, 300)) + 1j * rng.random((2, 300))
+    z = np.stack(
+        [a, b, a + rng.random(300) * (b - a)], axis=1
+    ).ravel()  # on a line but for rounding
+    F = np.arange(900).reshape(-1, 3)
+
+    def folded(a, b, c):
+        (p, q), (r, s) = ((Fraction(w.real), Fraction(w.imag)) for w in (a, b))
+        x, y = Fraction(c.real), Fraction(c.imag)
+        return (r - p) * (y - q) <= (s - q) * (x - p)
+
+    exact = [t for t in range(300) if folded(*z[F[t]].tolist())]
+    np.testing.assert_array_equal(folded_triangles(z, F), exact)
+    assert set(exact) != set(np.flatnonzero(~(signed_areas(z, F) > 0)))
+
+
+def test_an_image_that_is_not_finite_counts_as_folded():
+    z = np.array([0, 1, complex("nan"), 1j])
+    np.testing.assert_array_equal(folded_triangles(z, np.array([[0, 1, 2], [0, 1, 3]])), [0])
 
 
 @pytest.mark.parametrize(("centre", "radius"), [(0, 1), (3 - 4j, 1e-6), (1e3, 50.0)])

@@ -22,7 +22,7 @@ def shown(entries):
 @pytest.mark.parametrize("family", FILE_FAMILIES)
 def test_no_mutated_file_of_a_format_makes_a_fault(family, tried):
     found = [e for e in tried if e.part == "files" and e.family == family]
-    assert len(found) == 30
+    assert len(found) in (33, 34)  # 300 over nine families
     assert not shown(found), shown(found)
 
 

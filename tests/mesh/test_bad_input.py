@@ -36,7 +36,7 @@ FILES = {
     "degenerate.obj": (obj(np.where(V == [[0, 0, 0]], V[1], V), F), "degenerate triangles"),
     "edge.obj": (obj(*gallery.three_triangles_on_an_edge()), "non-manifold edge"),
     "vertex.obj": (obj(*gallery.bow_tie()), "non-manifold vertex 0"),
-    "moebius.obj": (obj(*gallery.moebius_strip()), "cannot be repaired"),
+    "moebius.obj": (obj(*gallery.moebius_strip()), "one-sided"),
     "pieces.obj": (obj(*gallery.two_pieces()), "2 connected components"),
     "closed.obj": (obj(*gallery.tetrahedron()), "the surface is closed"),
     "tube.obj": (obj(*gallery.tube()), "2 boundary loops"),

@@ -432,3 +432,12 @@ def test_only_ascii_spaces_part_numbers(tmp_path, odd):
     file.write_bytes(f"OFF\n3 1 0\n0 0 0\n1 0 0\n0{odd}1 0\n3 0 1 2\n".encode("latin-1"))
     with pytest.raises(MeshError, match="line 5"):
         read_soup(file)
+
+
+def test_the_polygons_come_in_blocks_of_one_size_in_order(tmp_path):
+    faces = [[0, 1, 2], [0, 2, 3], [0, 1, 2, 3], [3, 2, 1]]
+    lines = "".join("f " + " ".join(str(k + 1) for k in face) + "\n" for face in faces)
+    (tmp_path / "a.obj").write_text(OBJ + lines)
+    blocks = read_soup(tmp_path / "a.obj").polygons
+    assert [block.shape for block in blocks] == [(2, 3), (1, 4), (1, 3)]
+    assert [face for block in blocks for face in block.tolist()] == faces

@@ -6,7 +6,7 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench import DiskMesh, RegistryError, registry, surface
+from cembench import DiskMesh, RegistryError, registry, surface_family
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.files import write_mesh
@@ -23,7 +23,7 @@ def known(tmp_path, monkeypatch):
     def place(faces):
         return tmp_path / f"bowl-{faces}.ply"
 
-    @surface("bowl", title="Bowl", paper_row="Nefertiti", kept=place)
+    @surface_family("bowl", title="Bowl", paper_row="Nefertiti", kept=place)
     def bowl(faces: int = 562) -> DiskMesh:
         mesh = hemi_ellipsoid(faces)
         write_mesh(place(faces), mesh)

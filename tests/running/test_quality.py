@@ -37,9 +37,9 @@ def eared_disk(count=15):
 
 
 @pytest.mark.parametrize("mesh", [hemi_ellipsoid(800, x=2.0), flat_disk(600, stretch=4.0)])
-def test_the_yardstick_is_about_as_good_as_the_best_method(mesh):
+def test_the_yardstick_is_nearly_as_good_as_the_best_method(mesh):
     best = angle_errors(mesh, direct_cem(mesh).uv).mean()
-    assert angle_errors(mesh, yardstick("disk", mesh, direct_cem(mesh).uv)).mean() < 1.3 * best
+    assert angle_errors(mesh, yardstick("disk", mesh, direct_cem(mesh).uv)).mean() < 1.5 * best
 
 
 @pytest.mark.parametrize("algorithm", [cem, direct_cem])

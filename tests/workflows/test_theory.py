@@ -7,7 +7,6 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh, Parameterization, algorithm
-from cembench.commands.theory import _rival_history
 from cembench.core.errors import AlgorithmFailed
 from cembench.results.exhibits import read_exhibits
 from cembench.workflows.theory import (
@@ -18,6 +17,7 @@ from cembench.workflows.theory import (
     statements,
     trajectory,
 )
+from cembench.workflows.theory_facts import _rival_history
 from tests import gallery
 from tests.real_meshes import real_mesh
 
@@ -96,6 +96,8 @@ def test_the_chinese_lion_loses_positivity_and_nothing_else(cli):
     assert not facts["premises_hold"]
     failed = {check["name"] for check in facts["statements"] if not check["holds"]}
     assert failed == {"K > 0"}
+    least = {row["name"]: row["last"] for row in facts["energies"]}
+    assert least["Direct CEM"] < min(least["CEM, step (23)"], least["CEM, step (30)"])
     (exhibit,) = read_exhibits(cli.folder / "r")
     assert exhibit.name == "theory-chinese_lion"
     assert "K > 0" in exhibit.text
@@ -116,7 +118,10 @@ def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
 
     def rival(energies, failing=False):
         @algorithm("rival", title="Rival", target="disk")
-        def solver(mesh: DiskMesh) -> Parameterization:
+        def solver(
+            mesh: DiskMesh, *, delaunay: bool = True, back: float = 0.01
+        ) -> Parameterization:
+            assert (delaunay, back) == (False, 0)  # the least energy with K's own weights
             if failing:
                 raise AlgorithmFailed("no luck")
             return Parameterization(np.zeros(mesh.n, complex), 1, energies)

@@ -94,11 +94,6 @@ class Evidence:
     def of(cls, run: Path) -> Evidence:
         """Read a run."""
         store = Store(run)
-        if not run.is_dir():
-            raise RecordError(
-                f"{run} holds no run: there is no such folder. Make one with `cembench run`, or "
-                "`cembench reproduce`."
-            )
         records = store.records()
         if not records:
             raise RecordError(

@@ -52,7 +52,7 @@ def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
         raise RegistryError(
             f"profile {profile.value!r}: no surface stands for {', '.join(missing)}; "
             "name --surfaces or --mesh instead, or declare one with "
-            '@surface(..., paper_row="...").'
+            '@surface_family(..., paper_row="...").'
         )
     for model in wanted:
         if len(standing[model]) > 1:

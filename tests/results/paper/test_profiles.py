@@ -1,6 +1,6 @@
 import pytest
 
-from cembench import DiskMesh, RegistryError, surface
+from cembench import DiskMesh, RegistryError, surface_family
 from cembench.registry import Registry, load_registry
 from cembench.results import paper
 from cembench.results.paper.profiles import Profile, algorithms_of, models, surfaces_of
@@ -8,7 +8,7 @@ from cembench.results.paper.profiles import Profile, algorithms_of, models, surf
 
 def registry_of(rows):
     def declared(name, row):
-        @surface(name, title=name, paper_row=row)
+        @surface_family(name, title=name, paper_row=row)
         def plate(faces: int = 100) -> DiskMesh:
             raise NotImplementedError
 

@@ -1,0 +1,98 @@
+"""The verb `cut`: a closed surface, or one with handles, becomes a disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cembench.commands.console import Json, err, note, out, print_json
+from cembench.commands.options import Repair
+from cembench.commands.repair import print_steps
+from cembench.core.errors import MeshError
+
+
+def cut(
+    mesh: Annotated[Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL or MAT.")],
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="The disk: OBJ, OFF or PLY.")],
+    between: Annotated[
+        tuple[int, int] | None,
+        typer.Option(metavar="A B", help="Vertices, counted from 0, that the cut has to reach."),
+    ] = None,
+    mend: Repair = False,
+    force: Annotated[
+        bool,
+        typer.Option("--force", help="Write over the input, or an OUTPUT_seam.csv that is there."),
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Cut a surface open along short curves until it is a disk, and write it.
+
+    A closed surface without handles is cut between two points that lie far from each other, handles
+    along a short cut graph, and holes are joined to the cut. OUTPUT_seam.csv names the vertex of
+    the surface that each vertex of the disk is a copy of. `cembench map --cut` cuts, maps, and
+    writes the UVs for the uncut surface.
+    """
+    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.mesh.cut import cut_open, write_seam
+    from cembench.mesh.defects import located
+    from cembench.mesh.files import check_writable_format, checked, read_repaired, write_mesh
+    from cembench.mesh.reading import read_soup
+    from cembench.mesh.triangle_mesh import TriangleMesh
+
+    check_writable_format(output, with_uv=False)
+    if output.suffix.lower() == ".stl":
+        raise MeshError(
+            f"{output}: STL holds no connectivity, so the cut would close again; allowed here: "
+            ".obj, .off, .ply."
+        )
+    seam = output.with_name(f"{output.stem}_seam.csv")
+    refuse_inputs(output, [mesh], force=force)
+    refuse_present([seam], force=force)
+    with err.status("reading", spinner="line"):
+        soup, repaired = read_repaired(mesh) if mend else (read_soup(mesh), None)
+        surface = checked(soup, TriangleMesh, mesh)
+    with err.status(f"cutting {surface.m:,} triangles", spinner="line"):
+        try:
+            disk = cut_open(surface, between or ())
+        except MeshError as error:
+            raise located(error, mesh) from None
+    write_mesh(output, disk.mesh)
+    write_seam(seam, disk)
+    if as_json:
+        about = {
+            "input": str(mesh),
+            "output": str(output),
+            "seam": str(seam),
+            "cut_edges": disk.edges.tolist(),
+            "cut_length": disk.length,
+            "vertices": disk.mesh.n,
+            "faces": disk.mesh.m,
+            "boundary_vertices": len(disk.mesh.boundary),
+        }
+        steps = {} if repaired is None else {"repair": repaired.counts}
+        print_json(about | steps)
+        return
+    for notice in soup.notices if repaired is None else ():
+        note(f"{soup.name}: {notice}")
+    if repaired is not None:
+        print_steps(repaired.steps)
+    out.print(
+        f"{len(disk.edges):,} edges cut, {disk.length:.6g} long; the disk has "
+        f"{disk.mesh.n:,} vertices, {len(disk.mesh.boundary):,} of them on its boundary"
+    )
+    for path in (output, seam):
+        out.print(str(path), soft_wrap=True)
+
+
+#: Each verb with the examples that its help shows.
+VERBS = (
+    (
+        cut,
+        "Examples:  cembench cut head.obj -o disk.obj  ·  "
+        "cembench cut sphere.ply -o disk.ply --between 0 812  ·  "
+        "cembench map torus.obj --cut -o torus_uv.obj",
+    ),
+)

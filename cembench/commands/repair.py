@@ -1,0 +1,126 @@
+"""The verb `repair`: a file of triangles or polygons becomes an oriented manifold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cembench.commands.console import Json, err, note, out, print_json
+from cembench.commands.options import FillHoles, Weld
+
+if TYPE_CHECKING:
+    from cembench.mesh.repair import Step
+    from cembench.mesh.triangle_mesh import TriangleMesh
+
+
+class Keep(StrEnum):
+    """Which connected components are kept."""
+
+    largest = "largest"
+    all = "all"
+
+
+def repair(
+    mesh: Annotated[Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL or MAT.")],
+    *,
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The mended surface: OBJ, OFF, PLY or STL.")
+    ],
+    weld: Weld = 0.0,
+    fill_holes: FillHoles = 0,
+    components: Annotated[
+        Keep,
+        typer.Option(help="Keep the component with most triangles, or write a file for each."),
+    ] = Keep.largest,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write over the input, or OUT_1, OUT_2 that are there.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Mend a surface, say what was done, and write it.
+
+    In this order: faces with missing vertices dropped, polygons cut into triangles, coincident
+    vertices welded, degenerate and duplicate triangles mended or dropped, non-manifold edges and
+    vertices split, triangles oriented alike, components chosen, ears dropped, holes filled,
+    isolated vertices removed. docs/repair.md tells how.
+    """
+    from cembench.core.errors import MeshError
+    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.mesh.defects import located
+    from cembench.mesh.files import check_writable_format, write_mesh
+    from cembench.mesh.reading import read_soup
+    from cembench.mesh.repair import repair as repaired
+    from cembench.mesh.triangle_mesh import TriangleMesh
+
+    check_writable_format(output, with_uv=False)
+    refuse_inputs(output, [mesh], force=force)
+    with err.status("reading", spinner="line"):
+        soup = read_soup(mesh)
+    with err.status(f"mending {len(soup.sizes):,} faces", spinner="line"):
+        try:
+            result = repaired(
+                soup.V,
+                soup.polygons,
+                weld=weld,
+                fill_holes=fill_holes,
+                components=components.value,
+            )
+            surfaces = [TriangleMesh.from_arrays(*arrays) for arrays in result.surfaces]
+        except MeshError as error:
+            raise located(error, mesh) from None
+    files = [output]
+    if len(surfaces) > 1:
+        files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(surfaces) + 1)]
+        refuse_present(files, force=force)
+    about = []
+    for path, surface in zip(files, surfaces, strict=True):
+        write_mesh(path, surface)
+        about.append(_about(surface) | {"output": str(path)})
+    if as_json:
+        print_json({"input": str(mesh), "steps": result.counts, "surfaces": about})
+        return
+    for notice in soup.notices:
+        note(f"{soup.name}: {notice}")
+    print_steps(result.steps)
+    for one in about:
+        out.print(
+            f"{one['output']}: {one['vertices']:,} vertices, {one['faces']:,} triangles, "
+            f"{one['boundary_loops']} boundary loops, genus {one['genus']}",
+            soft_wrap=True,
+        )
+
+
+def print_steps(steps: Mapping[Step, int]) -> None:
+    """Print how often each step of a repair was taken."""
+    from cembench.mesh.repair import TITLES
+
+    for step, count in steps.items():
+        out.print(f"{count:>9,}  {TITLES[step]}", style="" if count else "dim")
+
+
+def _about(surface: TriangleMesh) -> dict[str, Any]:
+    from cembench.mesh.topology import euler_characteristic
+
+    loops = len(surface.loops)
+    euler = euler_characteristic(surface.F, surface.n)
+    return {
+        "vertices": surface.n,
+        "faces": surface.m,
+        "boundary_loops": loops,
+        "genus": (2 - loops - euler) // 2,
+    }
+
+
+#: Each verb with the examples that its help shows.
+VERBS = (
+    (
+        repair,
+        "Examples:  cembench repair scan.obj -o mended.obj  ·  "
+        "cembench repair scan.ply -o mended.ply --weld 1e-6 --fill-holes 20  ·  "
+        "cembench repair parts.stl -o part.obj --components all --json",
+    ),
+)

@@ -1,0 +1,388 @@
+"""Cut a surface open along short curves until it is a disk.
+
+The curves form a *cut graph*: what is left of the surface when it is taken away is one disk. A
+first one comes from a tree and a cotree [1]_: the tree of shortest paths from a root, and a
+spanning tree of the triangles that crosses the edges farthest from it; the edges in neither, with
+their paths to the root, cut every handle. Holes are joined to it by the tree. Then each arc of the
+graph is replaced by the shortest one that does the same, which is a shortest path between the two
+boundaries of the annulus that is left when the arc alone is healed, until none becomes shorter.
+
+A sphere needs no cut to be simply connected, but a boundary to be mapped to the disk: it is cut
+along a shortest path between two far points.
+
+References
+----------
+.. [1] J. Erickson, K. Whittlesey, "Greedy optimal homotopy and homology generators", SODA 2005.
+
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from cembench.core.atomic import write_bytes
+from cembench.core.errors import MeshError, ParameterError
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh import topology
+from cembench.mesh.defects import UnusableMeshError, components
+from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+
+Points = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Edge = tuple[int, int]
+
+#: An arc is replaced when that shortens it by more than this share.
+_SHORTER = 1e-9
+#: Rounds over all arcs; each replaces every arc once, and few surfaces need more than three.
+_ROUNDS = 10
+#: Roots that are tried for the tree, far from each other.
+_ROOTS = 4
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A surface that was cut open into a disk."""
+
+    #: The disk. Its triangles are those of the surface, in their order.
+    mesh: DiskMesh
+    #: The vertex of the surface that each vertex of the disk is a copy of; vertex i below the
+    #: surface's number of vertices is vertex i.
+    origin: Indices
+    #: The edges (k, 2) of the surface that were cut, and their length.
+    edges: Indices
+    length: float
+
+
+def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
+    """Cut a surface into a disk along short curves.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        A connected surface: closed or with boundary loops, of any genus.
+    through : sequence of int
+        Vertices that the cut has to reach, counted from 0. A sphere without any is cut between
+        two points that lie far from each other.
+
+    Returns
+    -------
+    Cut
+        The disk, and how its vertices belong to the surface's.
+
+    Raises
+    ------
+    UnusableMeshError
+        The surface is not connected.
+    ParameterError
+        A vertex that the mesh does not have, or two neighbours and nothing else on a sphere.
+
+    """
+    pieces = components(mesh.F, mesh.n)
+    if pieces is not None:
+        raise UnusableMeshError([pieces])
+    for vertex in through:
+        if not 0 <= vertex < mesh.n:
+            raise ParameterError(
+                f"vertex {vertex} is not in {mesh.name}; allowed is 0 to {mesh.n - 1}."
+            )
+    net = _Net.of(mesh)
+    points = list(dict.fromkeys(through))
+    if net.is_sphere and len(points) < 2:
+        points = net.extremities(points)
+    marks = frozenset(points)
+    graph = min((net.cut_graph(root, marks) for root in net.roots(points)), key=net.length)
+    graph = _without_ears(net, _shortened(net, graph, marks), marks)
+    if net.is_sphere and len(graph) < 2:
+        a, b = points[:2]
+        raise ParameterError(
+            f"vertices {a} and {b} are neighbours; a cut of one edge leaves the surface closed. "
+            "Name two vertices that lie farther from each other."
+        )
+    F, origin = net.cut(graph)
+    told = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
+    notice = Notice(NoticeKind.CUT_OPEN, told)
+    disk = DiskMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=(*mesh.notices, notice))
+    edges = net.edges[np.array(sorted(graph), dtype=np.int64)]
+    return Cut(disk, origin, edges, net.length(graph))
+
+
+def write_seam(path: Path, cut: Cut) -> None:
+    """Write a CSV file with the vertex of the surface for each vertex of the disk, from 0."""
+    rows = "".join(f"{k},{v}\n" for k, v in enumerate(cut.origin.tolist()))
+    content = f"vertex,original\n{rows}".encode()
+    write_bytes(path, content, error=MeshError, parents=False)
+
+
+@dataclass(frozen=True)
+class _Net:
+    """The edges of a surface; a cut graph is a set of numbers of interior ones."""
+
+    V: Points
+    F: Indices
+    edges: Indices  #: (e, 2), smaller vertex first, ascending
+    edge: Indices  #: (3m,), the edge of each half-edge
+    pairs: Indices  #: (interior edges, 2), their half-edges
+    lengths: Points  #: (e,)
+    rim: NDArray[np.bool_]  #: (e,), whether an edge is on the boundary
+    loops: tuple[Indices, ...]
+
+    @classmethod
+    def of(cls, mesh: TriangleMesh) -> _Net:
+        edges, edge, faces = edges_of_half_edges(mesh.F)
+        lengths = np.linalg.norm(mesh.V[edges[:, 0]] - mesh.V[edges[:, 1]], axis=1)
+        pairs = paired_half_edges(edge, faces)
+        return cls(mesh.V, mesh.F, edges, edge, pairs, lengths, faces == 1, mesh.loops)
+
+    @property
+    def n(self) -> int:
+        return len(self.V)
+
+    @property
+    def is_sphere(self) -> bool:
+        return not self.loops and self.n - len(self.edges) + len(self.F) == 2
+
+    def length(self, graph: Iterable[int]) -> float:
+        return float(self.lengths[list(graph)].sum())
+
+    def numbers(self, path: Indices) -> list[int]:
+        """Return the edges between successive vertices of a path."""
+        ends = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
+        keys = self.edges[:, 0] * self.n + self.edges[:, 1]
+        found: list[int] = np.searchsorted(keys, ends[:, 0] * self.n + ends[:, 1]).tolist()
+        return found
+
+    def roots(self, points: list[int]) -> list[int]:
+        """Return where trees of shortest paths may begin."""
+        if points:
+            return points[:1]
+        if self.loops:
+            return [int(loop[0]) for loop in self.loops[:_ROOTS]]
+        return self.far_points([], _ROOTS)
+
+    def extremities(self, points: list[int]) -> list[int]:
+        """Return two points far from each other, the first of them given perhaps."""
+        return self.far_points(points, 2)
+
+    def far_points(self, points: list[int], count: int) -> list[int]:
+        """Add vertices, each as far as possible from those before it."""
+        graph = self._distances()
+        if not points:
+            points = [int(np.argmax(csgraph.dijkstra(graph, indices=0)))]
+        while len(points) < count:
+            away = csgraph.dijkstra(graph, indices=points, min_only=True)
+            points = [*points, int(np.argmax(away))]
+        return points
+
+    def cut_graph(self, root: int, marks: frozenset[int]) -> frozenset[int]:
+        """Return a cut graph by tree and cotree that reaches these vertices."""
+        away, before = csgraph.dijkstra(self._distances(), indices=root, return_predecessors=True)
+        child = np.flatnonzero(before >= 0)
+        in_tree = np.zeros(len(self.edges), dtype=bool)
+        in_tree[self._between(child, before[child])] = True
+        crossed = self._cotree(away, in_tree)
+        loose = np.flatnonzero(~(in_tree | crossed | self.rim))
+        ends = [int(loop[np.argmin(away[loop])]) for loop in self.loops]
+        graph = set(loose.tolist())
+        for vertex in (*self.edges[loose].ravel().tolist(), *ends, *marks):
+            while vertex != root:
+                following = int(before[vertex])
+                step = int(self._between(np.array([vertex]), np.array([following]))[0])
+                if step in graph:
+                    break
+                if not self.rim[step]:
+                    graph.add(step)
+                vertex = following
+        return _pruned(self, graph, marks)
+
+    def cut(self, graph: Iterable[int]) -> tuple[Indices, Indices]:
+        """Return the triangles with these edges cut, and the vertices that theirs are copies of."""
+        open_ = np.zeros(len(self.edges), dtype=bool)
+        open_[list(graph)] = True
+        return glue(self.F, self.pairs[~open_[self.edge[self.pairs[:, 0]]]], self.n)
+
+    def _between(self, i: Indices, j: Indices) -> Indices:
+        keys = self.edges[:, 0] * self.n + self.edges[:, 1]
+        return np.searchsorted(keys, np.minimum(i, j) * self.n + np.maximum(i, j))
+
+    def _distances(self) -> sparse.csr_array:
+        """Return the graph of the edges, those of the boundary next to nothing: they are cut."""
+        weights = np.where(self.rim, 1e-9 * self.lengths.mean(), self.lengths)
+        return _graph(self.edges, weights, self.n)
+
+    def _cotree(self, away: Points, in_tree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return which edges a spanning tree of the triangles crosses: far ones, not the tree's."""
+        number = self.edge[self.pairs[:, 0]]
+        loop_length = away[self.edges[number]].sum(axis=1) + self.lengths[number]
+        most = loop_length.max() + self.lengths.mean()
+        cost = np.where(in_tree[number], 2 * most, most - loop_length)
+        m = len(self.F)
+        i, j = np.sort(self.pairs // 3, axis=1).T
+        tree = csgraph.minimum_spanning_tree(sparse.coo_array((cost, (i, j)), shape=(m, m)))
+        chosen = tree.tocoo()
+        keys = i * m + j
+        order = np.argsort(keys)
+        at = np.searchsorted(keys[order], chosen.row.astype(np.int64) * m + chosen.col)
+        crossed = np.zeros(len(self.edges), dtype=bool)
+        crossed[number[order[at]]] = True
+        return crossed
+
+
+def _graph(edges: Indices, weights: Points, n: int) -> sparse.csr_array:
+    i, j = edges.T
+    both = np.concatenate([weights, weights])
+    ends = (np.concatenate([i, j]), np.concatenate([j, i]))
+    return sparse.coo_array((both, ends), shape=(n, n)).tocsr()
+
+
+def _neighbours(net: _Net, graph: Iterable[int]) -> dict[int, list[Edge]]:
+    """Return for each vertex of a cut graph its edges there, as (edge, other end)."""
+    found: dict[int, list[Edge]] = defaultdict(list)
+    for number in sorted(graph):
+        i, j = net.edges[number].tolist()
+        found[i].append((number, j))
+        found[j].append((number, i))
+    return found
+
+
+def _held(net: _Net, marks: frozenset[int]) -> frozenset[int]:
+    """Return the vertices where a cut may end: on the boundary, and where it has to reach."""
+    return marks.union(*(loop.tolist() for loop in net.loops))
+
+
+def _pruned(net: _Net, graph: Iterable[int], marks: frozenset[int]) -> frozenset[int]:
+    """Take away what ends in the middle of the surface."""
+    left = set(graph)
+    around = _neighbours(net, left)
+    held = _held(net, marks)
+    ends = [v for v, there in around.items() if len(there) == 1 and v not in held]
+    while ends:
+        vertex = ends.pop()
+        ((number, other),) = around.pop(vertex)
+        left.discard(number)
+        around[other].remove((number, vertex))
+        if len(around[other]) == 1 and other not in held:
+            ends.append(other)
+    return frozenset(left)
+
+
+def _arcs(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> list[list[int]]:
+    """Return the graph's arcs between branching points, ends and the boundary, longest first."""
+    around = _neighbours(net, graph)
+    held = _held(net, marks)
+    nodes = [v for v, there in around.items() if len(there) != 2 or v in held]
+    arcs, seen = [], set()
+    for node in nodes:
+        for number, other in around[node]:
+            if number in seen:
+                continue
+            arc, before, vertex = [number], number, other
+            while len(around[vertex]) == 2 and vertex not in held:
+                before, vertex = next(e for e in around[vertex] if e[0] != before)
+                arc.append(before)
+            seen.update(arc)
+            arcs.append(sorted(arc))
+    return sorted(arcs, key=net.length, reverse=True)
+
+
+def _shortened(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> frozenset[int]:
+    """Replace arcs by shorter ones until no single arc can be."""
+    for _ in range(_ROUNDS):
+        before = net.length(graph)
+        for arc in _arcs(net, graph, marks):
+            if arc not in _arcs(net, graph, marks):  # another replacement has ended on it
+                continue
+            rest = graph.difference(arc)
+            shorter = _pruned(net, rest.union(_shortest_arc(net, rest, arc, marks)), marks)
+            if net.length(shorter) < (1 - _SHORTER) * net.length(graph):
+                graph = shorter
+        if net.length(graph) >= (1 - _SHORTER) * before:
+            break
+    return graph
+
+
+def _shortest_arc(
+    net: _Net,
+    rest: frozenset[int],
+    arc: list[int],
+    marks: frozenset[int],
+    *,
+    spare_rim: bool = False,
+) -> list[int]:
+    """Return the shortest arc that makes a disk again of what the rest of the graph leaves.
+
+    It joins the two boundaries of an annulus; or an end that must be reached to the one boundary
+    of a disk, or to the other end on a sphere. With `spare_rim` it does not run along triangles
+    that have a side on the boundary, if there is another way.
+    """
+    F, origin = net.cut(rest)
+    edges, edge, faces = edges_of_half_edges(F)
+    n = len(origin)
+    ends = net.edges[arc].ravel()
+    loops = topology.boundary_loops(F, n)
+    touched = np.unique(origin[np.concatenate(loops)]) if loops else np.empty(0, dtype=np.int64)
+    tips = [int(v) for v in marks.intersection(ends.tolist()) if v not in touched]
+    if len(loops) == 2:
+        sources, targets = loops
+    elif len(tips) == 1 and len(loops) == 1:
+        sources, targets = np.array(tips), loops[0]
+    elif len(tips) == 2 and not loops:
+        sources, targets = np.array(tips[:1]), np.array(tips[1:])
+    else:  # the arc joins marked points in another way: it stays
+        return arc
+    points = net.V[origin]
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    if spare_rim:
+        sides = edge.reshape(-1, 3)
+        beside = np.unique(sides[(faces[sides] == 1).any(axis=1)])
+        lengths[beside] += lengths.sum()  # longer than any other way
+    away, before, source = csgraph.dijkstra(
+        _graph(edges, lengths, n), indices=sources, min_only=True, return_predecessors=True
+    )
+    reached = away[targets]
+    if spare_rim:  # four arcs in one vertex leave some of them little room
+        reached = reached + (origin[source[targets]] == origin[targets]) * lengths.sum()
+    path = [int(targets[np.argmin(reached)])]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return net.numbers(origin[path])
+
+
+def _without_ears(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> frozenset[int]:
+    """Reroute arcs whose cut would leave triangles hanging by one side.
+
+    The tip of such a triangle has no way inside, and a map may have to fold it. They come about
+    where arcs meet at a narrow angle.
+    """
+    sides = net.edge.reshape(-1, 3)
+
+    def ears(graph: frozenset[int]) -> Indices:
+        taken, open_ = np.zeros((2, len(net.edges)), dtype=bool)
+        taken[list(graph)] = True
+        open_ = taken | net.rim
+        hanging = (open_[sides].sum(axis=1) >= 2) & taken[sides].any(axis=1)
+        return np.flatnonzero(hanging)
+
+    best = graph
+    for _ in range(_ROUNDS):
+        for arc in _arcs(net, graph, marks):
+            hanging = ears(graph)
+            if not len(hanging):
+                return graph
+            if arc not in _arcs(net, graph, marks) or not np.isin(arc, sides[hanging]).any():
+                continue
+            rest = graph.difference(arc)
+            rerouted = _shortest_arc(net, rest, arc, marks, spare_rim=True)
+            moved = _pruned(net, rest.union(rerouted), marks)
+            if len(ears(moved)) <= len(hanging):  # a move aside may make room for the next arc
+                graph = moved
+        best = min(best, graph, key=lambda one: (len(ears(one)), net.length(one)))
+    return best

@@ -1,0 +1,498 @@
+"""What is wrong with vertices and triangles that are to be a surface.
+
+Every defect has a kind, a count and a sentence, and :class:`UnusableMeshError` holds all of them,
+so that a user mends a file once and not once for each message.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cembench.core.errors import MeshError
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh import topology
+
+Points = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+#: A triangle counts as degenerate when its area is below this share of its longest edge squared.
+DEGENERATE_AREA = 1e-15
+#: Below this share a triangle is kept, with a notice: cotangents lose digits with its square.
+SLIVER_AREA = 1e-6
+#: Coordinates and edges in between: the fourth powers of lengths are computed with.
+LARGEST_LENGTH = 1e60
+SMALLEST_LENGTH = 1e-60
+
+
+class Defect(StrEnum):
+    """What can be wrong with a surface, in the order in which a repair goes about it."""
+
+    not_finite = "not finite"
+    out_of_range = "out of range"
+    scale = "scale"
+    coincident = "coincident vertices"
+    degenerate = "degenerate triangles"
+    duplicate = "duplicate triangles"
+    edges = "non-manifold edges"
+    vertices = "non-manifold vertices"
+    orientation = "inconsistent orientation"
+    one_sided = "one-sided"
+    components = "several components"
+    isolated = "isolated vertices"
+    holes = "holes"
+    no_hole = "no hole"
+    closed = "closed"
+    handles = "handles"
+
+
+class Remedy(StrEnum):
+    """What does away with a defect; most are commands."""
+
+    repair = "repair"
+    fill = "fill"
+    cut = "cut"
+    rescale = "rescale"
+    other_algorithm = "other algorithm"
+
+
+_REMEDIES = {
+    Defect.scale: Remedy.rescale,
+    Defect.holes: Remedy.fill,
+    Defect.no_hole: Remedy.other_algorithm,
+    Defect.closed: Remedy.cut,
+    Defect.handles: Remedy.cut,
+}
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One kind of defect of a surface: how often it occurs, and where first."""
+
+    defect: Defect
+    #: How many vertices, triangles, edges, pieces, loops or handles have it.
+    count: int
+    #: What is wrong, where, and what is allowed; no full stop at the end.
+    text: str
+    #: For holes: so many edges has the largest of those that would have to be filled.
+    edges: int = 0
+
+    @property
+    def remedy(self) -> Remedy:
+        """What does away with it."""
+        return _REMEDIES.get(self.defect, Remedy.repair)
+
+
+class UnusableMeshError(MeshError):
+    """A surface with defects; `problems` are all of them, and the message names the remedies."""
+
+    def __init__(self, problems: Sequence[Problem], path: Path | None = None) -> None:
+        self.problems = tuple(problems)
+        self.path = path
+        where = "" if path is None else f"{path}: "
+        if len(problems) == 1:
+            said = f"{where}{problems[0].text}."
+        else:
+            lines = "".join(f"\n  {k}. {p.text}." for k, p in enumerate(problems, start=1))
+            said = f"{where}{len(problems)} problems:{lines}\n"
+        super().__init__(said + ("" if said.endswith("\n") else " ") + _remedies(problems, path))
+
+    def __reduce__(self) -> tuple[type[UnusableMeshError], tuple[Any, ...]]:
+        return UnusableMeshError, (self.problems, self.path)
+
+
+def _remedies(problems: Sequence[Problem], path: Path | None) -> str:
+    """Return the commands that mend a surface, in the order in which they are to be used."""
+    needed = {p.remedy for p in problems}
+    given = "IN" if path is None else shlex.quote(str(path))
+    mended = "OUT" if path is None else f"{shlex.quote(path.stem + '_repaired')}.obj"
+    fill = f" --fill-holes {max(p.edges for p in problems)}" if Remedy.fill in needed else ""
+    advice = []
+    if Remedy.rescale in needed:
+        advice.append(
+            "Angles do not depend on the scale: divide all coordinates by the same number."
+        )
+    if Remedy.repair in needed:
+        does = "mends this" if len(problems) == 1 else "mends what can be mended"
+        advice.append(
+            f"`cembench repair {given} -o {mended}` {does}, or add --repair to map or run."
+        )
+        given = mended
+    if fill:
+        advice.append(
+            f"`cembench repair {given} -o {mended}{fill}` fills the holes; or use an algorithm for "
+            "surfaces with holes (see `cembench list algorithms`)."
+        )
+    if Remedy.cut in needed:
+        cut = "OUT" if path is None else f"{shlex.quote(path.stem + '_cut')}.obj"
+        advice.append(
+            f"`cembench cut {given} -o {cut}` makes it a disk, or add --cut to map: then the UVs "
+            "are written for the uncut surface."
+        )
+    if Remedy.other_algorithm in needed:
+        advice.append("Use an algorithm for disks (see `cembench list algorithms`).")
+    return " ".join(advice)
+
+
+def located(error: MeshError, path: Path | None) -> MeshError:
+    """Return the same error with the file it is about, if there is one."""
+    if path is None:
+        return error
+    if isinstance(error, UnusableMeshError):
+        return UnusableMeshError(error.problems, path)
+    return MeshError(f"{path}: {error}")
+
+
+def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
+    """Return vertices (n, 3) and triangles (m, 3) as float64 and int64.
+
+    Raises
+    ------
+    MeshError
+        The arrays have other shapes, the indices are not integers, or there are no faces.
+
+    """
+    points, faces = np.asarray(V), np.asarray(F)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), one row a vertex.")
+    if points.dtype.kind not in "fiub":
+        raise MeshError(f"coordinates are of type {points.dtype}; allowed are real numbers.")
+    if not len(points):
+        raise MeshError("the mesh has no vertices; a surface needs some.")
+    if faces.size == 0:
+        raise MeshError(
+            f"the mesh has {len(points)} vertices but no faces; a surface needs triangles. "
+            "If this is a point cloud, reconstruct a surface from it first."
+        )
+    if faces.ndim != 2 or faces.shape[1] != 3:
+        raise MeshError(
+            f"faces have shape {faces.shape}; allowed is (m, 3), three vertex indices a triangle."
+        )
+    if not np.issubdtype(faces.dtype, np.integer):
+        raise MeshError(f"face indices are of type {faces.dtype}; allowed are integers.")
+    return np.array(points, dtype=np.float64), np.array(faces, dtype=np.int64)
+
+
+class Examination(NamedTuple):
+    """What was found out about triangles."""
+
+    #: The triangles, those turned over that faced the other way than the rest of their piece.
+    F: Indices
+    #: What was changed, and which triangles are sound but hardly.
+    notices: tuple[Notice, ...]
+    #: Every defect that keeps them from being a manifold; none if this is empty.
+    problems: tuple[Problem, ...]
+
+
+def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
+    """Orient triangles, and find every defect that keeps them from being a manifold.
+
+    `connected` says that they must form a single piece too. On a sound surface only what can be
+    ruled out quickly is looked at. On one with defects, coincident vertices and turned triangles
+    are named as well: alone they are allowed, but they are often the cause.
+    """
+    finite: Mask = np.asarray(np.isfinite(V).all(axis=1))
+    inside: Mask = np.asarray(((F >= 0) & (len(V) > F)).all(axis=1))
+    sound: Mask = inside & finite[np.where(inside[:, None], F, 0)].all(axis=1)
+    number = np.flatnonzero(sound)
+    kept = F if sound.all() else F[sound]
+    scale = out_of_scale(V, kept)
+    found = [
+        _not_finite(np.flatnonzero(~finite)),
+        _out_of_range(np.flatnonzero(~inside), F, len(V)),
+        scale,
+        _isolated(np.flatnonzero(finite & ~_used(F[inside], len(V)))),
+    ]
+    turned = np.zeros(0, dtype=bool)
+    if len(kept):
+        edges, faces = topology.undirected_edges(kept)
+        facing, turned, contradictions = oriented(kept)
+        found += [
+            None if scale else _degenerate(number[degenerate(V, kept)], F),
+            _edges(edges, faces),
+            _one_sided(contradictions, faces),
+            _vertices(kept),
+            components(kept, len(V)) if connected else None,
+        ]
+    problems = [p for p in found if p is not None]
+    if not problems:
+        return Examination(facing, (*_slivers(V, F), *_turned(turned)), ())
+    if len(kept):
+        one_sided = any(p.defect is Defect.one_sided for p in problems)
+        more = [
+            coincident(V),
+            _duplicates(F, number),
+            None if one_sided else _orientation(number[turned], F),
+        ]
+        problems += [p for p in more if p is not None]
+    ordered = sorted(problems, key=lambda p: list(Defect).index(p.defect))
+    return Examination(F, (), tuple(ordered))
+
+
+def degenerate(V: Points, F: Indices) -> Mask:
+    """Whether each triangle is without an area, up to rounding."""
+    return _thinner_than(DEGENERATE_AREA, V, F)
+
+
+def out_of_scale(V: Points, F: Indices) -> Problem | None:
+    """Return the problem that products of lengths would overflow or vanish, if they would."""
+    finite = np.abs(V[np.isfinite(V).all(axis=1)])
+    largest = finite.max(initial=0)
+    if largest > LARGEST_LENGTH:
+        return Problem(
+            Defect.scale,
+            int((finite > LARGEST_LENGTH).any(axis=1).sum()),
+            f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}",
+        )
+    spans = np.abs(V[F[:, [1, 2, 0]]] - V[F]).max(axis=(1, 2))
+    tiny = np.flatnonzero((spans > 0) & (spans < SMALLEST_LENGTH))
+    if not len(tiny):
+        return None
+    return Problem(
+        Defect.scale,
+        len(tiny),
+        f"triangle {some(tiny)} (counted from 0) spans less than {SMALLEST_LENGTH:g}, the first "
+        f"{spans[tiny[0]]:.3g}",
+    )
+
+
+def duplicates(F: Indices) -> Mask:
+    """Whether each triangle has the same three vertices as an earlier one."""
+    import igl
+
+    _, first, _ = igl.unique_simplices(F)
+    extra = np.ones(len(F), dtype=bool)
+    extra[first] = False
+    return extra
+
+
+def representatives(V: Points, tolerance: float = 0.0) -> Indices:
+    """Return for each vertex the first vertex at its place, or within the tolerance of it.
+
+    Vertices that a chain of steps within the tolerance links count as one place.
+    """
+    if tolerance == 0:
+        _, first, place = np.unique(V + 0.0, axis=0, return_index=True, return_inverse=True)
+        return first[place.reshape(-1)]
+    from scipy import sparse
+    from scipy.sparse import csgraph
+    from scipy.spatial import cKDTree
+
+    i, j = cKDTree(V).query_pairs(tolerance, output_type="ndarray").T
+    graph = sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(V), len(V)))
+    _, place = csgraph.connected_components(graph, directed=False)
+    return np.unique(place, return_index=True)[1][place]
+
+
+def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
+    """Orient all triangles of a piece alike, as most of them are.
+
+    Returns
+    -------
+    F : int64 (m, 3)
+        The triangles; those turned over have two corners exchanged.
+    turned : bool (m,)
+        Which those are.
+    contradictions : int64 (k, 2)
+        Directed edges that two triangles still share: there are none unless the surface is
+        one-sided or has non-manifold edges.
+
+    """
+    if not len(topology.repeated_half_edges(F)):
+        return F, np.zeros(len(F), dtype=bool), np.empty((0, 2), dtype=np.int64)
+    import igl  # here and elsewhere: every measured process would wait for it, and none needs it
+
+    found, piece = igl.bfs_orient(F)
+    turned = (found != F).any(axis=1)
+    # The search keeps the first triangle it meets; keep the majority instead, piece by piece.
+    mostly = np.bincount(piece, weights=turned) > np.bincount(piece) / 2
+    turned ^= mostly[piece]
+    F = np.ascontiguousarray(np.where(turned[:, None], F[:, ::-1], F))
+    return F, turned, topology.repeated_half_edges(F)
+
+
+def coincident(V: Points) -> Problem | None:
+    """Return the problem that vertices lie exactly where others do, if any do."""
+    finite = np.flatnonzero(np.isfinite(V).all(axis=1))
+    same = representatives(V[finite])
+    extra = np.flatnonzero(same != np.arange(len(same)))
+    if not len(extra):
+        return None
+    i, j = finite[same[extra[0]]], finite[extra[0]]
+    return Problem(
+        Defect.coincident,
+        len(extra),
+        f"coincident vertices: {len(extra)} vertices lie exactly where another does, the first "
+        f"pair being {i} and {j} (counted from 0); seams may be open that should be closed",
+    )
+
+
+def components(F: Indices, n: int) -> Problem | None:
+    """Whether the triangles form more than one connected piece."""
+    _, label = topology.components(F, n)
+    vertices = np.bincount(label, weights=_used(F, n)).astype(int)
+    pieces = np.flatnonzero(vertices)
+    if len(pieces) == 1:
+        return None
+    smallest = pieces[np.argmin(vertices[pieces])]
+    place = int(np.flatnonzero((label == smallest) & _used(F, n))[0])
+    return Problem(
+        Defect.components,
+        len(pieces),
+        f"the mesh has {len(pieces)} connected components (the largest with {vertices.max()} of "
+        f"{vertices.sum()} vertices; vertex {place} lies in the smallest); this needs exactly one",
+    )
+
+
+def some(indices: NDArray[np.int64], most: int = 5) -> str:
+    """Write the first few of many, for a message."""
+    shown = ", ".join(str(k) for k in indices[:most].tolist())
+    return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
+
+
+def _thinner_than(share: float, V: Points, F: Indices) -> Mask:
+    """Whether each triangle has at most this share of its longest edge squared as its area."""
+    corners = V[F]
+    edges = corners[:, [1, 2, 0]] - corners
+    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+    longest = (edges**2).sum(axis=2).max(axis=1)
+    thin: Mask = double_area <= 2 * share * longest
+    return thin
+
+
+def _slivers(V: Points, F: Indices) -> tuple[Notice, ...]:
+    thin = np.flatnonzero(_thinner_than(SLIVER_AREA, V, F))
+    if not len(thin):
+        return ()
+    told = (
+        f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
+        f"{some(thin)}; energies and dilatations lose digits in rounding there"
+    )
+    return (Notice(NoticeKind.SLIVERS, told),)
+
+
+def _turned(turned: Mask) -> tuple[Notice, ...]:
+    if not turned.any():
+        return ()
+    told = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
+    return (Notice(NoticeKind.ORIENTATION_REPAIRED, told),)
+
+
+def _used(F: Indices, n: int) -> Mask:
+    used = np.zeros(n, dtype=bool)
+    used[F] = True
+    return used
+
+
+def _not_finite(bad: Indices) -> Problem | None:
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.not_finite,
+        len(bad),
+        f"coordinates that are NaN or infinite at vertex {some(bad)} (counted from 0); all must be "
+        "finite",
+    )
+
+
+def _out_of_range(bad: Indices, F: Indices, n: int) -> Problem | None:
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.out_of_range,
+        len(bad),
+        f"triangle {some(bad)} (counted from 0) has a vertex index out of range, the first being "
+        f"{F[bad[0]].tolist()}; allowed is 0 to {n - 1}: the file is damaged or was cut short",
+    )
+
+
+def _isolated(bad: Indices) -> Problem | None:
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.isolated,
+        len(bad),
+        f"isolated vertices, in no triangle: {some(bad)} (counted from 0)",
+    )
+
+
+def _degenerate(bad: Indices, F: Indices) -> Problem | None:
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.degenerate,
+        len(bad),
+        f"degenerate triangles (zero area): {some(bad)} (counted from 0), the first with vertices "
+        f"{F[bad[0]].tolist()}; angles are not defined there",
+    )
+
+
+def _duplicates(F: Indices, number: Indices) -> Problem | None:
+    bad = number[duplicates(F[number])]
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.duplicate,
+        len(bad),
+        f"duplicate triangles, with the same three vertices as another: {some(bad)} (counted "
+        f"from 0), the first with vertices {F[bad[0]].tolist()}",
+    )
+
+
+def _edges(edges: Indices, faces: Indices) -> Problem | None:
+    bad = np.flatnonzero(faces > 2)
+    if not len(bad):
+        return None
+    i, j = edges[bad[0]].tolist()
+    return Problem(
+        Defect.edges,
+        len(bad),
+        f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
+        f"{i}-{j} with {faces[bad[0]]}",
+    )
+
+
+def _one_sided(contradictions: Indices, faces: Indices) -> Problem | None:
+    if not len(contradictions) or faces.max() > 2:
+        return None
+    i, j = contradictions[0].tolist()
+    return Problem(
+        Defect.one_sided,
+        len(contradictions),
+        f"the surface is one-sided (like a Moebius strip): the triangles at edge {i}-{j} "
+        "contradict each other however they are turned; a repair cuts it there",
+    )
+
+
+def _orientation(bad: Indices, F: Indices) -> Problem | None:
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.orientation,
+        len(bad),
+        f"inconsistent orientation: {len(bad)} triangle(s) face the other way than the rest, the "
+        f"first with vertices {F[bad[0]].tolist()}",
+    )
+
+
+def _vertices(F: Indices) -> Problem | None:
+    import igl
+
+    manifold = igl.is_vertex_manifold(F)  # false also for numbers that no triangle has
+    bad = np.flatnonzero(~manifold & _used(F, len(manifold)))
+    if not len(bad):
+        return None
+    return Problem(
+        Defect.vertices,
+        len(bad),
+        f"non-manifold vertex {some(bad)} (counted from 0): its triangles form more than one fan, "
+        "so the surface touches itself in a point",
+    )

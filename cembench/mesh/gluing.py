@@ -1,0 +1,69 @@
+"""Triangles glued along chosen pairs of their sides, everything else left apart.
+
+A triangulation is its triangles and a list of which sides are glued to which. Leaving a pair out of
+the list cuts the surface there; gluing a side to at most one other makes every vertex a single fan.
+So one function splits non-manifold vertices and edges, and cuts a surface open.
+
+Half-edge ``h = 3 t + c`` is the side of triangle ``t`` from corner ``h`` to the next corner of the
+triangle, as in :mod:`cembench.mesh.topology`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from cembench.mesh.topology import half_edges
+
+Indices = NDArray[np.int64]
+
+
+def edges_of_half_edges(F: Indices) -> tuple[Indices, Indices, Indices]:
+    """Return the edges (e, 2), the edge of each half-edge (3m,), each edge's faces (e,)."""
+    ends = np.sort(half_edges(F), axis=1)
+    stride = int(F.max(initial=0)) + 1
+    keys, edge, faces = np.unique(
+        ends[:, 0] * stride + ends[:, 1], return_inverse=True, return_counts=True
+    )
+    return np.stack([keys // stride, keys % stride], axis=1), edge.reshape(-1), faces
+
+
+def paired_half_edges(edge: Indices, faces: Indices) -> Indices:
+    """Return the two half-edges of every edge with exactly two faces, (k, 2), by edge."""
+    order = np.argsort(edge, kind="stable")
+    return order[faces[edge[order]] == 2].reshape(-1, 2)
+
+
+def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
+    """Glue triangles along these pairs of half-edges (k, 2), and nowhere else.
+
+    Returns
+    -------
+    F : int64 (m, 3)
+        The triangles in the same order, with new vertices.
+    origin : int64 (n',)
+        The vertex of the input that each new vertex is a copy of. Vertex i of the input stays
+        vertex i, with one of its fans; the copies for its other fans are numbered from `n` on.
+
+    """
+    corner = np.arange(F.size).reshape(F.shape)
+    following = np.roll(corner, -1, axis=1).ravel()
+    vertex = F.ravel()
+    left, right = pairs.T
+    alike = vertex[left] == vertex[right]  # both sides run the same way: orientations disagree
+    start = np.where(alike, right, following[right])
+    end = np.where(alike, following[right], right)
+    i, j = np.concatenate([left, following[left]]), np.concatenate([start, end])
+    graph = sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(F.size, F.size))
+    _, fan = csgraph.connected_components(graph, directed=False)
+    first = np.unique(fan, return_index=True)[1]  # a corner of each fan
+    owner = vertex[first]
+    order = np.lexsort((first, owner))
+    is_copy = np.zeros(len(owner), dtype=bool)
+    is_copy[order[1:]] = owner[order[1:]] == owner[order[:-1]]
+    number = owner.copy()
+    copies = order[is_copy[order]]
+    number[copies] = n + np.arange(len(copies))
+    return number[fan].reshape(F.shape), np.concatenate([np.arange(n), owner[copies]])

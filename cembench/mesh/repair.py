@@ -1,0 +1,460 @@
+"""Mend a triangle soup until it is an oriented manifold, and tell every step.
+
+The order of the steps, each of which may need the ones before it and undoes none of them:
+
+1. *Faces with a missing or non-finite vertex* go first: nothing can be computed with them.
+2. *Polygons* are cut into triangles, which needs finite coordinates alone.
+3. *Coincident vertices* are welded; that is what closes seams, and it makes some triangles
+   degenerate and others equal.
+4. *Degenerate triangles* are collapsed (two corners that all but coincide), flipped with their
+   neighbour over the longest edge (three corners on a line: dropping one would leave a crack), or
+   dropped where they have no neighbour there.
+5. *Duplicate triangles*: of those with the same three vertices, the first stays.
+6. *Non-manifold edges and vertices* are split. At an edge with more than two triangles, those two
+   stay together that continue each other most smoothly, so a fin comes off and the sheet it stood
+   on stays whole.
+7. *Orientation*: all triangles of a piece as most of them are, closed pieces outwards; a one-sided
+   surface is cut where its triangles contradict each other. It follows the splitting, since what
+   holds pieces together is known only then.
+8. *Components*: the one with most triangles, or all of them as surfaces of their own. Fins and
+   crumbs that came off before are dropped here.
+9. *Ears*: triangles with two sides on the boundary, whose tip has no way inside; again until there
+   are none.
+10. *Holes* of at most so many edges are filled, if that is wanted; the longest loop stays open.
+11. *Isolated vertices* go last, whatever isolated them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cembench.core.errors import MeshError, ParameterError
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh import topology
+from cembench.mesh.defects import (
+    UnusableMeshError,
+    degenerate,
+    duplicates,
+    oriented,
+    out_of_scale,
+    representatives,
+)
+from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
+from cembench.mesh.polygons import triangulate
+
+Points = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Components = Literal["largest", "all"]
+
+#: A degenerate triangle with an edge below this share of its longest is collapsed, not flipped.
+_NEEDLE = 1e-6
+#: Flipping a degenerate triangle can make its neighbour one; so often it is tried again.
+_FLIP_ROUNDS = 10
+
+
+class Step(StrEnum):
+    """What a repair does, in its order; the value is the name in JSON."""
+
+    invalid_faces = "invalid_faces_dropped"
+    polygons = "polygons_triangulated"
+    weld = "vertices_welded"
+    collapse = "degenerate_triangles_collapsed"
+    flip = "degenerate_triangles_flipped"
+    degenerate = "degenerate_triangles_dropped"
+    duplicate = "duplicate_triangles_dropped"
+    edges = "non_manifold_edges_split"
+    vertices = "non_manifold_vertices_split"
+    orient = "triangles_turned_over"
+    one_sided = "edges_of_one_sided_surfaces_cut"
+    outwards = "closed_components_turned_outwards"
+    components = "components_dropped"
+    component_faces = "triangles_of_dropped_components"
+    ears = "ears_dropped"
+    holes = "holes_filled"
+    isolated = "isolated_vertices_removed"
+
+
+#: What a reader is told of each step, one and many.
+TITLES: dict[Step, str] = {
+    Step.invalid_faces: "faces with a missing or non-finite vertex dropped",
+    Step.polygons: "polygons cut into triangles",
+    Step.weld: "coincident vertices welded",
+    Step.collapse: "degenerate triangles collapsed",
+    Step.flip: "degenerate triangles flipped",
+    Step.degenerate: "degenerate triangles dropped",
+    Step.duplicate: "duplicate triangles dropped",
+    Step.edges: "non-manifold edges split",
+    Step.vertices: "non-manifold vertices split",
+    Step.orient: "triangles turned over",
+    Step.one_sided: "edges of one-sided surfaces cut",
+    Step.outwards: "closed components turned outwards",
+    Step.components: "components dropped",
+    Step.component_faces: "triangles of dropped components",
+    Step.ears: "ears dropped",
+    Step.holes: "holes filled",
+    Step.isolated: "isolated vertices removed",
+}
+
+
+@dataclass(frozen=True)
+class Repaired:
+    """Surfaces that are oriented manifolds, and what was done to make them so."""
+
+    #: Vertices (n, 3) and triangles (m, 3) of each surface, the one with most triangles first.
+    surfaces: tuple[tuple[Points, Indices], ...]
+    #: How often each step was taken; every step is there.
+    steps: dict[Step, int]
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How often each step was taken, by its name in JSON."""
+        return {step.value: n for step, n in self.steps.items()}
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What was changed, a sentence for each step that was needed."""
+        return tuple(
+            Notice(NoticeKind.REPAIRED, f"repaired: {n:,} {TITLES[step]}")
+            for step, n in self.steps.items()
+            if n
+        )
+
+
+def repair(
+    V: ArrayLike,
+    faces: Indices | Iterable[Indices],
+    *,
+    weld: float = 0.0,
+    fill_holes: int = 0,
+    components: Components = "largest",
+) -> Repaired:
+    """Make oriented manifolds out of vertices and faces of any quality.
+
+    Parameters
+    ----------
+    V : (n, 3)
+        Vertices; NaN and infinity are allowed.
+    faces : (m, 3) integers, or blocks (k, c) of k polygons with c corners each
+        Vertex indices, counted from 0.
+    weld : float
+        Vertices at most so far apart, in the units of `V`, become one; 0 welds those that coincide
+        exactly.
+    fill_holes : int
+        Boundary loops of at most so many edges are filled, except the longest of a component.
+    components : "largest" or "all"
+        Which connected components are kept; each is a surface of its own.
+
+    Returns
+    -------
+    Repaired
+        The surfaces, and a count for each step.
+
+    Raises
+    ------
+    ParameterError
+        A tolerance or a number of edges below 0, or `components` is neither word.
+    UnusableMeshError
+        The coordinates are too large or too small to compute with.
+    MeshError
+        Nothing is left: all faces were degenerate or had a missing vertex.
+
+    """
+    _check_options(weld, fill_holes, components)
+    steps = dict.fromkeys(Step, 0)
+    points = np.array(V, dtype=np.float64).reshape(-1, 3)
+    F = _triangles(points, faces, steps)
+    steps[Step.isolated] = len(points) - len(np.unique(F))  # removed with all that is unused
+    F = _weld(points, F, weld, steps)
+    wrong_scale = out_of_scale(points, F)
+    if wrong_scale is not None:
+        raise UnusableMeshError([wrong_scale])
+    F = _mend_degenerate(points, F, steps)
+    extra = duplicates(F) if len(F) else np.zeros(0, dtype=bool)
+    steps[Step.duplicate] = int(extra.sum())
+    F = F[~extra]
+    if not len(F):
+        raise MeshError(
+            "nothing is left to repair: every face is degenerate or has a missing vertex. The file "
+            "is damaged; export it again."
+        )
+    F, origin = _split(points, F, steps)
+    points = points[origin]
+    F, origin = _orient(F, len(points), steps)
+    points = points[origin]
+    F = _outwards(points, F, steps)
+    surfaces = []
+    for piece in _components(F, len(points), components, steps):
+        kept = _drop_ears(piece, len(points), steps)
+        filled = _fill_holes(points, kept, fill_holes, steps)
+        surfaces.append(_compact(*filled))
+    return Repaired(tuple(surfaces), steps)
+
+
+def _check_options(weld: float, fill_holes: int, components: str) -> None:
+    if not (np.isfinite(weld) and weld >= 0):
+        raise ParameterError(f"weld={weld!r} is not allowed; a tolerance is 0 or a finite length.")
+    if fill_holes < 0:
+        raise ParameterError(f"fill_holes={fill_holes} is not allowed; give 0 or more edges.")
+    if components not in ("largest", "all"):
+        raise ParameterError(f"components={components!r} is unknown; allowed: 'largest', 'all'.")
+
+
+def _triangles(V: Points, faces: Indices | Iterable[Indices], steps: dict[Step, int]) -> Indices:
+    """Cut the faces whose vertices exist and are finite into triangles."""
+    blocks = [faces] if isinstance(faces, np.ndarray) else faces
+    blocks = [np.asarray(block, dtype=np.int64) for block in blocks]
+    finite = np.append(np.isfinite(V).all(axis=1), False)
+    kept = []
+    for block in blocks:
+        inside = (block >= 0) & (block < len(V))
+        good = finite[np.where(inside, block, -1)].all(axis=1)
+        steps[Step.invalid_faces] += int((~good).sum())
+        kept.append(block[good])
+    steps[Step.polygons] = sum(len(block) for block in kept if block.shape[1] > 3)
+    return triangulate(V, kept)
+
+
+def _weld(V: Points, F: Indices, tolerance: float, steps: dict[Step, int]) -> Indices:
+    """Let the triangles use one vertex of those that coincide; the others become isolated."""
+    used = np.unique(F)
+    first = used[representatives(V[used], tolerance)]
+    steps[Step.weld] = int((first != used).sum())
+    number = np.arange(len(V))
+    number[used] = first
+    return number[F]
+
+
+def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
+    """Collapse needles, flip triangles whose corners lie on a line, drop what is left."""
+    for _ in range(_FLIP_ROUNDS):
+        F, dropped = _without(F, _repeats_a_vertex(F))
+        steps[Step.degenerate] += dropped
+        bad = np.flatnonzero(degenerate(V, F))
+        if not len(bad):
+            return F
+        F, collapsed = _collapse_needles(V, F, bad)
+        steps[Step.collapse] += collapsed
+        steps[Step.degenerate] -= collapsed  # what a collapse makes of it, the next round drops
+        if not collapsed:
+            F, flipped = _flip(V, F, bad)
+            steps[Step.flip] += flipped
+            if not flipped:
+                break
+    F, dropped = _without(F, _repeats_a_vertex(F) | degenerate(V, F))
+    steps[Step.degenerate] += dropped
+    return F
+
+
+def _without(F: Indices, bad: NDArray[np.bool_]) -> tuple[Indices, int]:
+    return F[~bad], int(bad.sum())
+
+
+def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
+    twice: NDArray[np.bool_] = (np.roll(F, 1, axis=1) == F).any(axis=1)
+    return twice
+
+
+def _lengths(V: Points, F: Indices) -> Points:
+    """Return the length of each side of each triangle, (m, 3); side c starts at corner c."""
+    found: Points = np.linalg.norm(V[np.roll(F, -1, axis=1)] - V[F], axis=2)
+    return found
+
+
+def _collapse_needles(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
+    """Merge the ends of the shortest side of degenerate triangles where it is next to nothing."""
+    lengths = _lengths(V, F[bad])
+    needles = lengths.min(axis=1) <= _NEEDLE * lengths.max(axis=1)
+    if not needles.any():
+        return F, 0
+    side = lengths[needles].argmin(axis=1)
+    corners = F[bad[needles]]
+    row = np.arange(len(corners))
+    ends = np.sort(np.stack([corners[row, side], corners[row, (side + 1) % 3]], axis=1), axis=1)
+    number = np.arange(len(V))
+    np.minimum.at(number, ends[:, 1], ends[:, 0])
+    while (number[number] != number).any():
+        number = number[number]
+    return number[F], int(_repeats_a_vertex(number[F]).sum())
+
+
+def _flip(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
+    """Exchange the longest side of flat triangles for the other diagonal of the quadrilateral.
+
+    No edge may come twice, and no triangle takes part in two flips of a round.
+    """
+    F = F.copy()
+    edges, edge, faces = edges_of_half_edges(F)
+    stride = len(V)
+    present = set((edges[:, 0] * stride + edges[:, 1]).tolist())
+    partner = np.full(F.size, -1)
+    pairs = paired_half_edges(edge, faces)
+    partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
+    touched: set[int] = set()
+    flips = 0
+    side = _lengths(V, F[bad]).argmax(axis=1)
+    for t, c in zip(bad.tolist(), side.tolist(), strict=True):
+        other = int(partner[3 * t + c])
+        s, d = divmod(other, 3)
+        if other < 0 or touched & {s, t}:
+            continue
+        tip = int(F[t, (c + 2) % 3])
+        end, start, far = (int(F[s, (d + k) % 3]) for k in range(3))
+        diagonal = min(tip, far) * stride + max(tip, far)
+        if tip == far or diagonal in present:
+            continue
+        F[t], F[s] = (tip, start, far), (tip, far, end)  # oriented as the neighbour was
+        present.add(diagonal)
+        touched |= {s, t}
+        flips += 1
+    return F, flips
+
+
+def _split(V: Points, F: Indices, steps: dict[Step, int]) -> tuple[Indices, Indices]:
+    """Split edges with more than two triangles, and vertices with more than one fan."""
+    _, edge, faces = edges_of_half_edges(F)
+    pairs = np.concatenate([paired_half_edges(edge, faces), _smoothest_pairs(V, F, edge, faces)])
+    steps[Step.edges] = int((faces > 2).sum())
+    while True:
+        glued, origin = glue(F, pairs, len(V))
+        _, edge, faces = edges_of_half_edges(glued)
+        # Two sheets that were taken apart can still share both ends of an edge.
+        good = faces[edge[pairs[:, 0]]] == 2
+        if good.all():
+            break
+        pairs = pairs[good]
+    steps[Step.vertices] = len(np.unique(origin[len(V) :]))
+    return glued, origin
+
+
+def _smoothest_pairs(V: Points, F: Indices, edge: Indices, faces: Indices) -> Indices:
+    """Choose which triangles stay together at each edge with more than two, (k, 2) half-edges.
+
+    Smoothest first: the angle between two triangles is nearest to straight. Where the input's
+    orientations agree elsewhere, they must agree here too.
+    """
+    crowded = np.flatnonzero(faces[edge] > 2)
+    chosen: list[tuple[int, int]] = []
+    if not len(crowded):
+        return np.empty((0, 2), dtype=np.int64)
+    left, right = paired_half_edges(edge, faces).T
+    trusted = not (F.ravel()[left] == F.ravel()[right]).any()
+    crowded = crowded[np.argsort(edge[crowded], kind="stable")]
+    t, c = np.divmod(crowded, 3)
+    tail, head, tip = F[t, c], F[t, (c + 1) % 3], F[t, (c + 2) % 3]
+    forwards = tail < head
+    along = V[np.maximum(tail, head)] - V[np.minimum(tail, head)]
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    inwards = V[tip] - V[tail]
+    inwards -= (inwards * along).sum(axis=1, keepdims=True) * along
+    inwards /= np.linalg.norm(inwards, axis=1, keepdims=True)
+    bounds = np.flatnonzero(np.diff(edge[crowded], prepend=-1, append=-1))
+    for first, last in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        cosine = inwards[first:last] @ inwards[first:last].T
+        i, j = np.triu_indices(last - first, 1)
+        if trusted:
+            opposite = forwards[first + i] != forwards[first + j]
+            i, j = i[opposite], j[opposite]
+        free = np.ones(last - first, dtype=bool)
+        for k in np.argsort(cosine[i, j], kind="stable"):
+            if free[i[k]] and free[j[k]]:
+                free[[i[k], j[k]]] = False
+                chosen.append((int(crowded[first + i[k]]), int(crowded[first + j[k]])))
+    return np.array(chosen, dtype=np.int64).reshape(-1, 2)
+
+
+def _orient(F: Indices, n: int, steps: dict[Step, int]) -> tuple[Indices, Indices]:
+    """Orient pieces alike, cutting one-sided ones where their triangles contradict each other."""
+    F, turned, contradictions = oriented(F)
+    steps[Step.orient] = int(turned.sum())
+    steps[Step.one_sided] = len(contradictions)
+    if not len(contradictions):
+        return F, np.arange(n)
+    _, edge, faces = edges_of_half_edges(F)
+    pairs = paired_half_edges(edge, faces)
+    agree = F.ravel()[pairs[:, 0]] != F.ravel()[pairs[:, 1]]
+    return glue(F, pairs[agree], n)
+
+
+def _outwards(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
+    """Turn closed components whose enclosed volume is negative; open ones have no outside."""
+    count, label = topology.components(F, len(V))
+    piece = label[F[:, 0]]
+    _, edge, faces = edges_of_half_edges(F)
+    closed = np.ones(count, dtype=bool)
+    closed[np.repeat(piece, 3)[faces[edge] == 1]] = False
+    centre = V - V[F].mean(axis=(0, 1))
+    a, b, c = (centre[F[:, k]] for k in range(3))
+    volume = np.bincount(piece, np.einsum("td,td->t", a, np.cross(b, c)), minlength=count)
+    inside_out = closed & (volume < 0)
+    steps[Step.outwards] = int(inside_out.sum())
+    return np.where(inside_out[piece][:, None], F[:, ::-1], F)
+
+
+def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) -> list[Indices]:
+    """Return the triangles of the components that are kept, the largest first."""
+    _, label = topology.components(F, n)
+    pieces, piece, sizes = np.unique(label[F[:, 0]], return_inverse=True, return_counts=True)
+    order = np.argsort(-sizes, kind="stable")
+    if wanted == "largest":
+        steps[Step.components] = len(pieces) - 1
+        steps[Step.component_faces] = int(len(F) - sizes[order[0]])
+        order = order[:1]
+    by_piece = np.split(F[np.argsort(piece, kind="stable")], np.cumsum(sizes)[:-1])
+    return [by_piece[k] for k in order]
+
+
+def _drop_ears(F: Indices, n: int, steps: dict[Step, int]) -> Indices:
+    """Drop triangles with two sides on the boundary until there are none.
+
+    A surface that would vanish, such as a strip that is one triangle wide, stays as it is.
+    """
+    kept = F
+    while len(kept):
+        _, edge, faces = edges_of_half_edges(kept)
+        ears = (faces[edge] == 1).reshape(-1, 3).sum(axis=1) >= 2
+        if not ears.any():
+            steps[Step.ears] += len(F) - len(kept)
+            return kept
+        kept = kept[~ears]
+    return F
+
+
+def _fill_holes(V: Points, F: Indices, most: int, steps: dict[Step, int]) -> tuple[Points, Indices]:
+    """Fill loops of at most so many edges, all but the longest.
+
+    A triangle fills three edges, a fan around a new vertex in the middle more: no new edge can then
+    be one that the surface has elsewhere.
+    """
+    loops = topology.boundary_loops(F, len(V)) if most else []
+    if len(loops) < 2:
+        return V, F
+    around = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
+    del loops[int(np.argmax(around))]
+    new_points: list[Points] = []
+    new_faces: list[Indices] = []
+    for loop in loops:
+        if len(loop) > most:
+            continue
+        following = np.roll(loop, -1)
+        steps[Step.holes] += 1
+        if len(loop) == 3:
+            new_faces.append(loop[None, ::-1])
+            continue
+        centre = np.full(len(loop), len(V) + len(new_points))
+        new_points.append(V[loop].mean(axis=0))
+        new_faces.append(np.stack([following, loop, centre], axis=1))
+    if not new_faces:
+        return V, F
+    return np.vstack([V, *new_points]), np.concatenate([F, *new_faces])
+
+
+def _compact(V: Points, F: Indices) -> tuple[Points, Indices]:
+    """Keep the vertices that triangles use, in their order."""
+    used, F = np.unique(F, return_inverse=True)
+    return V[used], F.reshape(-1, 3).astype(np.int64)

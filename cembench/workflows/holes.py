@@ -1,0 +1,51 @@
+"""Map a surface with holes by every algorithm for that class."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from cembench.core.errors import AlgorithmFailed
+from cembench.mesh.triangle_mesh import HoledMesh
+from cembench.registry import load_registry
+from cembench.workflows.parameterize import Result, parameterize
+from cembench.workflows.surface_input import SurfaceInput, checked_surface
+
+
+def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Result]:
+    """Map a surface with holes to a disk with round holes, by every algorithm that can.
+
+    Parameters
+    ----------
+    surface : mesh, path, name or pair of arrays (V, F)
+        A surface of genus zero with two boundary loops or more.
+    outer : int, optional
+        A vertex of the outer boundary; default: the widest loop is the outer one.
+
+    Returns
+    -------
+    dict of Result
+        By the algorithm's name; one that found no valid map is left out.
+
+    Raises
+    ------
+    MeshError
+        The surface is damaged or has no hole.
+    AlgorithmFailed
+        No algorithm found a valid map; the message says why for each.
+
+    """
+    mesh = checked_surface(surface, (HoledMesh,))
+    given: dict[str, Any] = {} if outer is None else {"outer": outer}
+    found, causes = {}, []
+    for name, algorithm in load_registry().algorithms.items():
+        if algorithm.target != "circular holes":
+            continue
+        known = {parameter.name for parameter in algorithm.parameters}
+        try:
+            own: dict[str, Any] = given if "outer" in known else {}
+            found[name] = parameterize(mesh, name, **own)
+        except AlgorithmFailed as error:
+            causes.append(str(error))
+    if not found:
+        raise AlgorithmFailed("; ".join(causes) or "no algorithm for surfaces with holes is there")
+    return found

@@ -1,0 +1,72 @@
+"""Morph surfaces into each other from what a user has in hand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.workflows.morphing.landmarks import Landmarks, check_landmarks
+from cembench.workflows.morphing.morph import Morph
+from cembench.workflows.morphing.morph import morph as register_all
+from cembench.workflows.parameterize import parameterize
+from cembench.workflows.surface_input import SurfaceInput, checked_surface
+
+
+def morph(
+    surfaces: Sequence[SurfaceInput],
+    landmarks: Mapping[str, Sequence[int]] | None = None,
+    *,
+    algorithm: str = "direct-cem",
+    **options: Any,
+) -> Morph:
+    """Register surfaces to the first one, so that its vertices can move through all of them.
+
+    Parameters
+    ----------
+    surfaces : sequence of meshes, paths, names or pairs of arrays (V, F)
+        Two or more topological disks.
+    landmarks : mapping, optional
+        By name, the vertex on every surface, counted from 0; the first landmark goes to the centre
+        of the disk. With none, curvature aligns the surfaces.
+    algorithm : str
+        The map to the disk.
+    **options
+        `lam`, `reach`, `pose` of :func:`cembench.workflows.morphing.morph.morph`.
+
+    Returns
+    -------
+    Morph
+        ``morph.at(t)`` gives the first surface's vertices (n, 3) at a time from 0 to 1.
+
+    Raises
+    ------
+    MeshError, ParameterError
+        A surface that is not a disk, fewer than two, or landmarks that cannot be right.
+    AlgorithmFailed
+        No map or no registration without folds.
+
+    """
+    if len(surfaces) < 2:
+        raise ParameterError("a morph needs two surfaces or more; name at least one other.")
+    meshes = [_disk(surface) for surface in surfaces]
+    names = tuple(landmarks or {})
+    rows = [list((landmarks or {})[name]) for name in names]
+    for name, row in zip(names, rows, strict=True):
+        if len(row) != len(meshes):
+            raise ParameterError(
+                f"landmark {name!r} has {len(row)} vertices; it needs {len(meshes)}, one a surface."
+            )
+    places = Landmarks(names, np.array(rows, dtype=np.int64).reshape(len(names), len(meshes)))
+    check_landmarks(places, meshes)
+    maps = [parameterize(mesh, algorithm).z for mesh in meshes]
+    return register_all(meshes, maps, places, **options)
+
+
+def _disk(surface: SurfaceInput) -> DiskMesh:
+    mesh = checked_surface(surface, (DiskMesh,))
+    assert isinstance(mesh, DiskMesh)
+    return mesh

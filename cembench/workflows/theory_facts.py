@@ -1,0 +1,159 @@
+"""What of the paper's Section 4 holds on one surface, as data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from cembench.core.errors import AlgorithmFailed
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import Algorithm, load_registry
+from cembench.workflows.surface_input import SurfaceInput, checked_surface
+from cembench.workflows.theory import (
+    TOLERANCE,
+    BoundaryOperator,
+    Check,
+    Trajectory,
+    predicted_rate,
+    premises,
+    statements,
+    trajectory,
+)
+
+#: The algorithm whose course is shown beside CEM's, where it is installed.
+RIVAL = "direct-cem"
+#: The least E_C, with the weights that K has: those of the mesh's own edges.
+RIVAL_PARAMETERS = {"delaunay": False, "back": 0.0}
+#: After how many iterations the table of energies looks.
+LOOKS = (0, 20, 200)
+#: K is formed, for the statements on its entries, up to so many boundary vertices.
+DENSE = 1200
+
+
+@dataclass(frozen=True)
+class TheoryFacts:
+    """Premises and statements of Section 4 on a surface, and what they were judged by.
+
+    Attributes
+    ----------
+    facts : mapping
+        Everything as plain data, as `cembench theory --json` prints it.
+    premises, statements : tuple of Check
+        Each with a figure, what it means, and whether it holds.
+    trajectories : mapping
+        The bare iterations (23) and (30) of CEM, by name.
+    others : mapping
+        Energies of another algorithm's iterations, by its title.
+    spectrum : list of float
+        Eigenvalues of K: all of them where K is small enough to be formed, else the leading ones.
+    missing : str
+        Why there is no other algorithm; empty where there is one.
+
+    """
+
+    facts: Mapping[str, Any]
+    premises: tuple[Check, ...]
+    statements: tuple[Check, ...]
+    trajectories: Mapping[str, Trajectory]
+    others: Mapping[str, tuple[float, ...]]
+    spectrum: list[float]
+    missing: str = ""
+
+
+def theory(surface: SurfaceInput, *, iterations: int = 200) -> TheoryFacts:
+    """Put Section 4 of the paper to the test on a disk.
+
+    Parameters
+    ----------
+    surface : mesh, path, name or pair of arrays (V, F)
+        A topological disk.
+    iterations : int
+        Iterations of the bare maps (23) and (30).
+
+    Raises
+    ------
+    MeshError
+        The surface is damaged or not a disk.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.theory(cembench.surface("flat-disk", 200)).facts["premises_hold"]
+    True
+
+    """
+    mesh = checked_surface(surface, (DiskMesh,))
+    assert isinstance(mesh, DiskMesh)
+    return theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)
+
+
+def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> TheoryFacts:
+    """Return the facts, with the energies of `rival` beside those of CEM."""
+    K = BoundaryOperator(mesh)
+    dense = K.size <= DENSE
+    paths = {
+        "CEM, step (23)": trajectory(K, iterations, inversion=False),
+        "CEM, step (30)": trajectory(K, iterations, inversion=True),
+    }
+    plain, inverse = paths.values()
+    given, said = premises(K), statements(K, plain, inverse, dense=dense)
+    leading, _ = K.leading_eigenpairs()
+    others, missing = _rival_history(rival, mesh)
+    rate = predicted_rate(leading)
+    facts: dict[str, Any] = {
+        "mesh": mesh.name,
+        "vertices": mesh.n,
+        "boundary_vertices": K.size,
+        "premises_hold": all(check.holds for check in given),
+        # The first claims nothing: see the check's source.
+        "statements_hold": all(c.holds for c in said if c.source != "not claimed"),
+        "premises": [asdict(check) for check in given],
+        "statements": [asdict(check) for check in said],
+        "eigenvalues": leading.tolist(),
+        "gap": float(1 - leading[1]),
+        "rate_predicted": rate,
+        "rate_23": plain.rate,
+        "rate_30": inverse.rate,
+        "rises_23": _rises(plain),
+        "rises_30": _rises(inverse),
+        "energies": _energies(paths, others),
+    }
+    spectrum = (K.spectrum() if dense else leading).tolist()
+    return TheoryFacts(facts, tuple(given), tuple(said), paths, others, spectrum, missing)
+
+
+def _rises(path: Any) -> dict[str, float | int]:
+    """How often E_C rises by more than rounding, and by how much together and at most."""
+    rises = path.rises[path.rises > TOLERANCE * abs(path.energies[0])]
+    return {
+        "count": len(rises),
+        "largest": float(rises.max(initial=0.0)),
+        "together": float(rises.sum()),
+    }
+
+
+def _rival_history(
+    rival: Algorithm | None, mesh: DiskMesh
+) -> tuple[dict[str, tuple[float, ...]], str]:
+    """The energies of the algorithm beside CEM; or why there are none."""
+    if rival is None or not isinstance(mesh, rival.mesh_type):
+        return {}, f"{RIVAL} is not installed here." if rival is None else ""
+    try:
+        result = rival.function(mesh.fresh(), **rival.arguments(RIVAL_PARAMETERS))
+    except AlgorithmFailed as error:
+        return {}, f"{rival.title} failed: {error}."
+    if not result.energy_history:
+        return {}, f"{rival.title} tells no energies."
+    return {rival.title: result.energy_history}, ""
+
+
+def _energies(paths: Any, others: Any) -> list[dict[str, Any]]:
+    """E_C at the start, after 20 and after 200 iterations, and the lowest; None where none is."""
+    curves = {name: path.energies.tolist() for name, path in paths.items()}
+    curves |= {name: list(history) for name, history in others.items()}
+    rows = []
+    for name, curve in curves.items():
+        at = {f"after_{k}": curve[k] if k < len(curve) else None for k in LOOKS}
+        rows.append({"name": name} | at | {"last": curve[-1], "iterations": len(curve) - 1})
+    return rows

@@ -1,0 +1,70 @@
+"""Judge a solver: is it right, and is it better and faster than what there is?"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cembench.running.local import Options
+from cembench.running.plan import distribute_parameters
+from cembench.validation.examine import ValidationOptions, examine
+from cembench.validation.solver import Solver, in_a_process, load_solver
+from cembench.validation.verdict import Validation
+from cembench.workflows.surface_input import SurfaceInput, checked_surface
+
+
+def validate(
+    plugin: str | os.PathLike[str],
+    *,
+    against: Sequence[str] | None = None,
+    surfaces: Sequence[SurfaceInput] = (),
+    rounds: int = 6,
+    up_to: int = 30_000,
+    checks_only: bool = False,
+    timeout: float = 120.0,
+    parameters: Mapping[str, Any] | None = None,
+) -> Validation:
+    """Examine a solver as `cembench validate` does.
+
+    Parameters
+    ----------
+    plugin : path or str
+        ``FILE.py``, ``FILE.py:NAME``, ``module:name`` or a registered name.
+    against : sequence of str, optional
+        Baselines; default: the usual one of the solver's target.
+    surfaces : sequence of meshes, paths, names or pairs of arrays
+        What is compared on; default: the usual six.
+    rounds : int
+        Rounds of timing.
+    up_to : int
+        Triangles up to which the growth of the seconds is measured; 0: not at all.
+    checks_only : bool
+        Contract and correctness only, without timing.
+    timeout : float
+        Seconds that a call may take.
+    parameters : mapping, optional
+        Of the solver.
+
+    Returns
+    -------
+    Validation
+        ``.valid``, ``.findings``, and figures beside the baselines.
+
+    """
+    algorithm, registry, plugins = load_solver(os.fspath(plugin))
+    arguments = distribute_parameters([algorithm], parameters or {})[algorithm.name]
+    options = Options(timeout=timeout)
+    asked = ValidationOptions(
+        against=against,
+        meshes=[checked_surface(one, (algorithm.mesh_type,), registry) for one in surfaces],
+        rounds=rounds,
+        up_to=up_to,
+        checks_only=checks_only,
+        options=options,
+    )
+    solver = Solver(algorithm, plugins, arguments, in_a_process(options))
+    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
+        return examine(solver, registry, Path(folder), asked)

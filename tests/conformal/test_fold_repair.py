@@ -1,0 +1,116 @@
+"""Repaired maps are as good as unrepaired ones, or they stay folded."""
+
+import numpy as np
+import pytest
+from cembench.algorithms.cem import cem
+from cembench.algorithms.direct_cem.disk import direct_cem
+from cembench.algorithms.fdm import fdm
+from cembench.algorithms.harmonic_circle import harmonic_circle
+from cembench.algorithms.ldm import ldm
+
+from cembench import AlgorithmFailed
+from cembench.conformal.fold_repair import MOST_COST, accepted_repair
+from cembench.conformal.metrics import all_metrics
+from cembench.mesh.files import read_mesh
+from tests import gallery
+from tests.hard_surfaces import hard_surface
+from tests.real_meshes import DISKS, real_mesh
+
+STRESS = ("stress/hippocampus_unfoldiso.obj", "stress/maze.obj")
+MORE_DISKS = ("nefertiti.obj", "human_brain.obj", "left_hand.obj")
+
+
+def check(mesh, algorithm):
+    """Whether the map was folded at first, and whether it is at the end."""
+    try:
+        found = algorithm(mesh)
+    except AlgorithmFailed:
+        return None
+    after, before = all_metrics(mesh, found.uv), found.extras.get("before_repair")
+    if before is None:
+        assert after["flipped_triangles"] == 0
+        return False, False
+    assert before["flipped_triangles"] > 0
+    assert after["conformal_energy"] <= 1.25 * before["conformal_energy"]
+    assert after["angle_error_mean_deg"] <= 1.5 * before["angle_error_mean_deg"]
+    return True, after["flipped_triangles"] > 0
+
+
+def test_a_map_without_folds_is_returned_as_it_is():
+    mesh = gallery.crumpled_disk()
+    uv = np.zeros(mesh.n, dtype=complex)
+    taken, extras = accepted_repair(mesh, uv, (uv, 0))
+    assert taken is uv
+    assert extras == {"fold_repairs": 0}
+
+
+def test_figures_before_are_recorded_and_those_after_are_the_maps():
+    mesh = gallery.crumpled_disk()
+    found = harmonic_circle(mesh)
+    before = found.extras["before_repair"]
+    assert set(before) == {"flipped_triangles", "conformal_energy", "angle_error_mean_deg"}
+    assert before["flipped_triangles"] == 6
+    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+    assert "refused_repair" not in found.extras
+
+
+def test_a_repair_that_costs_too_much_is_refused_and_its_figures_recorded():
+    mesh = gallery.crumpled_disk()
+    good = direct_cem(mesh).uv
+    bad = harmonic_circle(mesh).uv * 0.5 + good * 0.5
+    bad[mesh.interior] **= 3
+    taken, extras = accepted_repair(mesh, good, (bad, 2))
+    assert taken is good
+    refused, before = extras["refused_repair"], extras["before_repair"]
+    assert any(refused[figure] > most * before[figure] for figure, most in MOST_COST.items())
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_hard_surfaces(seed):
+    folded, still = check(hard_surface(seed), direct_cem)
+    assert folded or not still
+
+
+def test_most_folded_maps_can_be_repaired():
+    outcomes = [check(hard_surface(seed), harmonic_circle) for seed in range(20)]
+    folded = [still for was, still in outcomes if was]
+    assert len(folded) >= 7
+    assert sum(folded) <= 0.1 * len(folded)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", [direct_cem, cem, harmonic_circle, fdm, ldm])
+def test_two_hundred_hard_surfaces(algorithm):
+    outcomes = [check(hard_surface(seed), algorithm) for seed in range(200)]
+    folded = [still for was, still in filter(None, outcomes) if was]
+    assert len(folded) >= 50
+    assert sum(folded) <= 0.2 * len(folded)
+
+
+@pytest.mark.parametrize("name", [n for n in DISKS if not n.startswith("jacksboro")])
+def test_real_disks_end_without_folds(name):
+    _, still = check(read_mesh(real_mesh(name)), direct_cem)
+    assert not still
+
+
+@pytest.mark.parametrize("algorithm", [harmonic_circle, ldm])
+@pytest.mark.parametrize("name", STRESS)
+def test_stress_surfaces(algorithm, name):
+    check(read_mesh(real_mesh(name)), algorithm)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("algorithm", [direct_cem, cem, harmonic_circle, fdm, ldm])
+@pytest.mark.parametrize("name", [*DISKS, *STRESS, *MORE_DISKS])
+def test_every_real_disk_by_every_algorithm(algorithm, name):
+    check(read_mesh(real_mesh(name)), algorithm)
+
+
+def test_hippocampus_with_arcs_down_to_rounding_keeps_its_quality():
+    mesh = read_mesh(real_mesh("stress/hippocampus_unfoldiso.obj"))
+    found = direct_cem(mesh)
+    figures = all_metrics(mesh, found.uv)
+    assert figures["flipped_triangles"] == 0
+    assert figures["angle_error_mean_deg"] < 1.3
+    assert figures["conformal_energy"] < 0.03
+    assert found.extras["before_repair"]["flipped_triangles"] > 50

@@ -1,0 +1,175 @@
+"""The library as a notebook uses it: arrays, meshes, files and names in; results out."""
+
+import doctest
+import subprocess
+import sys
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import cembench
+from tests import gallery
+
+WITH_EXAMPLES = [
+    "cembench.workflows.catalogue",
+    "cembench.workflows.parameterize",
+    "cembench.workflows.theory_facts",
+]
+
+
+@pytest.fixture(scope="module")
+def disk():
+    return cembench.surface("hemi-ellipsoid", 300)
+
+
+@pytest.mark.parametrize("kind", ["mesh", "path", "arrays", "lists"])
+def test_a_surface_may_be_a_mesh_a_path_or_arrays(disk, kind, tmp_path):
+    cembench.write_mesh(tmp_path / "a.obj", disk)
+    given = {
+        "mesh": disk,
+        "path": tmp_path / "a.obj",
+        "arrays": (disk.V, disk.F),
+        "lists": [disk.V.tolist(), disk.F.tolist()],
+    }[kind]
+    result = cembench.parameterize(given, "cem")
+    assert result.ok
+    assert result.uv.shape == (disk.n, 2)
+    np.testing.assert_array_equal(result.z, result.uv[:, 0] + 1j * result.uv[:, 1])
+    assert result.metrics["flipped_triangles"] == 0
+    assert result.seconds == pytest.approx(sum(result.phases.values()))
+
+
+def test_the_default_algorithm_suits_the_topology(disk):
+    assert cembench.parameterize(disk).algorithm.name == "direct-cem"
+    ring = cembench.surface("catenoid-ring", 400)
+    assert cembench.parameterize(ring).algorithm.name == "direct-cem-holes"
+    assert {"koebe-cem", "direct-cem-holes"} <= set(cembench.holes(ring))
+
+
+def test_a_result_shows_and_saves_itself(disk, tmp_path):
+    result = cembench.parameterize(disk)
+    assert "direct-cem" in repr(result)
+    assert len(repr(result)) < 400
+    html = result._repr_html_()
+    assert "data:image/png;base64," in html
+    assert "conformal energy" in html
+    assert result.plot(tmp_path / "a.png").get_size_inches()[0] > 5
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    saved = result.save(tmp_path / "a.obj")
+    assert cembench.read_mesh(saved).hash == disk.hash
+    with pytest.raises(cembench.ParameterError, match="overwrite=True"):
+        result.save(saved)
+    result.save(saved, overwrite=True)
+
+
+def test_parameters_are_checked_as_on_the_command_line(disk):
+    assert cembench.parameterize(disk, "cem", max_iterations=2).iterations <= 2
+    with pytest.raises(cembench.ParameterError, match="max_iterations"):
+        cembench.parameterize(disk, "cem", max_iterations=-1)
+    with pytest.raises(cembench.ParameterError, match="no chosen algorithm has a parameter"):
+        cembench.parameterize(disk, "cem", wings=2)
+    with pytest.raises(cembench.RegistryError, match="unknown algorithm 'cme'"):
+        cembench.parameterize(disk, "cme")
+
+
+V, F = gallery.flat_rectangle()
+#: An edge of two triangles.
+INNER = next(e for t in F for e in (t[:2], t[1:]) if (np.isin(F, e).sum(axis=1) == 2).sum() == 2)
+BAD = {
+    "swapped": ((F, V), "must|integer|whole"),
+    "two columns": ((V[:, :2], F), r"\(n, 3\)|shape"),
+    "one-based": ((V, F + 1), "out of range"),
+    "negative": ((V, F - 1), "out of range"),
+    "NaN": ((np.where(V.max() == V, np.nan, V), F), "NaN|infinite"),
+    "infinite": ((np.where(V.max() == V, np.inf, V), F), "NaN|infinite"),
+    "quads": ((V, np.zeros((2, 4), int)), r"\(m, 3\)|shape"),
+    "no faces": ((V, np.zeros((0, 3), int)), "no faces|at least|empty"),
+    "no vertices": ((np.zeros((0, 3)), F), "vert|out of range"),
+    "fractions": ((V, F + 0.5), "integer|whole"),
+    "isolated": ((np.vstack([V, [[9, 9, 9]]]), F), "isolated"),
+    "degenerate": ((V, np.vstack([F, [[0, 0, 1]]])), "degenerate|repeat|twice"),
+    "words": ((V.astype(str), F), "of type"),
+    "complex": ((V + 1j, F), "of type complex128"),
+    "fin": ((np.vstack([V, [[0, 0, 9]]]), np.vstack([F, [[*INNER, len(V)]]])), "non-manifold"),
+    "doubled": ((V, np.vstack([F, F[:1]])), "non-manifold|duplicate"),
+    "huge": ((V * 1e200, F), "1e\\+60"),
+    "tiny": ((V * 1e-200, F), "1e-60"),
+    "two pieces": ((np.vstack([V, V + 99]), np.vstack([F, F + len(V)])), "components"),
+    "not a pair": ((V,), "pair of arrays"),
+    "a number": (7, "pair of arrays"),
+    "no such file": ("nowhere.obj", "no such file"),
+    "no such name": ("nowhere", "neither a file nor a registered surface"),
+}
+
+
+@pytest.mark.parametrize("what", BAD)
+def test_bad_input_from_python_is_named(what):
+    given, message = BAD[what]
+    with pytest.raises(cembench.MeshError, match=message):
+        cembench.parameterize(given)
+
+
+@pytest.mark.parametrize("what", [k for k, v in BAD.items() if isinstance(v[0], tuple)][:15])
+def test_the_bare_constructor_checks_too(what):
+    given, message = BAD[what]
+    with pytest.raises(cembench.MeshError, match=message):
+        cembench.DiskMesh(*given)
+
+
+def test_benchmark_gives_tables(disk, tmp_path):
+    run = cembench.benchmark(
+        [disk, (disk.V * 2, disk.F)], ["harmonic-circle", "lscm"], rounds=1, out=tmp_path / "run"
+    )
+    table = run.table("harmonic-circle")
+    assert isinstance(table, pd.DataFrame)
+    assert set(table["mesh"]) == {disk.name, "surface-2"}
+    assert set(table["status"]) == {"ok"}
+    assert len(run.speedups("harmonic-circle")) == 2
+    assert "<table" in run._repr_html_()
+    again = cembench.benchmark([disk], ["lscm"], rounds=1, out=tmp_path / "run")
+    assert len(again.records()) == 4
+    with pytest.raises(cembench.ParameterError, match="no surface"):
+        cembench.benchmark([])
+
+
+def test_morph_and_theory_take_what_parameterize_takes(disk):
+    found = cembench.morph([disk, (disk.V * [1, 1, 2], disk.F)])
+    np.testing.assert_allclose(found.at(0.0), disk.V, atol=1e-9)
+    assert cembench.theory(disk).facts["boundary_vertices"] == len(disk.boundary)
+    with pytest.raises(cembench.ParameterError, match="two surfaces or more"):
+        cembench.morph([disk])
+
+
+def test_validate_returns_findings():
+    found = cembench.validate("harmonic-circle", checks_only=True)
+    assert found.algorithm == "harmonic-circle"
+    assert found.findings
+
+
+@pytest.mark.parametrize("module", WITH_EXAMPLES)
+def test_the_examples_in_docstrings_run(module):
+    __import__(module)
+    found = doctest.testmod(sys.modules[module])
+    assert found.attempted >= 1
+    assert not found.failed
+
+
+def test_every_public_name_is_there_and_documented():
+    for name in cembench.__all__:
+        value = getattr(cembench, name)
+        assert name == "__version__" or value.__doc__, name
+
+
+def test_importing_the_package_loads_no_numerical_library():
+    code = "import cembench, sys; print([m for m in ('numpy', 'scipy', 'igl') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_the_package_is_a_command():
+    for arguments in (["-m", "cembench", "--version"], ["-m", "cembench", "-h"]):
+        done = subprocess.run(
+            [sys.executable, *arguments], capture_output=True, text=True, check=True
+        )
+        assert "cembench" in done.stdout
