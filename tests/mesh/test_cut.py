@@ -5,6 +5,7 @@ from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh, ParameterError, TriangleMesh
 from cembench.conformal.metrics import all_metrics
+from cembench.core.notices import NoticeKind, of_kind
 from cembench.mesh.cut import cut_open
 from cembench.mesh.defects import Defect, UnusableMeshError
 from cembench.mesh.files import read_mesh
