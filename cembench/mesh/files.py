@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import igl
-import meshio
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.atomic import write_by
@@ -139,11 +137,15 @@ def _write_ply(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
 
 
 def _write_off(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
+    import meshio  # here and not above: it is slow to load
+
     # trimesh would write a fixed number of digits behind the point.
     meshio.off.write(path, meshio.Mesh(mesh.V, [("triangle", mesh.F)]))
 
 
 def _write_stl(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
+    import trimesh  # as slow to load
+
     with path.open("wb") as file:
         trimesh.Trimesh(mesh.V, mesh.F, process=False).export(file, file_type="stl")
 
@@ -173,6 +175,8 @@ def _obj_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
 
 
 def _off_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
+    import meshio
+
     found = meshio.off.read(path)
     return found.points, found.cells_dict["triangle"]
 
