@@ -174,13 +174,13 @@ def places_of(content):
 
 @pytest.mark.parametrize("name", VERBS)
 def test_a_spoiled_run_ends_every_verb_with_a_message(fuzzed, name):
-    for seed in range(40):
+    for seed in range(25):
         fuzzed(seed, VERBS[name])
 
 
 def test_a_spoiled_run_ends_report_with_a_message(fuzzed, monkeypatch):
     monkeypatch.setattr("cembench.report.write_report._write_all", counted_report)
-    for seed in range(60):
+    for seed in range(12):
         fuzzed(seed, ("report", "run"))
 
 

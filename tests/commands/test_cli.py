@@ -227,7 +227,7 @@ def test_the_module_runs_as_a_process(tmp_path):
 def real_cells():
     for name in DISKS:
         for algorithm in ("cem", "harmonic-circle", "lscm", "fdm", "ldm", "qiem"):
-            slow = (name, algorithm) in {("jacksboro_dem.ply", a) for a in ("qiem", "fdm")}
+            slow = algorithm != "cem" and not name.startswith("human_face")
             yield pytest.param(name, algorithm, marks=[pytest.mark.slow] if slow else [])
 
 
