@@ -145,7 +145,19 @@ def _faults_of_holes(outer: Sequence[Point], holes: Sequence[Sequence[Point]]) -
         if not shared and _boxes_meet(boxes[i], boxes[j]) and _meet(*one, *other):
             found.append("two boundaries cross, or one crosses itself")
             break
+    return found
+
+
+def circles_out_of_place(uv: Sequence[complex], faces: Sequence[Face]) -> list[str]:
+    """Return how the circles of a map with holes, where they are some, lie in the wrong place.
+
+    Three points always lie on a circle, so that nothing but such a circle tells of a bad map.
+    """
+    points = [(Fraction(z.real), Fraction(z.imag)) for z in uv]
+    loops = [[points[k] for k in loop] for loop in boundary_loops(faces)]
+    holes = sorted(loops, key=twice_area)[:-1]
     circles = [circle for circle in map(_circle, holes) if circle[2] <= CIRCULAR]
+    found = []
     for (c, r, _), (d, s, _) in combinations(circles, 2):
         if abs(c - d) < (r + s) * (1 - CIRCULAR):
             found.append("the circles of two holes overlap")

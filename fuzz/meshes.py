@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fuzz import project
-from fuzz.exact import faults_of_map, overlaps
+from fuzz.exact import circles_out_of_place, faults_of_map, overlaps
 from fuzz.hard_meshes import hard_mesh
 from fuzz.project import Algorithm, CembenchError, TriangleMesh
 from fuzz.slow_metrics import conformal_energy, mean_angle_error
@@ -91,6 +91,9 @@ def wrong_ok(
     found = faults_of_map(z, faces, target)
     if found:
         return "wrong ok", "; ".join(found)
+    misplaced = circles_out_of_place(z, faces) if target == "circular holes" else []
+    if misplaced and not outcome.notes:
+        return "untold circles", "; ".join(misplaced)
     if target == "free boundary" and not outcome.notes and overlaps(z, faces):
         return "untold overlap", "the image covers itself, and no note says so"
     missing = [name for name, value in outcome.metrics.items() if not _finite(value)]

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
 from cembench.core.clock import phase
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -76,10 +77,10 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
     with phase("laplacian"):
         if not delaunay:
             return cotangent_laplacian(mesh.V, mesh.F)
-        import igl  # slow to load, and rarely needed
-
-        negative, _, _ = igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)
-        return sparse.csc_array(-negative)
+        corners = mesh.V[mesh.F]
+        lengths = np.linalg.norm(corners[:, [1, 2, 0]] - corners[:, [2, 0, 1]], axis=2)
+        F, _, weights = intrinsic_delaunay(mesh.F, lengths, half_cotangents(mesh.V, mesh.F))
+        return laplacian_of_weights(F, weights, mesh.n)
 
 
 def by_rows(L: sparse.csc_array) -> sparse.csr_array:

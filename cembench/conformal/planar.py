@@ -90,6 +90,8 @@ def fitted_circle(z: Complex) -> tuple[complex, float]:
 
     Radius NaN where the points do not determine a circle.
     """
+    if not np.isfinite(z).all():
+        return complex("nan"), float("nan")
     middle = z.mean()
     w = z - middle
     scale = float(np.abs(w).max())

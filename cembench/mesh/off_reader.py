@@ -77,9 +77,11 @@ def _declared(lines: _Lines) -> tuple[int, int]:
 
 
 def _numbers(kind: type[M], number: int, words: list[str], count: int) -> list[M]:
-    """The first `count` numbers of a line."""
+    """The first `count` numbers of a line; what follows, as colours do, must be numbers too."""
     try:
         found = [kind(word) for word in words[:count]]
+        for word in words[count:]:
+            float(word)
         refuse_underscores(words)
     except ValueError as error:
         raise damaged(f"line {number}, {shown(' '.join(words))}: {error}") from None

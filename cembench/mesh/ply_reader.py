@@ -12,6 +12,7 @@ import re
 import struct
 import warnings
 from array import array
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -160,13 +161,20 @@ def _element(elements: list[_Element], name: str) -> _Element:
 
 
 def _check_elements(elements: list[_Element]) -> None:
-    """Raise where polygons would be passed over: in triangle strips, or in elements of one name."""
+    """Raise where polygons would be passed over: in triangle strips, or in what has one name."""
     names = [element.name for element in elements]
     if "tristrips" in names:
         raise MeshError("triangle strips are not supported. Export it with an element 'face'.")
-    for name in names:
-        if names.count(name) > 1:
-            raise damaged(f"the header declares element {name!r} {names.count(name)} times")
+    twice = [f"element {name!r}" for name in _repeated(names)]
+    for element in elements:
+        repeated = _repeated([p.name for p in element.properties])
+        twice += [f"property {name!r} of {element.name!r}" for name in repeated]
+    if twice:
+        raise damaged(f"the header declares more than once: {', '.join(twice)}")
+
+
+def _repeated(names: list[str]) -> list[str]:
+    return [name for name, count in Counter(names).items() if count > 1]
 
 
 def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
@@ -287,7 +295,7 @@ def _walk_rows(
                 (found,) = unpack(body, at)
                 at += least_bytes
                 size = int(found) if 0 <= found <= end else -1
-                if size != found:
+                if size < 0 or size != found:
                     raise damaged(
                         f"list {element.properties[k].name!r} of {element.name!r} {row} (counted "
                         f"from 0) declares {found} items"

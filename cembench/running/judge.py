@@ -14,6 +14,8 @@ either that triangle is folded or the polygon crosses itself.
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -134,11 +136,21 @@ def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
 
 def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[Notice]:
     circles = boundary_circles(mesh, uv)[1:]
-    off = [circle for circle in circles if not circle.circularity <= CIRCULAR]
-    if not off:
-        return []
-    worst = max(circle.circularity for circle in off)
-    told = (
-        f"{len(off)} of {len(circles)} holes are no circles: off by up to {worst:.2g} of the radius"
-    )
-    return [Notice(NoticeKind.HOLES_NOT_CIRCULAR, told)]
+    told = []
+    off = [circle.circularity for circle in circles if not circle.circularity <= CIRCULAR]
+    if off:
+        told.append(
+            f"{len(off)} of {len(circles)} holes are no circles: off by up to {max(off):.2g} of "
+            "the radius"
+        )
+    # Three vertices always lie on a circle, but not always on one inside the disk.
+    out = [c for c in circles if c.circularity <= CIRCULAR < abs(c.centre) + c.radius - 1]
+    if out:
+        told.append(f"the circles of {len(out)} of {len(circles)} holes reach out of the disk")
+    if any(
+        abs(one.centre - other.centre) < (one.radius + other.radius) * (1 - CIRCULAR)
+        for one, other in combinations(circles, 2)
+        if max(one.circularity, other.circularity) <= CIRCULAR
+    ):
+        told.append("circles of holes overlap")
+    return [Notice(NoticeKind.HOLES_NOT_CIRCULAR, text) for text in told]

@@ -7,6 +7,7 @@ group, or whose parent is gone, is ended.
 
 from __future__ import annotations
 
+import ctypes
 import os
 import select
 import signal
@@ -18,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic, sleep
-from typing import Protocol, TypeAlias
+from typing import IO, Protocol, TypeAlias
 
 import psutil
 
@@ -137,8 +138,8 @@ def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
                 break
     finally:
         code, left = _end_all(process, tree, mark)
-    with suppress(OSError):  # the process may have removed it
-        said = (said + log.read_bytes())[-KEPT_OUTPUT_BYTES:]
+    with suppress(OSError), log.open("rb") as file:  # the process may have removed it
+        said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
     return ProcessEnd(code, limit, seen, said.decode(errors="replace").strip(), left)
 
 
@@ -176,14 +177,36 @@ def _resident_bytes(process: psutil.Process) -> int:
 
 
 def _drain(log: Path, said: bytes) -> bytes:
-    """Keep the end of a log that grows too large, and empty the file."""
+    """Give the space of a log that grows too large back, but for its end.
+
+    Linux frees the file's beginning while the process writes on. Elsewhere the file is emptied, and
+    what is written between the last look and that is lost.
+    """
     with suppress(OSError):  # the process may have removed it
-        if log.stat().st_size > _LARGEST_LOG_BYTES:
-            with log.open("rb") as file:
-                file.seek(-KEPT_OUTPUT_BYTES, os.SEEK_END)
-                said = file.read()
+        state = log.stat()
+        if state.st_blocks * 512 > _LARGEST_LOG_BYTES:
+            with log.open("rb+") as file:
+                if _freed(file.fileno(), state.st_size - KEPT_OUTPUT_BYTES):
+                    return said
+                said = _end_of(file)
             os.truncate(log, 0)
     return said
+
+
+def _freed(handle: int, size: int) -> bool:
+    """Whether the system could free the first bytes of a file; they read as zeros then."""
+    keep_size, punch_hole = 1, 2  # of <linux/falloc.h>
+    if sys.platform != "linux" or size <= 0:
+        return False
+    free = ctypes.CDLL(None).fallocate64
+    free.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64)
+    return bool(free(handle, keep_size | punch_hole, 0, size) == 0)
+
+
+def _end_of(file: IO[bytes]) -> bytes:
+    size = file.seek(0, os.SEEK_END)
+    file.seek(max(0, size - KEPT_OUTPUT_BYTES))
+    return file.read()
 
 
 def _end_all(

@@ -12,7 +12,7 @@ _KEYWORD = re.compile(r"(ST)?C?N?OFF")
 def read_off(data: bytes) -> Content:
     """Read an OFF file, a vertex and a face a line.
 
-    The number of edges is not looked at and may be missing. Lenient: numbers after the third of a
+    The word OFF and the number of edges may be missing. Lenient: numbers after the third of a
     vertex and after the corners of a face (colours) need only be numbers.
     """
     text = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
@@ -21,11 +21,11 @@ def read_off(data: bytes) -> Content:
         words = re.split(r"[ \t]+", line.partition("#")[0].strip(" \t"))
         if words != [""]:
             lines.append(words)
-    if not lines or not _KEYWORD.fullmatch(lines[0][0]):
-        raise Damaged("it does not begin with OFF")
-    keyword = lines[0].pop(0)
-    if not lines[0]:
-        lines.pop(0)
+    keyword = ""
+    if lines and _KEYWORD.fullmatch(lines[0][0]):
+        keyword = lines[0].pop(0)
+        if not lines[0]:
+            lines.pop(0)
     if not lines or len(lines[0]) < 2:
         raise Damaged("the counts are missing")
     vertices, faces = (integer(word) for word in lines.pop(0)[:2])

@@ -169,3 +169,8 @@ def test_turns_of_a_loop():
     rounded = ring()
     rounded = np.insert(rounded, 1, rounded[0] * np.exp(-3e-16j))
     assert turns(rounded)[0] == 1
+
+
+def test_no_circle_is_fitted_to_points_that_are_no_numbers():
+    assert np.isnan(fitted_circle(np.array([1, 1j, np.nan, -1]))[1])
+    assert np.isnan(fitted_circle(np.array([1, 1j, np.inf, -1]))[1])

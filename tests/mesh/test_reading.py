@@ -258,6 +258,7 @@ DAMAGED = {
     "binary.off": (b"OFF BINARY\n\0\0\0\4", "'OFF BINARY' are not supported"),
     "four.off": ("4OFF\n4 1 0\n", "'4OFF' are not supported"),
     "few-corners.off": ("OFF\n4 1 0\n" + OFF + "2 0 1\n", "face 0 .* has 2 corners"),
+    "colour.off": ("OFF\n4 2 0\n" + OFF + "3 0 1 2 255 x\n3 0 2 3\n", "line 7, .* 'x'"),
     "header-cut.ply": (ply()[:60], "header does not end"),
     "header-word.ply": (
         ply().replace("element face", "elemont face"),
@@ -287,7 +288,15 @@ DAMAGED = {
         ply(face="property list uchar int q\n"),
         "no property 'vertex_indices' that",
     ),
-    "twice.ply": (ply(last=("element face 0\n", "")), "declares element 'face' 2 times"),
+    "twice.ply": (ply(last=("element face 0\n", "")), "more than once: element 'face'"),
+    "property-twice.ply": (
+        ply(vertex=XYZ + "property double y\n"),
+        "more than once: property 'y' of 'vertex'",
+    ),
+    "first-list-size.ply": (
+        binary_ply(TRIANGLES, size="i1").replace(b"\3\0\0\0\0", b"\xff\0\0\0\0", 1),
+        "'vertex_index' of 'face' 0 .* -1",
+    ),
     "strips.ply": (
         ply(last=("element tristrips 1\nproperty list int int k\n", "3 0 1 2\n")),
         "triangle strips are not supported",

@@ -103,3 +103,18 @@ def test_holes_inside_out_or_outside_are_refused():
     inner = nested[one] - nested[one].mean()
     nested[one] = nested[other].mean() + 0.1 * inner
     assert FaultKind.FOLDED in kinds(nested, HOLED, "circular holes")
+
+
+def test_circles_out_of_the_disk_or_over_each_other_are_told():
+    """Each hole is a circle, so that no figure of circularity would tell."""
+    one, other = (k for k in HOLED.loops[:3] if np.abs(np.abs(HOLED_FLAT[k]) - 1).max() > 1e-6)
+
+    def told(loop, shift):
+        moved = HOLED_FLAT.copy()
+        moved[loop] += shift
+        return [note.text for note in remarks(solver("circular holes"), HOLED, moved)]
+
+    assert told(one, 0) == []
+    middles = HOLED_FLAT[one].mean(), HOLED_FLAT[other].mean()
+    assert told(one, 1 - middles[0]) == ["the circles of 1 of 3 holes reach out of the disk"]
+    assert told(one, middles[1] - middles[0] + 0.01) == ["circles of holes overlap"]

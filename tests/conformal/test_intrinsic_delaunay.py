@@ -1,0 +1,79 @@
+import igl
+import numpy as np
+import pytest
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+from cembench import DiskMesh
+from cembench.conformal import intrinsic_delaunay as own
+from cembench.conformal.laplacian import half_cotangents, laplacian
+from tests import gallery
+
+
+def of(V, F):
+    lengths = np.linalg.norm(V[F[:, [1, 2, 0]]] - V[F[:, [2, 0, 1]]], axis=2)
+    return own.intrinsic_delaunay(F, lengths, half_cotangents(V, F))
+
+
+def area(lengths):
+    return own._area(*lengths.T).sum()
+
+
+@pytest.mark.parametrize(
+    "mesh", [hemi_ellipsoid(1500, x=5.0), flat_disk(1500, stretch=6.0), gallery.three_holes(900)]
+)
+def test_the_laplacian_is_that_of_libigl(mesh):
+    found = laplacian(mesh, delaunay=True)
+    reference = -igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)[0]
+    assert abs(found - reference).max() < 1e-12 * abs(reference).max()
+
+
+def test_a_stretched_disk_is_triangulated_anew_and_stays_the_same_surface():
+    mesh = flat_disk(1500, stretch=6.0)
+    F, lengths, weights = of(mesh.V, mesh.F)
+    assert (F != mesh.F).any(axis=1).sum() > 500
+    # In the plane the lengths must be the distances, and the triangles cover the disk once.
+    ends = mesh.V[F[:, [1, 2, 0]]] - mesh.V[F[:, [2, 0, 1]]]
+    assert lengths == pytest.approx(np.linalg.norm(ends, axis=2))
+    assert weights == pytest.approx(half_cotangents(mesh.V, F))
+    corners = mesh.V[F]
+    signed = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] / 2
+    assert signed.min() > 0
+    assert signed.sum() == pytest.approx(area(lengths))
+
+
+def test_angles_round_every_vertex_and_area_stay():
+    """A metric with cone points is known by its lengths; a flip must not change it."""
+    mesh = hemi_ellipsoid(3000, z=8.0)
+    rough = mesh.V + 0.02 * np.random.default_rng(3).normal(size=mesh.V.shape)
+    F, lengths, weights = of(rough, mesh.F)
+    assert (F != mesh.F).any()
+
+    def angle_sums(F, weights):
+        angles = np.arctan2(1, 2 * weights)
+        return np.bincount(F.ravel(), angles.ravel())
+
+    before = half_cotangents(rough, mesh.F)
+    assert angle_sums(F, weights) == pytest.approx(angle_sums(mesh.F, before), abs=1e-9)
+    corners = rough[mesh.F]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert area(lengths) == pytest.approx(np.linalg.norm(normals, axis=1).sum() / 2)
+
+
+def test_flips_end_where_rounding_makes_both_edges_look_wrong():
+    """A fan of needles, 40,000 times as long as wide, on which flips of libigl do not end."""
+    angles = 2 * np.pi * np.arange(12) / 12
+    rim = np.stack([np.cos(angles), np.sin(angles), 0 * angles], axis=1)
+    V = np.concatenate([[[0, 0, 4e4]], rim, 2 * rim])
+    inner, outer = 1 + np.arange(12), 13 + np.arange(12)
+    right, outer_right = np.roll(inner, -1), np.roll(outer, -1)
+    F = np.concatenate(
+        [
+            np.stack([0 * inner, inner, right], axis=1),
+            np.stack([inner, outer, outer_right], axis=1),
+            np.stack([inner, outer_right, right], axis=1),
+        ]
+    )
+    L = laplacian(DiskMesh(V, F), delaunay=True)
+    assert np.isfinite(L.data).all()
+    assert abs(L.sum(axis=1)).max() < 1e-12 * abs(L).max()
