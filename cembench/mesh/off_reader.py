@@ -31,8 +31,12 @@ def read_off(path: Path) -> Soup:
         for k in range(faces):
             number, words = _next(lines, f"{faces} faces are declared, but {k} were found")
             (size,) = _numbers(int, number, words, 1)
-            corners.extend(_numbers(int, number, words[1:], max(size, 0)))
-            sizes.append(size)
+            try:
+                corners.extend(_numbers(int, number, words[1:], max(size, 0)))
+                sizes.append(size)
+            except OverflowError:
+                told = "a number is too large for a vertex index"
+                raise damaged(f"line {number}, {shown(' '.join(words))}: {told}") from None
         for number, words in lines:
             raise damaged(
                 f"{vertices} vertices and {faces} faces are declared, but the file goes on at line "

@@ -258,6 +258,11 @@ DAMAGED = {
     "binary.off": (b"OFF BINARY\n\0\0\0\4", "'OFF BINARY' are not supported"),
     "four.off": ("4OFF\n4 1 0\n", "'4OFF' are not supported"),
     "few-corners.off": ("OFF\n4 1 0\n" + OFF + "2 0 1\n", "face 0 .* has 2 corners"),
+    "huge-index.off": (
+        "OFF\n4 1 0\n" + OFF + "3 0 1 99999999999999999999\n",
+        "line 7, .* too large for a vertex index",
+    ),
+    "huge-size.off": ("OFF\n4 1 0\n" + OFF + "-99999999999999999999 0\n", "line 7, .* too large"),
     "colour.off": ("OFF\n4 2 0\n" + OFF + "3 0 1 2 255 x\n3 0 2 3\n", "line 7, .* 'x'"),
     "header-cut.ply": (ply()[:60], "header does not end"),
     "header-word.ply": (
