@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         RegistryError,
         RenderError,
     )
+    from cembench.core.extras import MissingExtra
     from cembench.core.parameterization import MapStep, Parameterization
     from cembench.mesh.files import read_mesh, write_mesh
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -53,6 +54,7 @@ _PLACES = {
         "RegistryError",
         "RenderError",
     ),
+    "cembench.core.extras": ("MissingExtra",),
     "cembench.core.parameterization": ("MapStep", "Parameterization"),
     "cembench.mesh.files": ("read_mesh", "write_mesh"),
     "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
@@ -75,6 +77,7 @@ __all__ = [
     "HoledMesh",
     "MapStep",
     "MeshError",
+    "MissingExtra",
     "NotPositiveDefinite",
     "ParameterError",
     "Parameterization",

@@ -62,8 +62,6 @@ def writes(call):
         return any(set(mode) <= set("rwxabt+") and set(mode) & set("wxa+") for mode in modes)
     if name == "replace":  # of a path it has one argument, of a text two, of a dataclass keywords
         return owner == "os" or (method and len(call.args) == 1 and not call.keywords)
-    if name == "write":
-        return owner.startswith("meshio")
     if (not method and name in OURS) or owner in OUR_OBJECTS:
         return False
     given_file = any(isinstance(one, ast.Name) and one.id in OPEN_FILES for one in call.args)
@@ -117,7 +115,7 @@ def test_no_code_writes_files_but_through_one_function():
         "os.replace(draft, path)",
         "shutil.copyfile(a, b)",
         "igl.writeOBJ(path, V, F)",
-        "meshio.off.write(path, mesh)",
+        "igl.writeSTL(path, V, F)",
     ],
 )
 def test_a_direct_write_is_noticed(code):

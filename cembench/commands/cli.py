@@ -51,6 +51,8 @@ from cembench.commands.options import (
     memory_bytes,
 )
 from cembench.core.errors import MeshError, ParameterError
+from cembench.core.extras import Extra, require
+from cembench.linear_algebra.backends import default_backend
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
 
@@ -230,7 +232,7 @@ def map_(
     ] = False,
     plugin: Plugins = [],  # noqa: B006
     solves: SolvesOption = Solves.reuse,
-    backend: BackendOption = Backend.cvxopt,
+    backend: BackendOption = Backend(default_backend()),  # noqa: B008
     threads: Threads = 1,
     timeout: Timeout = 600.0,
     memory: Memory = None,
@@ -359,7 +361,7 @@ def run(
     solves: Annotated[
         list[str], typer.Option("--solves", help="reuse, backslash, or both with a comma.")
     ] = ["reuse"],  # noqa: B006
-    backend: BackendOption = Backend.cvxopt,
+    backend: BackendOption = Backend(default_backend()),  # noqa: B008
     threads: Threads = 1,
     reference: Annotated[
         str | None,
@@ -443,6 +445,7 @@ def reproduce(
     from cembench.running.local import Options
     from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
 
+    require(Extra.REPORT, "a report")
     run_folder.check(output)
     folders.check(output / "report", "report")
     options = Options(memory_bytes=memory_bytes(None), fresh=fresh)

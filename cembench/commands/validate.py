@@ -83,7 +83,7 @@ def validate(
     Exit code 0: valid, and what was required holds; 1: not; 2: wrong usage.
     docs/write_a_solver.md shows it at work.
     """
-    from cembench.core import folders
+    from cembench.core import extras, folders
     from cembench.running.local import Options
     from cembench.running.plan import distribute_parameters
     from cembench.validation.examine import ValidationOptions, examine
@@ -91,6 +91,7 @@ def validate(
     from cembench.validation.terminal import validation_text
 
     if output is not None:
+        extras.require(extras.Extra.REPORT, f"the page in {output}")
         folders.check(output, "validation")
     with err.status(f"importing {escape(plugin)}", spinner="line"):
         algorithm, registry, plugins = load_solver(plugin)

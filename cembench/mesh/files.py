@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import igl
-import meshio
 import numpy as np
-import trimesh
 from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.atomic import write_by
@@ -22,6 +20,7 @@ from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import located
 from cembench.mesh.obj_text import obj_text
+from cembench.mesh.off_reader import read_off
 from cembench.mesh.reading import READERS as _READERS
 from cembench.mesh.reading import read_soup
 from cembench.mesh.repair import Repaired, repair
@@ -139,13 +138,15 @@ def _write_ply(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
 
 
 def _write_off(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
-    # trimesh would write a fixed number of digits behind the point.
-    meshio.off.write(path, meshio.Mesh(mesh.V, [("triangle", mesh.F)]))
+    # Own code, because libigl and trimesh write fewer digits than a double has.
+    lines = [f"OFF\n{mesh.n} {mesh.m} 0"]
+    lines += [f"{x!r} {y!r} {z!r}" for x, y, z in mesh.V.tolist()]
+    lines += [f"3 {i} {j} {k}" for i, j, k in mesh.F.tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _write_stl(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
-    with path.open("wb") as file:
-        trimesh.Trimesh(mesh.V, mesh.F, process=False).export(file, file_type="stl")
+    igl.writeSTL(str(path), mesh.V.copy(), mesh.F.copy(), binary=True)
 
 
 def _check_written(
@@ -173,8 +174,8 @@ def _obj_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
 
 
 def _off_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
-    found = meshio.off.read(path)
-    return found.points, found.cells_dict["triangle"]
+    found = read_off(path)
+    return found.V, found.triangles
 
 
 def _ply_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
