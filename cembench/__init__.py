@@ -35,9 +35,11 @@ if TYPE_CHECKING:
     from cembench.registry import algorithm, surface_family
     from cembench.workflows.benchmark import Run, benchmark
     from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
+    from cembench.workflows.cut import cut
     from cembench.workflows.holes import holes
     from cembench.workflows.morph_surfaces import morph
     from cembench.workflows.parameterize import Result, parameterize
+    from cembench.workflows.repair import Repair, repair
     from cembench.workflows.theory_facts import theory
     from cembench.workflows.validate import validate
 
@@ -61,9 +63,11 @@ _PLACES = {
     "cembench.registry": ("algorithm", "surface_family"),
     "cembench.workflows.benchmark": ("Run", "benchmark"),
     "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
+    "cembench.workflows.cut": ("cut",),
     "cembench.workflows.holes": ("holes",),
     "cembench.workflows.morph_surfaces": ("morph",),
     "cembench.workflows.parameterize": ("Result", "parameterize"),
+    "cembench.workflows.repair": ("Repair", "repair"),
     "cembench.workflows.theory_facts": ("theory",),
     "cembench.workflows.validate": ("validate",),
 }
@@ -84,18 +88,21 @@ __all__ = [
     "RecordError",
     "RegistryError",
     "RenderError",
+    "Repair",
     "Result",
     "Run",
     "TriangleMesh",
     "__version__",
     "algorithm",
     "benchmark",
+    "cut",
     "holes",
     "list_algorithms",
     "list_surfaces",
     "morph",
     "parameterize",
     "read_mesh",
+    "repair",
     "surface",
     "surface_family",
     "theory",

@@ -41,6 +41,12 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
     MeshError
         The file is missing, empty, of unknown format or damaged, or its mesh fails a check.
 
+    Examples
+    --------
+    >>> write_mesh("triangle.obj", DiskMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    >>> read_mesh("triangle.obj").F
+    array([[0, 1, 2]])
+
     """
     return checked(read_soup(path), mesh_type, Path(path))
 
