@@ -44,8 +44,8 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
     Examples
     --------
     >>> write_mesh("triangle.obj", DiskMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
-    >>> read_mesh("triangle.obj").F
-    array([[0, 1, 2]])
+    >>> read_mesh("triangle.obj").F.tolist()
+    [[0, 1, 2]]
 
     """
     return checked(read_soup(path), mesh_type, Path(path))
