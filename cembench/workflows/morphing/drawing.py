@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from cembench.core.errors import ParameterError
 from cembench.drawing.array_bundle import ArrayBundle
 from cembench.drawing.camera import viewpoints
-from cembench.drawing.draw_numpy import SAMPLES, shrunk
+from cembench.drawing.draw_numpy import SAMPLES, averaged
 from cembench.drawing.rasterizer import rasterize
 from cembench.drawing.scene import FILL, INSIDE, brightness_of, doubled_areas
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -169,6 +169,7 @@ def draw_by_numpy(F: NDArray[np.int64], points: Real, side: int) -> Pictures:
     raster = rasterize(corners, side * SAMPLES)
     light = raster.interpolate(brightness_of(F, points)[F].ravel())
     light = np.where(doubled_areas(corners[:, :2])[raster.face] < 0, INSIDE * light, light)
-    canvas = np.ones((raster.size**2, 3))
-    canvas[raster.pixel] = light[:, None] * np.array(CLAY)
-    return shrunk(255 * canvas.reshape(raster.size, raster.size, 3))
+    shade, white = np.zeros(raster.size**2), np.ones(raster.size**2)
+    shade[raster.pixel], white[raster.pixel] = light, 0.0
+    shade, white = (averaged(one.reshape(raster.size, raster.size)) for one in (shade, white))
+    return np.round(255 * (white[:, :, None] + shade[:, :, None] * np.array(CLAY))).astype(np.uint8)
