@@ -27,12 +27,6 @@ ALLOWED = {
     "cembench/running/process.py": "the output of a process, in the scratch folder",
     "cembench/running/worker.py": "between processes, in the scratch folder",
     "cembench/running/memory.py": "a switch of the system, not a file",
-    "cembench/drawing/array_bundle.py": "between processes, in a temporary folder",
-    "cembench/drawing/draw_pyvista.py": "between processes, in a temporary folder",
-    "cembench/drawing/preview.py:_by_pyvista": "between processes, in a temporary folder",
-    "cembench/workflows/morphing/drawing.py:_by_pyvista": "between processes, temporary",
-    "cembench/workflows/morphing/draw_frames.py": "between processes, in a temporary folder",
-    "meshes_gen/contact_sheet.py:thumbnail": "between processes, in a temporary folder",
 }
 #: Methods and functions that take a path, write there, and report no full disk or replace at once.
 WRITING = {

@@ -689,9 +689,7 @@ def _draw(mesh: TriangleMesh, uv: Any, picture: Path, record: Record) -> None:
         f"{metrics['flipped_triangles']} folds"
     )
     title = f"{record.cell.mesh}: {record.title}"
-    drawn = write_preview(mesh, uv, picture, title=title, caption=caption)
-    if drawn.notice:
-        note(drawn.notice, style="dim")
+    write_preview(mesh, uv, picture, title=title, caption=caption)
 
 
 def _print_notices(meshes: Sequence[TriangleMesh]) -> None:

@@ -180,13 +180,12 @@ def morph(
         } | found.metrics(frames)
         films = [path for path in output if path.suffix.lower() in FILMS]
         others = [path for path in output if path not in films]
-        told = ""
         if others:
             with _timed(seconds, "frames"):
                 write_path(found, others, frames, status.update)
         if films:
             with _timed(seconds, "film"):
-                told = write_films(found, films, frames, chosen_views, size, status.update)
+                write_films(found, films, frames, chosen_views, size, status.update)
         written = list(output)
         if run is not None:
             given = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
@@ -194,8 +193,6 @@ def morph(
             command = f"cembench morph {' '.join(given)} --run {run}"
             standing = rows_of_paper(registry, surfaces)
             written += lay_down(run, found, figures, command, standing, status.update)
-    if told:
-        note(told, style="dim")
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return

@@ -20,7 +20,6 @@ class Extra(StrEnum):
     FETCH = "fetch"
     PARDISO = "pardiso"
     PARQUET = "parquet"
-    RENDER = "render"
     REPORT = "report"
     STANDINS = "standins"
     TABLES = "tables"
@@ -32,7 +31,6 @@ MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.FETCH: ("pooch", "requests"),
     Extra.PARDISO: ("pypardiso",),
     Extra.PARQUET: ("pyarrow",),
-    Extra.RENDER: ("pyvista",),
     Extra.REPORT: ("jinja2", "markupsafe", "plotly"),
     Extra.STANDINS: ("skimage", "pymeshlab"),
     Extra.TABLES: ("pandas",),
@@ -84,7 +82,7 @@ def require(extra: Extra, purpose: str, *modules: str) -> None:
 
     Examples
     --------
-    >>> require(Extra.RENDER, "a picture", "numpy")
+    >>> require(Extra.TABLES, "a table", "numpy")
 
     """
     absent = missing(extra, *modules)

@@ -29,7 +29,6 @@ _FOR = {
     Extra.FETCH: "fetches public surfaces",
     Extra.PARDISO: "another back end",
     Extra.PARQUET: "exports runs as Parquet",
-    Extra.RENDER: "finer pictures",
     Extra.REPORT: "writes reports",
     Extra.STANDINS: "makes stand-ins for the paper's models",
     Extra.TABLES: "gives a run's figures as pandas DataFrames",
@@ -59,7 +58,6 @@ def examine() -> list[InstallationFinding]:
         *(_library(package, module) for package, module in _REQUIRED.items()),
         _backends(),
         _plugins(),
-        _renderer(),
         *(_offered(entry) for entry in sorted(entry_points(group=CHECKS), key=lambda e: e.name)),
         *_datasets(),
         *(_extra(extra) for extra in Extra),
@@ -103,22 +101,6 @@ def _plugins() -> InstallationFinding:
     detail = f"{len(found.algorithms)} algorithms, {len(found.surfaces)} surfaces"
     return InstallationFinding(
         "plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench."
-    )
-
-
-def _renderer() -> InstallationFinding:
-    from cembench.drawing.preview import renderer_status
-
-    try:
-        ok, message = renderer_status()
-    except ImportError as error:  # a library that is required; said in its own line
-        ok, message = False, str(error)
-    return InstallationFinding(
-        "pictures",
-        ok,
-        message,
-        required=False,
-        remedy="Previews are drawn by matplotlib instead, less finely.",
     )
 
 

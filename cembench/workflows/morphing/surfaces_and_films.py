@@ -108,13 +108,12 @@ def write_films(
     views: Sequence[str],
     size: int,
     tell: Tell = lambda words: None,
-) -> str:
-    """Draw a path once and write it to every film; a notice if it was not drawn as usual."""
+) -> None:
+    """Draw a path once and write it to every film."""
     film = Film.of(found.meshes[0], found.stops, np.linspace(0, 1, frames), views, size)
-    pictures, notice = draw_film(film, _frame_of(frames, tell))
+    pictures = draw_film(film, _frame_of(frames, tell))
     for path in outputs:
         writers.write_film(path, pictures)
-    return notice
 
 
 def _frame_of(frames: int, tell: Tell) -> Callable[[int], object]:
