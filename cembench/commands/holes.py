@@ -77,35 +77,33 @@ def holes(
 
 
 def _show(rows: list[dict[str, Any]], run: Path) -> None:
-    from rich.table import Table as Grid
+    from cembench.report.render.grid import figures, grid, names
 
-    grid = Grid(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    grid.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=14)
-    grid.add_column("algorithm", no_wrap=True)
-    for heading in ("sweeps", "E_C", "mean", "SD", "circ.", "folds", "sec"):
-        grid.add_column(heading, justify="right", no_wrap=True)
-    grid.add_column("status", no_wrap=True)
-    before = None
-    for row in rows:
-        grid.add_row(
-            row["mesh"] if row["mesh"] != before else "",
-            row["algorithm"],
-            "-" if row["sweeps"] is None else str(row["sweeps"]),
-            *(
-                "-" if row.get(key) is None else format(row[key], form)
-                for key, form in (
-                    ("conformal_energy", ".4f"),
-                    ("angle_error_mean_deg", ".2f"),
-                    ("angle_error_sd_deg", ".2f"),
-                    ("boundary_circularity", ".0e"),
-                    ("flipped_triangles", "d"),
-                    ("seconds", ".2f"),
-                )
-            ),
-            row["status"],
+    forms = {
+        "conformal_energy": ".4f",
+        "angle_error_mean_deg": ".2f",
+        "angle_error_sd_deg": ".2f",
+        "boundary_circularity": ".0e",
+        "flipped_triangles": "d",
+        "seconds": ".2f",
+    }
+    lines = []
+    for before, row in zip([None, *(row["mesh"] for row in rows)], rows, strict=False):
+        measured = (
+            "-" if row.get(key) is None else format(row[key], form) for key, form in forms.items()
         )
-        before = row["mesh"]
-    out.print(grid)
+        lines.append(
+            [
+                "" if row["mesh"] == before else row["mesh"],
+                row["algorithm"],
+                "-" if row["sweeps"] is None else str(row["sweeps"]),
+                *measured,
+                row["status"],
+            ]
+        )
+    heads = figures("sweeps", "E_C", "mean", "SD", "circ.", "folds", "sec")
+    columns = [names("surface", 14), names("algorithm"), *heads, names("status")]
+    out.print(grid(columns, lines))
     out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
 
 

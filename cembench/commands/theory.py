@@ -65,9 +65,9 @@ def theory(
 
 
 def _show(exhibit: Exhibit, run: Path) -> None:
-    from rich.table import Table as Grid
     from rich.text import Text
 
+    from cembench.report.render.grid import figures, grid, names, words
     from cembench.results.exhibits import place_of
     from cembench.workflows.theory_facts import LOOKS
 
@@ -75,27 +75,19 @@ def _show(exhibit: Exhibit, run: Path) -> None:
     vertices = f"{facts['vertices']:,} vertices, {facts['boundary_vertices']} on the boundary"
     out.print(f"{facts['mesh']}: {vertices}", style="bold", markup=False)
     for part in ("premises", "statements"):
-        grid = Grid(box=None, pad_edge=False, header_style="bold")
-        grid.add_column(part, ratio=1)
-        grid.add_column("")
-        grid.add_column("figure", justify="right", no_wrap=True)
+        rows: list[list[str | Text]] = []
         for check in facts[part]:
             mark = Text("ok", style="green") if check["holds"] else Text("NO", style="bold red")
             figure = check["figure"]
-            grid.add_row(
-                Text.assemble(check["name"], "  ", (check["source"], "dim")),
-                mark,
-                str(figure) if isinstance(figure, int) else f"{figure:.3g}",
-            )
-        out.print(grid)
-    grid = Grid(box=None, pad_edge=False, header_style="bold")
-    grid.add_column("E_C")
-    for heading in (*(f"after {k}" for k in LOOKS), "last"):
-        grid.add_column(heading, justify="right")
+            told = str(figure) if isinstance(figure, int) else f"{figure:.3g}"
+            rows.append([Text.assemble(check["name"], "  ", (check["source"], "dim")), mark, told])
+        out.print(grid([*words(part), names(""), *figures("figure")], rows, gap=2))
+    energies: list[list[str]] = []
     for row in facts["energies"]:
         cells = [row[f"after_{k}"] for k in LOOKS] + [row["last"]]
-        grid.add_row(row["name"], *("-" if c is None else f"{c:.6f}" for c in cells))
-    out.print(grid)
+        energies.append([row["name"], *("-" if c is None else f"{c:.6f}" for c in cells)])
+    heads = figures(*(f"after {k}" for k in LOOKS), "last")
+    out.print(grid([*words("E_C"), *heads], energies, gap=2))
     out.print(exhibit.text, markup=False)
     out.print(f"picture  {place_of(run, exhibit.name, 'theory.png')}", soft_wrap=True, markup=False)
 
