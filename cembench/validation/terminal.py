@@ -11,7 +11,7 @@ from rich.text import Text
 
 from cembench.report.render.grid import GridColumn, figures, grid, names, words
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison
+from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import Growth
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -90,15 +90,6 @@ def growths_table(growths: tuple[Growth, ...]) -> Table:
         GridColumn(head, figures=True, wraps=True) for head in (*sizes, "exponent", "rounds")
     ]
     return grid([*words("seconds"), *columns], rows)
-
-
-def sides_text(found: PairedComparison) -> str:
-    """On how many lower, equal, higher, and the median ratio."""
-    said = f"lower on {found.lower}, equal within 1 % on {found.equal}, higher on {found.higher}"
-    if found.ratio is None:
-        return said
-    said += f"; median ratio {found.ratio:.3f}"
-    return said if found.low is None else f"{said} ({found.low:.3f}-{found.high:.3f})"
 
 
 def _number(value: float | None, form: str) -> str:
