@@ -3,8 +3,8 @@
 The paper does not state when its iteration stops, except after 20 iterations at most. Both readings
 take the same steps; they differ in how many::
 
-    python benchmarks/cem_stopping_rules.py --meshes ../meshes
-    python benchmarks/cem_stopping_rules.py --most-faces 100000
+    python -m benchmarks.cem_stopping_rules --meshes ../meshes
+    python -m benchmarks.cem_stopping_rules --most-faces 100000
 """
 
 from __future__ import annotations
@@ -18,14 +18,13 @@ from cembench.algorithms.cem import cem
 from cembench.surfaces.catalogue import stand_in
 from cembench.surfaces.rows import ROWS
 
+from benchmarks.pages import fill
 from cembench.conformal.metrics import all_metrics
-from cembench.core.atomic import write_text
 from cembench.mesh.files import read_mesh
 from cembench.mesh.reading import is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 
 PAGE = Path(__file__).parents[1] / "docs/algorithms.md"
-BEGIN, END = "<!-- table: made by benchmarks/cem_stopping_rules.py -->", "<!-- end of table -->"
 TOLERANCE = 1e-5
 
 
@@ -39,11 +38,8 @@ def main() -> None:
     for name, mesh in surfaces(chosen.meshes, chosen.most_faces):
         lines.append((mesh.m, line(name, mesh)))
         print(lines[-1][1], flush=True)
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
     table = "\n".join(text for _, text in sorted(lines))
-    text = f"{before}{BEGIN}\n\n{HEADING}\n{table}\n\n{END}{after}"
-    write_text(PAGE, text)
+    fill(PAGE, "cem_stopping_rules", f"{HEADING}\n{table}")
 
 
 HEADING = """\

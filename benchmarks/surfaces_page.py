@@ -3,9 +3,9 @@
 Maps all twenty stand-ins with CEM and writes the page's tables anew. A model of the paper that was
 fetched, or is named with --mesh, gets a line of its own. --sheet draws the contact sheet instead::
 
-    python benchmarks/surfaces_page.py
-    python benchmarks/surfaces_page.py --mesh chinese_lion.mat
-    python benchmarks/surfaces_page.py --sheet
+    python -m benchmarks.surfaces_page
+    python -m benchmarks.surfaces_page --mesh chinese_lion.mat
+    python -m benchmarks.surfaces_page --sheet
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from cembench.surfaces.catalogue import stand_in
 from cembench.surfaces.contact_sheet import contact_sheet
 from cembench.surfaces.rows import ROWS
 
+from benchmarks.pages import fill
 from cembench.conformal.metrics import all_metrics
-from cembench.core.atomic import write_text
 from cembench.mesh.datasets import is_fetched
 from cembench.mesh.files import read_mesh
 from cembench.registry import Registry, load_registry
@@ -31,7 +31,6 @@ from cembench.running.plan import mesh_facts, paper_role_of_file
 
 PAGE = Path(__file__).parents[1] / "docs/surfaces.md"
 SHEET = Path(__file__).parents[1] / "reports/surfaces/contact_sheet.jpg"
-BEGIN, END = "<!-- tables: made by benchmarks/surfaces_page.py -->", "<!-- end of tables -->"
 
 
 @dataclass(frozen=True)
@@ -57,10 +56,7 @@ def main() -> None:
         return
     fetched = [d.path for d in registry.datasets.values() if d.paper_row and is_fetched(d)]
     lines = [*stand_ins(registry), *models(registry, [*chosen.mesh, *fetched])]
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    after = rest.partition(END)[2]
-    text = f"{before}{BEGIN}\n\n{tables(lines)}\n{END}{after}"
-    write_text(PAGE, text)
+    fill(PAGE, "surfaces_page", tables(lines))
 
 
 def stand_ins(registry: Registry) -> Iterable[Line]:

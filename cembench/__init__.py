@@ -28,15 +28,18 @@ if TYPE_CHECKING:
         RegistryError,
         RenderError,
     )
+    from cembench.core.extras import MissingExtra
     from cembench.core.parameterization import MapStep, Parameterization
     from cembench.mesh.files import read_mesh, write_mesh
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
     from cembench.registry import algorithm, surface_family
     from cembench.workflows.benchmark import Run, benchmark
     from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
+    from cembench.workflows.cut import cut
     from cembench.workflows.holes import holes
     from cembench.workflows.morph_surfaces import morph
     from cembench.workflows.parameterize import Result, parameterize
+    from cembench.workflows.repair import Repair, repair
     from cembench.workflows.theory_facts import theory
     from cembench.workflows.validate import validate
 
@@ -53,15 +56,18 @@ _PLACES = {
         "RegistryError",
         "RenderError",
     ),
+    "cembench.core.extras": ("MissingExtra",),
     "cembench.core.parameterization": ("MapStep", "Parameterization"),
     "cembench.mesh.files": ("read_mesh", "write_mesh"),
     "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
     "cembench.registry": ("algorithm", "surface_family"),
     "cembench.workflows.benchmark": ("Run", "benchmark"),
     "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
+    "cembench.workflows.cut": ("cut",),
     "cembench.workflows.holes": ("holes",),
     "cembench.workflows.morph_surfaces": ("morph",),
     "cembench.workflows.parameterize": ("Result", "parameterize"),
+    "cembench.workflows.repair": ("Repair", "repair"),
     "cembench.workflows.theory_facts": ("theory",),
     "cembench.workflows.validate": ("validate",),
 }
@@ -75,24 +81,28 @@ __all__ = [
     "HoledMesh",
     "MapStep",
     "MeshError",
+    "MissingExtra",
     "NotPositiveDefinite",
     "ParameterError",
     "Parameterization",
     "RecordError",
     "RegistryError",
     "RenderError",
+    "Repair",
     "Result",
     "Run",
     "TriangleMesh",
     "__version__",
     "algorithm",
     "benchmark",
+    "cut",
     "holes",
     "list_algorithms",
     "list_surfaces",
     "morph",
     "parameterize",
     "read_mesh",
+    "repair",
     "surface",
     "surface_family",
     "theory",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cembench.core.extras import Extra, command
 from cembench.workflows.doctor import InstallationFinding
 
 from . import remesh
@@ -18,6 +19,6 @@ def remeshing_finding() -> InstallationFinding:
         f"{filter_} is missing; surfaces are remeshed by local operations instead, which gives "
         "other meshes",
         required=False,
-        remedy="Install pymeshlab and the system library libOpenGL (Debian, Ubuntu: apt-get "
-        "install libopengl0).",
+        remedy=f"Run `{command(Extra.STANDINS)}`, and install the system library libOpenGL "
+        "(Debian, Ubuntu: apt-get install libopengl0).",
     )

@@ -17,9 +17,9 @@ from typing import TypeVar
 import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
-from skimage.measure import marching_cubes
 
 from cembench.core.errors import MeshError
+from cembench.core.extras import Extra, missing, require
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -61,9 +61,11 @@ FALLBACK_NOTE = Notice(
 @lru_cache(maxsize=1)
 def has_remeshing_filter() -> bool:
     """Can pymeshlab remesh here? Its plug-ins vanish silently where libOpenGL is missing."""
+    if missing(Extra.STANDINS, "pymeshlab"):
+        return False
     try:
         import pymeshlab
-    except ImportError:
+    except ImportError:  # a system library is missing
         return False
     return hasattr(pymeshlab.MeshSet, "meshing_isotropic_explicit_remeshing") or hasattr(
         pymeshlab.MeshSet(), "meshing_isotropic_explicit_remeshing"
@@ -104,6 +106,7 @@ def march(body: Body) -> tuple[Real, Faces, Body, float]:
 
     Tunnels a few cells wide are plugged. Also the body with its plugs, and the grid's spacing.
     """
+    require(Extra.STANDINS, "making this surface", "skimage")
     values, lower, spacing = sample(body)
     grid = values.shape
     for attempt in range(9):
@@ -138,6 +141,8 @@ def _remove_strays(values: Real, spacing: float) -> None:
 
 
 def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
+    from skimage.measure import marching_cubes
+
     V, F, _, _ = marching_cubes(values, 0.0)  # type: ignore[no-untyped-call] # has no type hints
     V, F = compact(lower + spacing * V.astype(np.float64), F.astype(np.int64))
     V = to_surface(body.f, V, 0.05 * spacing, 0.4 * spacing, rounds=2)

@@ -27,12 +27,6 @@ ALLOWED = {
     "cembench/running/process.py": "the output of a process, in the scratch folder",
     "cembench/running/worker.py": "between processes, in the scratch folder",
     "cembench/running/memory.py": "a switch of the system, not a file",
-    "cembench/drawing/array_bundle.py": "between processes, in a temporary folder",
-    "cembench/drawing/draw_pyvista.py": "between processes, in a temporary folder",
-    "cembench/drawing/preview.py:_by_pyvista": "between processes, in a temporary folder",
-    "cembench/workflows/morphing/drawing.py:_by_pyvista": "between processes, temporary",
-    "cembench/workflows/morphing/draw_frames.py": "between processes, in a temporary folder",
-    "meshes_gen/contact_sheet.py:thumbnail": "between processes, in a temporary folder",
 }
 #: Methods and functions that take a path, write there, and report no full disk or replace at once.
 WRITING = {
@@ -62,8 +56,6 @@ def writes(call):
         return any(set(mode) <= set("rwxabt+") and set(mode) & set("wxa+") for mode in modes)
     if name == "replace":  # of a path it has one argument, of a text two, of a dataclass keywords
         return owner == "os" or (method and len(call.args) == 1 and not call.keywords)
-    if name == "write":
-        return owner.startswith("meshio")
     if (not method and name in OURS) or owner in OUR_OBJECTS:
         return False
     given_file = any(isinstance(one, ast.Name) and one.id in OPEN_FILES for one in call.args)
@@ -117,7 +109,7 @@ def test_no_code_writes_files_but_through_one_function():
         "os.replace(draft, path)",
         "shutil.copyfile(a, b)",
         "igl.writeOBJ(path, V, F)",
-        "meshio.off.write(path, mesh)",
+        "igl.writeSTL(path, V, F)",
     ],
 )
 def test_a_direct_write_is_noticed(code):

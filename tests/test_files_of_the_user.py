@@ -13,7 +13,7 @@ from cembench.surfaces.holed_disk import holed_disk
 from PIL import Image
 
 from cembench.core.errors import RecordError
-from cembench.drawing import preview
+from cembench.drawing import draw_numpy
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.report import plots
 from cembench.report.content import inspection
@@ -49,12 +49,12 @@ DECOYS = {
 
 @pytest.fixture(autouse=True)
 def no_renderer(monkeypatch):
-    """Pictures are grey, so that no process is started for them."""
+    """Pictures are grey, so that they take no time."""
 
     def grey(scene, side):
         return (np.full((side, side, 3), 128, dtype=np.uint8),) * 2
 
-    monkeypatch.setattr(preview, "_by_pyvista", grey)
+    monkeypatch.setattr(draw_numpy, "draw", grey)
 
 
 @pytest.fixture

@@ -11,9 +11,6 @@ LOOKS = ("startswith", "endswith", "find", "index", "count", "partition", "split
 #: What may look at words all the same: the file, what it looks for, and why.
 ALLOWED = {
     ("cembench/core/notices.py", "Definition 1"): "records written before notices had kinds",
-    ("cembench/drawing/preview.py", "No module named 'pyvista'"): "Python's words, of a process "
-    "that died without data; only advice depends on it",
-    ("cembench/drawing/preview.py", "ImportError"): "as above",
     ("cembench/running/environment.py", "model name"): "a key of /proc/cpuinfo",
     ("cembench/running/memory.py", "VmHWM:"): "a key of /proc/self/status",
     ("cembench/report/pictures.py", "A"): "a band of an image",

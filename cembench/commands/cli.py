@@ -50,7 +50,9 @@ from cembench.commands.options import (
     Timeout,
     memory_bytes,
 )
-from cembench.core.errors import MeshError, ParameterError
+from cembench.core.errors import ParameterError
+from cembench.core.extras import Extra, require
+from cembench.linear_algebra.backends import default_backend
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
 
@@ -230,7 +232,7 @@ def map_(
     ] = False,
     plugin: Plugins = [],  # noqa: B006
     solves: SolvesOption = Solves.reuse,
-    backend: BackendOption = Backend.cvxopt,
+    backend: BackendOption = Backend(default_backend()),  # noqa: B008
     threads: Threads = 1,
     timeout: Timeout = 600.0,
     memory: Memory = None,
@@ -249,13 +251,19 @@ def map_(
     from cembench.running.local import Options, map_once
     from cembench.running.plan import MeasurementSettings, paper_role_of_file, plan_cells
     from cembench.running.surface_file import read_surface_file, write_map
+    from cembench.workflows.map_files import (
+        check_takes_disks,
+        draw_map,
+        output_files,
+        picture_files,
+    )
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     registry = registry_with(plugin)
     candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
     if cut:
-        _check_takes_disks(candidates)
-    outputs = _outputs(meshes, output, cut=cut)
+        check_takes_disks(candidates)
+    outputs = output_files(meshes, output, cut=cut)
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
     sources = [fetched.get(path, path) for path in meshes]
@@ -271,7 +279,7 @@ def map_(
     chosen = [next(a for a in candidates if isinstance(file.mesh, a.mesh_type)) for file in found]
     pictures: list[Path] = []
     if preview:
-        pictures = _pictures(sources, chosen, outputs)
+        pictures = picture_files(sources, chosen, outputs)
         for picture in pictures if not force else ():
             check_replaceable(picture)
     how = MeasurementSettings(solves.value, _installed(backend), threads, repeats=1)
@@ -296,7 +304,7 @@ def map_(
             if preview:
                 with err.status("drawing", spinner="line"):
                     written["preview"] = str(pictures[k])
-                    _draw(file.mesh, uv, pictures[k], record)
+                    draw_map(file.mesh, uv, pictures[k], record)
         repaired = {"repair": file.repaired.counts} if file.repaired else {}
         rows.append(row(record) | repaired | written)
         if not as_json:
@@ -359,7 +367,7 @@ def run(
     solves: Annotated[
         list[str], typer.Option("--solves", help="reuse, backslash, or both with a comma.")
     ] = ["reuse"],  # noqa: B006
-    backend: BackendOption = Backend.cvxopt,
+    backend: BackendOption = Backend(default_backend()),  # noqa: B008
     threads: Threads = 1,
     reference: Annotated[
         str | None,
@@ -443,6 +451,7 @@ def reproduce(
     from cembench.running.local import Options
     from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
 
+    require(Extra.REPORT, "a report")
     run_folder.check(output)
     folders.check(output / "report", "report")
     options = Options(memory_bytes=memory_bytes(None), fresh=fresh)
@@ -508,80 +517,6 @@ _MORE = (
 )
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
-
-
-def _check_takes_disks(candidates: Sequence[Algorithm]) -> None:
-    """Raise :class:`ParameterError` where no algorithm maps what a cut makes."""
-    from cembench.mesh.triangle_mesh import DiskMesh
-
-    if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
-        raise ParameterError(
-            f"--cut makes a disk, which {candidates[0].name} does not take; name an algorithm for "
-            "disks (see `cembench list algorithms`)."
-        )
-
-
-def _pictures(
-    sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
-) -> list[Path]:
-    """Return where the picture of each surface goes: beside its output, or here.
-
-    Raises
-    ------
-    ParameterError
-        Two would have one name.
-
-    """
-    from cembench.core.names import file_name
-
-    pictures = [
-        Path(f"{file_name(f'{source.stem}_{algorithm.name}')}.png")
-        if target is None
-        else target.with_suffix(".png")
-        for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
-    ]
-    twice = [picture for picture in pictures if pictures.count(picture) > 1]
-    if twice:
-        raise ParameterError(f"two pictures would be {twice[0]}; draw them one after another.")
-    return pictures
-
-
-def _outputs(meshes: Sequence[Path], output: Path | None, *, cut: bool) -> list[Path | None]:
-    """Return where the map of each surface goes: a file, or files of a folder for several.
-
-    Raises
-    ------
-    MeshError
-        A format that cannot hold the UVs, or a folder that is not there.
-    ParameterError
-        Two surfaces of one name, or a file for several surfaces.
-
-    """
-    from cembench.mesh.files import check_writable_format
-    from cembench.running.surface_file import check_map_format
-
-    if output is None:
-        return [None] * len(meshes)
-    if len(meshes) == 1 and not output.is_dir():
-        check_writable_format(output, with_uv=True)
-        check_map_format(output, cut=cut)
-        return [output]
-    if output.is_file() or output.suffix:
-        raise ParameterError(
-            f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with -o."
-        )
-    if not output.parent.is_dir():
-        raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")
-    files = [
-        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' and not cut else '.obj'}"
-        for path in meshes
-    ]
-    twice = [file for file in files if files.count(file) > 1]
-    if twice:
-        raise ParameterError(
-            f"two surfaces would be written to {twice[0]}; map them into different folders."
-        )
-    return list(files)
 
 
 def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
@@ -674,21 +609,6 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
         f"\n{len(costs)} of {len(tasks)} cells to measure: about {duration(seconds)}, "
         f"{largest / 2**30:.1f} GiB at most{rough}"
     )
-
-
-def _draw(mesh: TriangleMesh, uv: Any, picture: Path, record: Record) -> None:
-    from cembench.drawing.preview import write_preview
-
-    metrics = record.outcome.metrics
-    caption = (
-        f"E_C {metrics['conformal_energy']:.4f}   angles off by "
-        f"{metrics['angle_error_mean_deg']:.2f} degrees in the mean   "
-        f"{metrics['flipped_triangles']} folds"
-    )
-    title = f"{record.cell.mesh}: {record.title}"
-    drawn = write_preview(mesh, uv, picture, title=title, caption=caption)
-    if drawn.notice:
-        note(drawn.notice, style="dim")
 
 
 def _print_notices(meshes: Sequence[TriangleMesh]) -> None:

@@ -35,12 +35,12 @@ def cut(
     the surface that each vertex of the disk is a copy of. `cembench map --cut` cuts, maps, and
     writes the UVs for the uncut surface.
     """
+    from cembench.core.notices import NoticeKind
     from cembench.core.outputs import refuse_inputs, refuse_present
-    from cembench.mesh.cut import cut_open, write_seam
-    from cembench.mesh.defects import located
-    from cembench.mesh.files import check_writable_format, checked, read_repaired, write_mesh
-    from cembench.mesh.reading import read_soup
-    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.mesh.cut import write_seam
+    from cembench.mesh.files import check_writable_format, write_mesh
+    from cembench.workflows.cut import cut as cut_open
+    from cembench.workflows.repair import repair as mended
 
     check_writable_format(output, with_uv=False)
     if output.suffix.lower() == ".stl":
@@ -51,14 +51,9 @@ def cut(
     seam = output.with_name(f"{output.stem}_seam.csv")
     refuse_inputs(output, [mesh], force=force)
     refuse_present([seam], force=force)
-    with err.status("reading", spinner="line"):
-        soup, repaired = read_repaired(mesh) if mend else (read_soup(mesh), None)
-        surface = checked(soup, TriangleMesh, mesh)
-    with err.status(f"cutting {surface.m:,} triangles", spinner="line"):
-        try:
-            disk = cut_open(surface, between or ())
-        except MeshError as error:
-            raise located(error, mesh) from None
+    with err.status("cutting", spinner="line"):
+        repaired = mended(mesh) if mend else None
+        disk = cut_open(repaired.mesh if repaired else mesh, through=between or ())
     write_mesh(output, disk.mesh)
     write_seam(seam, disk)
     if as_json:
@@ -72,11 +67,12 @@ def cut(
             "faces": disk.mesh.m,
             "boundary_vertices": len(disk.mesh.boundary),
         }
-        steps = {} if repaired is None else {"repair": repaired.counts}
+        steps = {} if repaired is None else {"repair": repaired.steps}
         print_json(about | steps)
         return
-    for notice in soup.notices if repaired is None else ():
-        note(f"{soup.name}: {notice}")
+    for notice in disk.mesh.notices:
+        if notice.kind is not NoticeKind.CUT_OPEN:  # told below
+            note(f"{mesh.stem}: {notice}")
     if repaired is not None:
         print_steps(repaired.steps)
     out.print(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -11,16 +11,8 @@ from cembench.commands.console import Json, complain, err, out, print_json
 from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
 
-if TYPE_CHECKING:
-    from cembench.core.parameterization import MapStep
-    from cembench.mesh.triangle_mesh import HoledMesh
-    from cembench.registry import Algorithm
-    from cembench.results.records import MeshOrigin, Record
-
 #: The surface of the paper's Figures 1 and 7.
 STAND_IN = "ho-face-with-holes"
-#: Steps that a picture shows; surfaces with more boundaries are drawn without the rest.
-MOST_STEPS = 4
 
 
 def holes(
@@ -53,6 +45,7 @@ def holes(
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.running.plan import surface_named
+    from cembench.workflows.holes_exhibits import examine_holes, write_holes_table
 
     run_folder.check(run)
     registry = load_registry()
@@ -69,9 +62,9 @@ def holes(
     for name, mesh in zip(meshes, surfaces, strict=True):
         with err.status(f"Koebe's method on {mesh.name}", spinner="line"):
             command = f"cembench holes {Path(name).name}{options}"
-            rows += _examine(mesh, algorithms, outer, sweeps, run, command)
+            rows += examine_holes(mesh, algorithms, outer, sweeps, run, command, complain)
     files = " ".join(Path(name).name for name in meshes)
-    _lay_down_table(rows, run, f"cembench holes {files}{options}")
+    write_holes_table(rows, run, f"cembench holes {files}{options}")
     if as_json:
         print_json(rows)
     else:
@@ -83,262 +76,34 @@ def holes(
         raise typer.Exit(1)
 
 
-def _examine(
-    mesh: HoledMesh,
-    algorithms: list[Algorithm],
-    outer: int | None,
-    sweeps: int,
-    run: Path,
-    command: str,
-) -> list[dict[str, Any]]:
-    """Everything about one surface: a row for each way of mapping it, and two exhibits."""
-    from cembench.core.errors import AlgorithmFailed
-
-    rows = []
-    for algorithm in algorithms:
-        steps: list[MapStep] = []
-        counts: list[int | None] = [None]
-        if algorithm.steps:
-            try:
-                steps = list(algorithm.steps(mesh, sweeps=sweeps, outer=outer))
-                counts = [*sorted({1, _best_sweep(mesh, steps)})]
-            except AlgorithmFailed as error:
-                complain(f"{mesh.name}: {error}")
-                counts = [1]
-        for count in counts:
-            row, record, uv = _measured(mesh, algorithm, outer, count)
-            rows.append(row)
-            if uv is not None and count == 1:
-                _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
-    return rows
-
-
-def _best_sweep(mesh: HoledMesh, steps: list[MapStep]) -> int:
-    """Return the first sweep whose finished map has an E_C within 1 % of the lowest."""
-    from cembench.conformal.metrics import dirichlet_energy, image_area
-
-    results = [step.result for step in steps if step.result is not None]
-    energies = [dirichlet_energy(mesh, uv) - image_area(mesh, uv) for uv in results]
-    enough = min(energies) * (1.01 if min(energies) > 0 else 0.99)
-    return 1 + next(k for k, energy in enumerate(energies) if energy <= enough)
-
-
-def _measured(
-    mesh: HoledMesh, algorithm: Algorithm, outer: int | None, sweeps: int | None
-) -> tuple[dict[str, Any], Record, Any]:
-    """One checked call in a process of its own, as a row."""
-    from cembench.running.local import Options, map_once
-    from cembench.running.plan import MeasurementSettings, plan_cells
-
-    known = {parameter.name for parameter in algorithm.parameters}
-    given = {"outer": outer, "sweeps": sweeps}
-    parameters = {k: v for k, v in given.items() if v is not None and k in known}
-    task = plan_cells([algorithm], [mesh], parameters, MeasurementSettings(repeats=1))[0]
-    record, uv = map_once(task, Options())
-    outcome = record.outcome
-    row = {
-        "mesh": mesh.name,
-        "faces": mesh.m,
-        "holes": len(mesh.loops) - 1,
-        "algorithm": algorithm.name,
-        "sweeps": sweeps,
-        "status": outcome.status,
-        "cause": outcome.cause,
-        **outcome.metrics,
-        "circularity_before_rounding": outcome.extras.get("circularity_before_rounding"),
-        "boundaries": [boundary.model_dump() for boundary in outcome.boundaries],
-        "iterations": outcome.iterations,
-        "seconds": outcome.median_seconds,
-        "phases": outcome.phases,
-    }
-    return row, record, uv
-
-
-def _lay_down_pictures(
-    mesh: HoledMesh,
-    steps: list[MapStep],
-    uv: Any,
-    record: Record,
-    outer: int | None,
-    run: Path,
-    command: str,
-) -> None:
-    """Figure 1, the steps of the first sweep, and Figure 7, the map."""
-    from cembench.drawing.koebe_steps import write_steps
-    from cembench.drawing.preview import write_preview
-    from cembench.results.exhibits import Exhibit, ExhibitPicture, exhibit_folder, write_exhibit
-
-    metrics = record.outcome.metrics
-    origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
-    figures = {
-        "angle_error_mean_deg": metrics["angle_error_mean_deg"],
-        "conformal_energy": metrics["conformal_energy"],
-        "boundary_circularity": metrics["boundary_circularity"],
-        "flipped_triangles": metrics["flipped_triangles"],
-    }
-    caption = (
-        f"E_C {metrics['conformal_energy']:.4f}   angles off by "
-        f"{metrics['angle_error_mean_deg']:.2f} degrees in the mean   "
-        f"holes off circles by {metrics['boundary_circularity']:.1g}   "
-        f"{metrics['flipped_triangles']} folds"
-    )
-    name = f"koebe-map-{mesh.name}"
-    picture = exhibit_folder(run, name) / "map.png"
-    write_preview(mesh, uv, picture, title=f"{mesh.name}: {record.title}", caption=caption)
-    alternative = "A checkerboard on the surface and on its image, a disk with round holes."
-    write_exhibit(
-        run,
-        Exhibit(
-            name=name,
-            title=f"{mesh.name} and its image, a disk with round holes",
-            text=f"The result of one sweep of Koebe's method. {caption}.",
-            command=command,
-            origin=origin,
-            figure="Figure 7",
-            pictures=(ExhibitPicture(file="map.png", caption=caption, alternative=alternative),),
-            facts=figures,
-        ),
-    )
-    if len(mesh.loops) > MOST_STEPS:
-        return
-    name = f"koebe-steps-{mesh.name}"
-    first = [step for step in steps if step.sweep == 1]
-    title = f"{mesh.name}: the steps of Koebe's method"
-    panels = _panels(mesh, first, outer)
-    write_steps(mesh, panels, uv, exhibit_folder(run, name) / "steps.png", title)
-    words = (
-        "(a) The surface. Then, in turn: one boundary (red) is left open and the others are filled,"
-        " CEM makes the open one a circle; the next boundary is turned outside by an inversion at "
-        "its centroid. The checkerboard is that of the final map throughout."
-    )
-    table = _steps_table(mesh, first, outer)
-    write_exhibit(
-        run,
-        Exhibit(
-            name=name,
-            title=f"The steps of Koebe's method on {mesh.name}",
-            text=words,
-            command=command,
-            origin=origin,
-            figure="Figure 1",
-            pictures=(ExhibitPicture(file="steps.png", caption=words, alternative=alternative),),
-            tables=(table,),
-            facts={"iterations": [len(step.energies) - 1 for step in first]},
-        ),
-    )
-
-
-def _panels(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
-    from cembench.drawing.koebe_steps import StepPanel
-
-    first, others = mesh.outer_and_holes(outer)
-    loops = (first, *others)
-    panels = [StepPanel("the surface")]
-    for step in steps:
-        name = "outer boundary" if step.boundary == 0 else f"hole {step.boundary}"
-        if step.before is not None:
-            panels.append(StepPanel(f"{name} turned outside", step.before, loops[step.boundary]))
-        panels.append(StepPanel(f"{name} made a circle", step.uv, loops[step.boundary]))
-    return panels
-
-
-def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
-    """Circularity of each boundary after each step of the sweep."""
-    from cembench.conformal.metrics import circle_of
-    from cembench.results.exhibits import ExhibitTable
-
-    first, others = mesh.outer_and_holes(outer)
-    loops = (first, *others)
-    names = ("outer", *(f"hole {k}" for k in range(1, len(loops))))
-    rows: tuple[tuple[str | float | int | None, ...], ...] = tuple(
-        (
-            names[step.boundary],
-            len(step.energies) - 1,
-            *(circle_of(loop, step.uv[loop]).circularity for loop in loops),
-        )
-        for step in steps
-    )
-    columns = ("opened", "iterations", *(f"circularity, {name}" for name in names))
-    return ExhibitTable(
-        title="Circularity after each step, before rounding", columns=columns, rows=rows
-    )
-
-
-_TABLE = (
-    ("surface", "mesh"),
-    ("holes", "holes"),
-    ("algorithm", "algorithm"),
-    ("sweeps", "sweeps"),
-    ("E_C", "conformal_energy"),
-    ("mean", "angle_error_mean_deg"),
-    ("SD", "angle_error_sd_deg"),
-    ("circularity", "boundary_circularity"),
-    ("before rounding", "circularity_before_rounding"),
-    ("folds", "flipped_triangles"),
-    ("iterations", "iterations"),
-    ("seconds", "seconds"),
-    ("status", "status"),
-)
-
-
-def _lay_down_table(rows: list[dict[str, Any]], run: Path, command: str) -> None:
-    from cembench.results.exhibits import Exhibit, ExhibitTable, write_exhibit
-
-    table = ExhibitTable(
-        title="Surfaces with holes",
-        columns=tuple(title for title, _ in _TABLE),
-        rows=tuple(tuple(row.get(key) for _, key in _TABLE) for row in rows),
-        notes=(
-            "Mean and SD are of the angles' errors in degrees; circularity is the largest "
-            "distance of a boundary from its fitted circle, in radii; seconds are of one call.",
-        ),
-    )
-    standing = {row["mesh"] for row in rows} <= {STAND_IN}
-    write_exhibit(
-        run,
-        Exhibit(
-            name="holes",
-            title="Surfaces with holes",
-            text="Koebe's method after one sweep and after the best number of sweeps, beside the "
-            "other maps to a disk with holes.",
-            command=command,
-            origin="stand-in" if standing else "surface",
-            tables=(table,),
-            facts={"rows": rows},
-        ),
-    )
-
-
 def _show(rows: list[dict[str, Any]], run: Path) -> None:
-    from rich.table import Table as Grid
+    from cembench.report.render.grid import figures, grid, names
 
-    grid = Grid(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    grid.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=14)
-    grid.add_column("algorithm", no_wrap=True)
-    for heading in ("sweeps", "E_C", "mean", "SD", "circ.", "folds", "sec"):
-        grid.add_column(heading, justify="right", no_wrap=True)
-    grid.add_column("status", no_wrap=True)
-    before = None
-    for row in rows:
-        grid.add_row(
-            row["mesh"] if row["mesh"] != before else "",
-            row["algorithm"],
-            "-" if row["sweeps"] is None else str(row["sweeps"]),
-            *(
-                "-" if row.get(key) is None else format(row[key], form)
-                for key, form in (
-                    ("conformal_energy", ".4f"),
-                    ("angle_error_mean_deg", ".2f"),
-                    ("angle_error_sd_deg", ".2f"),
-                    ("boundary_circularity", ".0e"),
-                    ("flipped_triangles", "d"),
-                    ("seconds", ".2f"),
-                )
-            ),
-            row["status"],
+    forms = {
+        "conformal_energy": ".4f",
+        "angle_error_mean_deg": ".2f",
+        "angle_error_sd_deg": ".2f",
+        "boundary_circularity": ".0e",
+        "flipped_triangles": "d",
+        "seconds": ".2f",
+    }
+    lines = []
+    for before, row in zip([None, *(row["mesh"] for row in rows)], rows, strict=False):
+        measured = (
+            "-" if row.get(key) is None else format(row[key], form) for key, form in forms.items()
         )
-        before = row["mesh"]
-    out.print(grid)
+        lines.append(
+            [
+                "" if row["mesh"] == before else row["mesh"],
+                row["algorithm"],
+                "-" if row["sweeps"] is None else str(row["sweeps"]),
+                *measured,
+                row["status"],
+            ]
+        )
+    heads = figures("sweeps", "E_C", "mean", "SD", "circ.", "folds", "sec")
+    columns = [names("surface", 14), names("algorithm"), *heads, names("status")]
+    out.print(grid(columns, lines))
     out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -22,16 +24,7 @@ from cembench.commands.console import (
     split,
 )
 from cembench.commands.options import Faces, Parameters, Plugins, Timeout, finite
-from cembench.core.errors import AlgorithmFailed, MeshError, ParameterError
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from cembench.mesh.triangle_mesh import DiskMesh
-    from cembench.registry import Registry
-    from cembench.workflows.morphing.morph import Morph
+from cembench.core.errors import AlgorithmFailed, ParameterError
 
 
 class Pose(StrEnum):
@@ -111,9 +104,17 @@ def morph(
     from cembench.drawing.camera import viewpoints
     from cembench.results import run_folder
     from cembench.workflows.morphing.drawing import check_views
+    from cembench.workflows.morphing.exhibit import lay_down
     from cembench.workflows.morphing.landmarks import common_landmarks, read_landmarks
     from cembench.workflows.morphing.morph import morph as morphed
-    from cembench.workflows.morphing.writers import check_output, files_of
+    from cembench.workflows.morphing.surfaces_and_films import (
+        checked_maps,
+        disk_with_landmarks,
+        rows_of_paper,
+        write_films,
+        write_path,
+    )
+    from cembench.workflows.morphing.writers import FILMS, check_output, files_of
 
     chosen_views = split([views])
     check_views(chosen_views)
@@ -130,7 +131,7 @@ def morph(
     meshes, known = [], []
     for name in surfaces:
         with err.status(f"reading {name}", spinner="line"):
-            mesh, named = _surface(registry, name, faces)
+            mesh, named = disk_with_landmarks(registry, name, faces)
         for notice in mesh.notices:
             note(f"{mesh.name}: {notice}")
         meshes.append(mesh)
@@ -140,28 +141,34 @@ def morph(
     else:
         places = read_landmarks(landmarks, meshes, known)
     seconds: dict[str, float] = {}
-    started = perf_counter()
-    maps = _maps(registry, meshes, algorithm, assignments(parameter), plugin, timeout)
-    seconds["maps"] = perf_counter() - started
-    started = perf_counter()
     first = meshes[0]
     right, up, _ = viewpoints(first)["front"]
-    with err.status("registering", spinner="line") as status:
+    with err.status("mapping", spinner="line") as status:
         try:
-            found = morphed(
-                meshes,
-                maps,
-                places,
-                lam=lam,
-                reach=reach,
-                pose=pose.value,
-                upright=first.V @ right + 1j * (first.V @ up),
-                tell=status.update,
-            )
+            with _timed(seconds, "maps"):
+                maps = checked_maps(
+                    registry,
+                    meshes,
+                    algorithm,
+                    assignments(parameter),
+                    plugin,
+                    timeout,
+                    status.update,
+                )
+            with _timed(seconds, "registration"):
+                found = morphed(
+                    meshes,
+                    maps,
+                    places,
+                    lam=lam,
+                    reach=reach,
+                    pose=pose.value,
+                    upright=first.V @ right + 1j * (first.V @ up),
+                    tell=status.update,
+                )
         except AlgorithmFailed as error:
             complain(str(error))
             raise typer.Exit(1) from None
-        seconds["registration"] = perf_counter() - started
         status.update("measuring")
         figures: dict[str, Any] = {
             "surfaces": [mesh.name for mesh in meshes],
@@ -171,12 +178,21 @@ def morph(
             "reach": reach,
             "frames": frames,
         } | found.metrics(frames)
-    written = _write(found, output, frames, chosen_views, size, seconds)
-    if run is not None:
-        given = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
-        given += [] if faces is None else ["--faces", str(faces)]
-        command = f"cembench morph {' '.join(given)} --run {run}"
-        written += _lay_down(run, found, figures, command, registry, surfaces)
+        films = [path for path in output if path.suffix.lower() in FILMS]
+        others = [path for path in output if path not in films]
+        if others:
+            with _timed(seconds, "frames"):
+                write_path(found, others, frames, status.update)
+        if films:
+            with _timed(seconds, "film"):
+                write_films(found, films, frames, chosen_views, size, status.update)
+        written = list(output)
+        if run is not None:
+            given = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
+            given += [] if faces is None else ["--faces", str(faces)]
+            command = f"cembench morph {' '.join(given)} --run {run}"
+            standing = rows_of_paper(registry, surfaces)
+            written += lay_down(run, found, figures, command, standing, status.update)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -187,119 +203,11 @@ def morph(
         out.print("Nothing was written; add -o FILM.gif to see it.", style="dim")
 
 
-def _surface(
-    registry: Registry, name: str, faces: int | None
-) -> tuple[DiskMesh, Mapping[str, int]]:
-    """The surface of a file or of a registered name, and its landmarks by name."""
-    from cembench.mesh.files import read_mesh
-    from cembench.mesh.triangle_mesh import DiskMesh
-    from cembench.running.plan import generate_surface
-
-    if Path(name).suffix or name not in registry.surfaces:
-        if not Path(name).suffix and not Path(name).exists():
-            raise ParameterError(
-                f"{name!r} is neither a mesh file nor a surface; surfaces: "
-                f"{', '.join(sorted(registry.surfaces))}."
-            )
-        return read_mesh(name), {}
-    mesh = generate_surface(registry, name, faces)
-    if not isinstance(mesh, DiskMesh):
-        raise MeshError(
-            f"{name} has {len(mesh.loops)} boundary loops; a morph needs topological disks, with "
-            "exactly one."
-        )
-    find = registry.surface(name).landmarks
-    return mesh, find(mesh) if find else {}
-
-
-def _maps(
-    registry: Registry,
-    meshes: list[DiskMesh],
-    algorithm: str,
-    parameters: dict[str, str],
-    plugins: list[str],
-    timeout: float,
-) -> list[NDArray[Any]]:
-    """A checked map of each surface; exit code 1 where there is none."""
-    from cembench.running.local import Options, map_once
-    from cembench.running.plan import MeasurementSettings, plan_cells
-
-    chosen = registry.algorithm(algorithm)
-    if chosen.target != "disk":
-        able = ", ".join(a.name for a in registry.algorithms.values() if a.target == "disk")
-        raise ParameterError(
-            f"{algorithm} maps to the target {chosen.target!r}; a morph needs the disk: {able}."
-        )
-    maps = []
-    for mesh in meshes:
-        (task,) = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1), plugins)
-        with err.status(f"{chosen.title} on {mesh.name}", spinner="line"):
-            record, uv = map_once(task, Options(timeout=timeout))
-        if record.outcome.status != "ok" or uv is None:
-            complain(f"{mesh.name}: {record.outcome.status}: {record.outcome.cause}")
-            raise typer.Exit(1)
-        maps.append(uv)
-    return maps
-
-
-def _write(
-    found: Morph,
-    outputs: list[Path],
-    frames: int,
-    views: list[str],
-    size: int,
-    seconds: dict[str, float],
-) -> list[Path]:
-    """Write the path to every place asked for."""
-    import numpy as np
-
-    from cembench.workflows.morphing import writers
-    from cembench.workflows.morphing.drawing import Film, draw_film
-
-    times, first = np.linspace(0, 1, frames), found.meshes[0]
-    films = [path for path in outputs if path.suffix.lower() in writers.FILMS]
-    others = [path for path in outputs if path not in films]
-    with err.status("writing", spinner="line") as status:
-
-        def tell(frame: int) -> None:
-            status.update(f"frame {frame + 1} of {frames}")
-
-        started = perf_counter()
-        for path in others:
-            if path.suffix.lower() in writers.ARRAYS and not path.is_dir():
-                writers.write_arrays(path, first, times, found.at)
-            else:
-                writers.write_meshes(path, first, times, found.at, tell)
-        if others:
-            seconds["frames"] = perf_counter() - started
-        started = perf_counter()
-        if films:
-            film = Film.of(first, found.stops, times, views, size)
-            pictures, notice = draw_film(film, tell)
-            if notice:
-                note(notice, style="dim")
-            for path in films:
-                writers.write_film(path, pictures)
-            seconds["film"] = perf_counter() - started
-    return list(outputs)
-
-
-def _lay_down(
-    run: Path,
-    found: Morph,
-    figures: dict[str, Any],
-    command: str,
-    registry: Registry,
-    surfaces: list[str],
-) -> list[Path]:
-    from cembench.running.plan import paper_roles
-    from cembench.workflows.morphing.exhibit import lay_down
-
-    generated = [name for name in surfaces if name in registry.surfaces]
-    standing = paper_roles(registry, generated)
-    rows = tuple(standing[name].paper_row if name in standing else "" for name in surfaces)
-    with err.status("drawing", spinner="line") as status:
-        return lay_down(run, found, figures, command, rows, status.update)
+@contextmanager
+def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
+    started = perf_counter()
+    yield
+    seconds[name] = perf_counter() - started
 
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:

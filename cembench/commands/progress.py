@@ -11,6 +11,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from cembench.report.render.grid import GridColumn, grid
 from cembench.report.render.terminal import status_style
 from cembench.results.records import Record
 from cembench.running.local import Step, Watcher
@@ -149,9 +150,8 @@ class LiveProgress(PlainProgress):
         self._recent.append(label)
 
     def _picture(self) -> RenderableType:
-        table = Table(box=None, pad_edge=False, show_header=False)
-        for label in self._recent:
-            table.add_row(*self._lines[label])
+        lines = [self._lines[label] for label in self._recent]
+        table = grid([GridColumn(wraps=True)] * 3, lines, gap=2)
         bar = Table.grid(padding=(0, 1))
         left = self.remaining.seconds
         bar.add_row(

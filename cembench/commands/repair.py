@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from cembench.commands.console import Json, err, note, out, print_json
 from cembench.commands.options import FillHoles, Weld
-
-if TYPE_CHECKING:
-    from cembench.mesh.repair import Step
-    from cembench.mesh.triangle_mesh import TriangleMesh
 
 
 class Keep(StrEnum):
@@ -48,44 +44,37 @@ def repair(
     vertices split, triangles oriented alike, components chosen, ears dropped, holes filled,
     isolated vertices removed. docs/repair.md tells how.
     """
-    from cembench.core.errors import MeshError
     from cembench.core.outputs import refuse_inputs, refuse_present
-    from cembench.mesh.defects import located
     from cembench.mesh.files import check_writable_format, write_mesh
-    from cembench.mesh.reading import read_soup
-    from cembench.mesh.repair import repair as repaired
-    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.mesh.topology import genus
+    from cembench.workflows.repair import repair as mended
 
     check_writable_format(output, with_uv=False)
     refuse_inputs(output, [mesh], force=force)
-    with err.status("reading", spinner="line"):
-        soup = read_soup(mesh)
-    with err.status(f"mending {len(soup.sizes):,} faces", spinner="line"):
-        try:
-            result = repaired(
-                soup.V,
-                soup.polygons,
-                weld=weld,
-                fill_holes=fill_holes,
-                components=components.value,
-            )
-            surfaces = [TriangleMesh.from_arrays(*arrays) for arrays in result.surfaces]
-        except MeshError as error:
-            raise located(error, mesh) from None
+    with err.status("mending", spinner="line"):
+        found = mended(mesh, weld=weld, fill_holes=fill_holes, components=components.value)
     files = [output]
-    if len(surfaces) > 1:
-        files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(surfaces) + 1)]
+    if len(found.meshes) > 1:
+        files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(found.meshes) + 1)]
         refuse_present(files, force=force)
-    about = []
-    for path, surface in zip(files, surfaces, strict=True):
+    about: list[dict[str, Any]] = []
+    for path, surface in zip(files, found.meshes, strict=True):
         write_mesh(path, surface)
-        about.append(_about(surface) | {"output": str(path)})
+        about.append(
+            {
+                "vertices": surface.n,
+                "faces": surface.m,
+                "boundary_loops": len(surface.loops),
+                "genus": genus(surface.F, surface.n, len(surface.loops)),
+                "output": str(path),
+            }
+        )
     if as_json:
-        print_json({"input": str(mesh), "steps": result.counts, "surfaces": about})
+        print_json({"input": str(mesh), "steps": found.steps, "surfaces": about})
         return
-    for notice in soup.notices:
-        note(f"{soup.name}: {notice}")
-    print_steps(result.steps)
+    for notice in found.notices:
+        note(f"{mesh.stem}: {notice}")
+    print_steps(found.steps)
     for one in about:
         out.print(
             f"{one['output']}: {one['vertices']:,} vertices, {one['faces']:,} triangles, "
@@ -94,25 +83,12 @@ def repair(
         )
 
 
-def print_steps(steps: Mapping[Step, int]) -> None:
+def print_steps(steps: Mapping[str, int]) -> None:
     """Print how often each step of a repair was taken."""
-    from cembench.mesh.repair import TITLES
+    from cembench.mesh.repair import TITLES, Step
 
     for step, count in steps.items():
-        out.print(f"{count:>9,}  {TITLES[step]}", style="" if count else "dim")
-
-
-def _about(surface: TriangleMesh) -> dict[str, Any]:
-    from cembench.mesh.topology import euler_characteristic
-
-    loops = len(surface.loops)
-    euler = euler_characteristic(surface.F, surface.n)
-    return {
-        "vertices": surface.n,
-        "faces": surface.m,
-        "boundary_loops": loops,
-        "genus": (2 - loops - euler) // 2,
-    }
+        out.print(f"{count:>9,}  {TITLES[Step(step)]}", style="" if count else "dim")
 
 
 #: Each verb with the examples that its help shows.

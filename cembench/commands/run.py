@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -38,17 +39,17 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
     damaged = {f.file.stem for f in verified.findings if f.kind is Kind.damaged} - held.keys()
     asked = store.plan() or [record.cell for record in held.values()]
     states = {cell.label: _state(store, held.get(cell.label), cell) for cell in asked}
-    states |= dict.fromkeys(damaged & states.keys(), "damaged")
+    states |= dict.fromkeys(damaged & states.keys(), CellState("damaged"))
     shown = verified.findings if verify else verified.disagreements
     others = [record for label, record in held.items() if label not in states]
     about: dict[str, Any] = {
         "run": str(run),
         "measuring": store.is_locked(),
         "asked": len(asked),
-        "states": dict(Counter(state.split(":")[0] for state in states.values())),
+        "states": dict(Counter(state.name for state in states.values())),
         "recorded_besides": len(others),
         "cells": [
-            {"key": c.key, "mesh": c.mesh, "algorithm": c.algorithm, "state": states[c.label]}
+            {"key": c.key, "mesh": c.mesh, "algorithm": c.algorithm, "state": str(states[c.label])}
             for c in asked
         ],
         "findings": [
@@ -67,7 +68,7 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
 
 
 def _show_status(
-    about: dict[str, Any], others: list[Record], cells: list[tuple[Cell, str]]
+    about: dict[str, Any], others: list[Record], cells: list[tuple[Cell, CellState]]
 ) -> None:
     from cembench.report.render.terminal import status_style
 
@@ -77,7 +78,7 @@ def _show_status(
     if others:
         out.print(f"{len(others):>6}  recorded besides, not asked for last")
     for cell, state in cells:
-        if state not in ("ok", "waiting"):
+        if state.name not in ("ok", "waiting"):
             line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {state}"
             out.print(line, soft_wrap=True)
     for finding in about["findings"]:
@@ -243,13 +244,24 @@ def export(
         out.print(f"{len(found)} rows in {path}", soft_wrap=True)
 
 
-def _state(store: Store, record: Record | None, cell: Cell) -> str:
-    """In words: a status with its cause, how many rounds are done, or that it waits."""
+@dataclass(frozen=True)
+class CellState:
+    """How far a cell is: a status, "waiting", "in work" or "damaged", and more in words."""
+
+    name: str
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.detail}" if self.detail else self.name
+
+
+def _state(store: Store, record: Record | None, cell: Cell) -> CellState:
     if record is not None:
-        outcome = record.outcome
-        return outcome.status + (f": {outcome.cause}" if outcome.cause else "")
+        return CellState(record.outcome.status, record.outcome.cause or "")
     rounds = store.rounds_done(cell)
-    return "waiting" if rounds is None else f"in work: {rounds} of {cell.repeats} rounds done"
+    if rounds is None:
+        return CellState("waiting")
+    return CellState("in work", f"{rounds} of {cell.repeats} rounds done")
 
 
 def _chosen(records: list[Record], wanted: str) -> list[Record]:

@@ -83,14 +83,16 @@ def validate(
     Exit code 0: valid, and what was required holds; 1: not; 2: wrong usage.
     docs/write_a_solver.md shows it at work.
     """
-    from cembench.core import folders
+    from cembench.core import extras, folders
     from cembench.running.local import Options
     from cembench.running.plan import distribute_parameters
     from cembench.validation.examine import ValidationOptions, examine
     from cembench.validation.solver import Solver, in_a_process, load_solver
     from cembench.validation.terminal import validation_text
+    from cembench.workflows.validate import write_validation
 
     if output is not None:
+        extras.require(extras.Extra.REPORT, f"the page in {output}")
         folders.check(output, "validation")
     with err.status(f"importing {escape(plugin)}", spinner="line"):
         algorithm, registry, plugins = load_solver(plugin)
@@ -113,7 +115,7 @@ def validate(
     )
     with _folder(output) as folder:
         found = examine(solver, registry, folder, asked, _telling())
-        written = _write(found, folder) if output is not None else {}
+        written = write_validation(found, folder) if output is not None else {}
     if as_json:
         print_json(_as_json(found, written))
     else:
@@ -168,24 +170,6 @@ def _telling() -> ValidationHooks:
         return (LiveProgress if err.is_terminal else PlainProgress)(err, cells)
 
     return ValidationHooks(lambda stage: err.print(f"{stage} ...", style="dim"), watcher)
-
-
-def _write(found: Validation, folder: Path) -> dict[str, str]:
-    """Lay the validation into the folder, as JSON and as a page; where is each?"""
-    from cembench.core import folders
-    from cembench.core.atomic import draft_folder, unwritable, write_model
-    from cembench.report.render.html import FILE, write_html
-    from cembench.validation.document import document_of
-
-    name = "validation.json"
-    try:
-        with draft_folder(folder) as draft:
-            write_model(draft / name, found)
-            write_html(document_of(found, folder, draft), draft)
-            folders.publish(draft, folder, "validation")
-    except OSError as error:
-        raise unwritable(folder, error) from error
-    return {"output": str(folder / name), "page": str(folder / FILE)}
 
 
 def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:

@@ -24,11 +24,16 @@ def draw(scene: Scene, side: int) -> tuple[Picture, Picture]:
     return _drawn(scene, scene.surface, side), _drawn(scene, scene.image, side)
 
 
-def shrunk(picture: Real | Picture) -> Picture:
+def averaged(samples: Real) -> Real:
+    """Average the samples of each pixel: (SAMPLES s, SAMPLES s, ...) to (s, s, ...)."""
+    steps = range(SAMPLES)
+    total: Real = sum(samples[i::SAMPLES, j::SAMPLES] for i in steps for j in steps)  # type: ignore[assignment]
+    return total / SAMPLES**2
+
+
+def shrunk(picture: Real) -> Picture:
     """Average the samples of each pixel; values 0 to 255."""
-    side = len(picture) // SAMPLES
-    mean = picture.reshape(side, SAMPLES, side, SAMPLES, 3).mean(axis=(1, 3))
-    return np.round(mean).astype(np.uint8)
+    return np.round(averaged(picture)).astype(np.uint8)
 
 
 def _drawn(scene: Scene, view: View, side: int) -> Picture:

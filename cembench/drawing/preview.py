@@ -5,21 +5,14 @@ under the same checkerboard. The board has 18 squares across the image; in regio
 be large on the surface every square is divided into 3 x 3, as often as needed, in both panels alike
 (the conformal factor of one map can range over a factor of thousands).
 
-pyvista draws if it can, in a process of its own because without a display or EGL it dies; else a
-rasterizer in numpy draws, and matplotlib puts the page together in either case.
+A rasterizer in numpy draws, so that no graphics card or display is needed and the same map gives
+the same bytes; matplotlib puts the page together.
 """
 
 from __future__ import annotations
 
 import io
-import signal
-import subprocess
-import sys
-import tempfile
-from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from matplotlib.image import imsave
@@ -34,40 +27,11 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 Complex = NDArray[np.complex128]
 Picture = NDArray[np.uint8]
-Renderer = Literal["pyvista", "matplotlib"]
 
 #: Width and height in pixels, and the smallest that can hold two panels and words.
 SIZE, LEAST = (1600, 940), (240, 150)
 #: Side in pixels of a picture of the surface alone.
 THUMBNAIL = 480
-#: Seconds after which pyvista is given up.
-TIMEOUT = 90.0
-#: What a user can do where pyvista dies or draws nothing.
-SYSTEM_LIBRARIES = (
-    "it needs EGL (or OSMesa) from the system; on Debian or Ubuntu: "
-    "apt-get install libegl1 libgl1-mesa-dri"
-)
-
-
-@dataclass(frozen=True)
-class RendererUsed:
-    """How a picture came about.
-
-    Parameters
-    ----------
-    renderer : "pyvista" or "matplotlib"
-        Which one drew it.
-    notice : str
-        Why it was not pyvista, although that was to be tried first; else empty.
-
-    """
-
-    renderer: Renderer
-    notice: str = ""
-
-
-class _PyvistaFailed(Exception):  # noqa: N818 - a reason to go another way, not an error
-    """Pyvista did not draw; the message says why and what to do."""
 
 
 def write_preview(
@@ -78,9 +42,8 @@ def write_preview(
     title: str = "",
     caption: str = "",
     size: tuple[int, int] = SIZE,
-    renderer: Renderer = "pyvista",
-) -> RendererUsed:
-    """Draw a surface and its image under one checkerboard into a PNG file; which renderer did it?
+) -> None:
+    """Draw a surface and its image under one checkerboard into a PNG file.
 
     Triangles that the map folds over are red in both panels, and ringed where they are small.
 
@@ -96,51 +59,46 @@ def write_preview(
         Words below the picture; broken into two lines where they are long.
     size : tuple of int
         Width and height of the picture in pixels.
-    renderer : "pyvista" or "matplotlib"
-        Which one to try first; "matplotlib" is always there.
 
     Raises
     ------
     ParameterError
         A map of the wrong shape or with values that are not finite; a size that is too small.
     RenderError
-        The file cannot be written, or no renderer works.
+        The file cannot be written, or the picture cannot be drawn.
 
     """
-    png, drawn = _page(mesh, uv, (title, caption), size, renderer)
+    png = preview_png(mesh, uv, title=title, caption=caption, size=size)
     write_bytes(path, png, error=RenderError, parents=False)
-    return drawn
 
 
-def preview_png(mesh: TriangleMesh, uv: Complex, *, title: str = "", caption: str = "") -> bytes:
-    """Return the picture of :func:`write_preview` as PNG, drawn in this process."""
-    return _page(mesh, uv, (title, caption), SIZE, "matplotlib")[0]
-
-
-def _page(
-    mesh: TriangleMesh, uv: Complex, words: tuple[str, str], size: tuple[int, int], first: Renderer
-) -> tuple[bytes, RendererUsed]:
+def preview_png(
+    mesh: TriangleMesh,
+    uv: Complex,
+    *,
+    title: str = "",
+    caption: str = "",
+    size: tuple[int, int] = SIZE,
+) -> bytes:
+    """Return the picture of :func:`write_preview` as PNG."""
     _check(mesh, uv, size)
     scene = Scene.of(mesh, uv)
-    (surface, image), drawn = _draw(scene, compose.side_of(size), first)
+    surface, image = _draw(scene, compose.side_of(size))
     outline = image_in_window(uv)[:, :2]
     overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
-    return compose.page(surface, image, overlay, (*words, _note(scene)), size), drawn
+    return compose.page(surface, image, overlay, (title, caption, _note(scene)), size)
 
 
-def write_thumbnail(
-    mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL
-) -> RendererUsed:
-    """Draw a surface under the checkerboard of its map into a PNG file; which renderer did it?
+def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> None:
+    """Draw a surface under the checkerboard of its map into a PNG file.
 
     `side` in pixels; the rest, errors too, as in :func:`write_preview`.
     """
     _check(mesh, uv, SIZE)
-    (surface, _), drawn = _draw(Scene.of(mesh, uv), side, "pyvista")
+    surface, _ = _draw(Scene.of(mesh, uv), side)
     file = io.BytesIO()
     imsave(file, surface, format="png", metadata={"Software": SOFTWARE})
     write_bytes(path, file.getvalue(), error=RenderError, parents=False)
-    return drawn
 
 
 def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Picture]:
@@ -149,18 +107,7 @@ def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Pi
     Raises what :func:`write_preview` raises, except for files.
     """
     _check(mesh, uv, SIZE)
-    return _draw(Scene.of(mesh, uv), side, "pyvista")[0]
-
-
-def renderer_status() -> tuple[bool, str]:
-    """Does pyvista draw here, and if not, why, and what can the user do?"""
-    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [0, 1, 0]])
-    mesh = TriangleMesh.from_arrays(corners, [[0, 1, 2]])
-    try:
-        _by_pyvista(Scene.of(mesh, corners[:, 0] + 1j * corners[:, 1]), 32)
-    except _PyvistaFailed as reason:
-        return False, f"{reason}. Pictures are drawn by matplotlib instead."
-    return True, "pyvista draws surfaces"
+    return _draw(Scene.of(mesh, uv), side)
 
 
 def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
@@ -190,79 +137,10 @@ def _note(scene: Scene) -> str:
     )
 
 
-def _draw(
-    scene: Scene, side: int, renderer: Renderer
-) -> tuple[tuple[Picture, Picture], RendererUsed]:
-    notice = ""
-    if renderer == "pyvista":
-        try:
-            return _by_pyvista(scene, side), RendererUsed("pyvista")
-        except _PyvistaFailed as reason:
-            notice = f"drawn by matplotlib: {reason}"
+def _draw(scene: Scene, side: int) -> tuple[Picture, Picture]:
     try:
-        return draw_numpy.draw(scene, side), RendererUsed("matplotlib", notice)
+        return draw_numpy.draw(scene, side)
     except (MemoryError, ArithmeticError, ValueError, IndexError) as error:
         raise RenderError(
             f"the picture could not be drawn: {type(error).__name__}: {error}"
-            + (f" (and before that, not {notice})" if notice else "")
         ) from error
-
-
-def _by_pyvista(scene: Scene, side: int) -> tuple[Picture, Picture]:
-    """Both panels, from a process that may die without harm to this one."""
-    try:
-        with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
-            source, target = Path(folder, "scene.npz"), Path(folder, "pictures.npz")
-            scene.save(source)
-            _run(_command(source, target, side), folder)
-            with np.load(target) as pictures:
-                surface, image = pictures["surface"], pictures["image"]
-    except OSError as error:
-        raise _PyvistaFailed(f"no picture came back from pyvista ({error})") from None
-    if (surface == 255).all() or (image == 255).all():
-        raise _PyvistaFailed(f"pyvista drew an empty picture; {SYSTEM_LIBRARIES}")
-    return surface, image
-
-
-def _command(source: Path, target: Path, side: int) -> list[str]:
-    module = "cembench.drawing.draw_pyvista"
-    return [sys.executable, "-m", module, str(source), str(target), str(side)]
-
-
-def _run(command: list[str], folder: str) -> None:
-    """Run to the end in a folder; :class:`_PyvistaFailed` tells why it did not get there."""
-    try:
-        done = subprocess.run(
-            command,
-            cwd=folder,  # a core file would be left there
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=TIMEOUT,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise _PyvistaFailed(f"pyvista took more than {TIMEOUT:g} s") from None
-    except OSError as error:
-        raise _PyvistaFailed(f"the process for pyvista did not start: {error}") from None
-    if done.returncode < 0:
-        name = _signal_name(-done.returncode)
-        raise _PyvistaFailed(f"pyvista died of signal {name}; {SYSTEM_LIBRARIES}")
-    if done.returncode:
-        raise _PyvistaFailed(_explained(done.stderr))
-
-
-def _signal_name(number: int) -> str:
-    with suppress(ValueError):
-        return signal.Signals(number).name
-    return str(number)
-
-
-def _explained(stderr: str) -> str:
-    last = next((line for line in reversed(stderr.splitlines()) if line.strip()), "no message")
-    if "No module named 'pyvista'" in last:
-        return "pyvista is not installed; pip install 'cembench[render]'"
-    if last.startswith("ImportError"):
-        return f"pyvista cannot be loaded ({last}); {SYSTEM_LIBRARIES}"
-    return f"pyvista failed ({last})"

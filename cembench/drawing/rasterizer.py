@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,8 @@ Ints = NDArray[np.int64]
 CHUNK = 2_000_000
 #: A pixel this little outside a triangle still counts, so that no cracks show along edges.
 TOLERANCE = 1e-9
+#: Barycentric coordinates of a triangle's first corner.
+START = (1.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -40,8 +43,10 @@ class Raster:
 
     def interpolate(self, corners: Real) -> Real:
         """Values at the triangles' corners in turn, (3 m,) or (3 m, d), at the pixels: (k, ...)."""
-        at_corners = corners.reshape(-1, 3, *corners.shape[1:])[self.face]
-        return np.einsum("kc,kc...->k...", self.weights, at_corners)
+        at_corners = corners.reshape(-1, 3, *corners.shape[1:])
+        along = (slice(None), *([None] * (corners.ndim - 1)))
+        parts = (self.weights[:, c][along] * at_corners[self.face, c] for c in range(3))
+        return cast(Real, sum(parts))
 
 
 def rasterize(corners: Real, size: int) -> Raster:
@@ -57,25 +62,88 @@ def rasterize(corners: Real, size: int) -> Raster:
 
     """
     place = np.stack([(corners[:, 0] + 1) / 2, (1 - corners[:, 1]) / 2], axis=1) * size - 0.5
-    xy, z = place.reshape(-1, 3, 2), corners[:, 2].reshape(-1, 3)
+    triangles = _Triangles.of(place.reshape(-1, 3, 2), corners[:, 2].reshape(-1, 3), size)
     depth = np.full(size * size, -np.inf)
     face = np.full(size * size, -1, dtype=np.int64)
-    low, counts = _boxes(xy, size)
-    for faces in _portions(counts.prod(axis=1)):
-        owner, pixel = _candidates(faces, low, counts, size)
-        weights = _weights(xy[owner], pixel, size)
-        covered = (weights >= -TOLERANCE).all(axis=1)
-        owner, pixel = owner[covered], pixel[covered]
-        _enter(owner, pixel, (weights[covered] * z[owner]).sum(axis=1), depth, face)
+    for faces in _portions(triangles.boxes):
+        owner, pixel, height = triangles.covered(faces)
+        np.maximum.at(depth, pixel, height)
+        nearest = height == depth[pixel]
+        face[pixel[nearest]] = owner[nearest]
     pixel = np.flatnonzero(face >= 0)
-    return Raster(size, pixel, face[pixel], _weights(xy[face[pixel]], pixel, size))
+    return Raster(size, pixel, face[pixel], triangles.weights(face[pixel], pixel))
 
 
-def _boxes(xy: Real, size: int) -> tuple[Ints, Ints]:
-    """Lowest column and row (m, 2) of the pixel centres in each bounding box, and how many."""
-    low = np.clip(np.ceil(xy.min(axis=1) - TOLERANCE), 0, size).astype(np.int64)
-    high = np.clip(np.floor(xy.max(axis=1) + TOLERANCE), -1, size - 1).astype(np.int64)
-    return low, np.maximum(high - low + 1, 0)
+@dataclass(frozen=True)
+class _Triangles:
+    """Triangles in pixels: x is the column, y the row, from the first corner on.
+
+    The barycentric coordinate k of a pixel is START[k] + x * across[k] + y * down[k].
+    """
+
+    size: int
+    corner: Real  #: (2, m), the first corner's x and y
+    across: Real  #: (3, m); NaN where there is no area
+    down: Real  #: (3, m)
+    depths: Real  #: (3, m), of the corners
+    low: Ints  #: (2, m), lowest column and row of a pixel in the bounding box
+    high: Ints  #: (2, m), highest
+
+    @classmethod
+    def of(cls, xy: Real, z: Real, size: int) -> _Triangles:
+        a, u, v = xy[:, 0].T, (xy[:, 1] - xy[:, 0]).T, (xy[:, 2] - xy[:, 0]).T
+        area = u[0] * v[1] - u[1] * v[0]
+        area = np.where(area == 0, np.nan, area)
+        across = np.stack([u[1] - v[1], v[1], -u[1]]) / area
+        down = np.stack([v[0] - u[0], -v[0], u[0]]) / area
+        low = np.clip(np.ceil(xy.min(axis=1) - TOLERANCE), 0, size).astype(np.int64)
+        high = np.clip(np.floor(xy.max(axis=1) + TOLERANCE), -1, size - 1).astype(np.int64)
+        high[np.isnan(area)] = -1
+        return cls(size, a, across, down, z.T, low.T, high.T)
+
+    @property
+    def boxes(self) -> Ints:
+        """How many pixels there are in each bounding box, (m,)."""
+        counts: Ints = np.maximum(self.high - self.low + 1, 0).prod(axis=0)
+        return counts
+
+    def covered(self, faces: Ints) -> tuple[Ints, Ints, Real]:
+        """Every pixel that one of these triangles covers: which triangle, which pixel, its z."""
+        tall = self.high[1, faces] - self.low[1, faces] + 1
+        face = np.repeat(faces, tall)  # a line of pixels each
+        row = _counted(tall) + np.repeat(self.low[1, faces], tall)
+        x, y = self.corner[:, face]
+        y = row - y
+        left, right = (end[0, face].astype(np.float64) for end in (self.low, self.high))
+        for start, across, down in zip(START, self.across, self.down, strict=True):
+            slope, rest = across[face], start + TOLERANCE + y * down[face]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                end = x - rest / slope
+            left = np.where(slope > 0, np.maximum(left, np.ceil(end)), left)
+            right = np.where(slope < 0, np.minimum(right, np.floor(end)), right)
+            right = np.where((slope == 0) & (rest < 0), -1, right)
+        wide = np.maximum(right - left + 1, 0).astype(np.int64)
+        rise = self.depths[1:] - self.depths[0]
+        by_column, by_row = ((rise * by[1:]).sum(axis=0)[face] for by in (self.across, self.down))
+        first = self.depths[0, face] + y * by_row + (left - x) * by_column
+        step = _counted(wide)
+        pixel = np.repeat(row * self.size + left.astype(np.int64), wide) + step
+        return (
+            np.repeat(face, wide),
+            pixel,
+            np.repeat(first, wide) + step * np.repeat(by_column, wide),
+        )
+
+    def weights(self, face: Ints, pixel: Ints) -> Real:
+        """Barycentric coordinates (k, 3) of pixels in triangles."""
+        row = pixel // self.size
+        x = pixel - row * self.size - self.corner[0][face]
+        y = row - self.corner[1][face]
+        found = np.empty((len(face), 3))
+        for k in (1, 2):
+            found[:, k] = x * self.across[k][face] + y * self.down[k][face]
+        found[:, 0] = 1 - found[:, 1] - found[:, 2]
+        return found
 
 
 def _portions(candidates: Ints) -> list[Ints]:
@@ -85,31 +153,6 @@ def _portions(candidates: Ints) -> list[Ints]:
     return np.split(wanted, np.flatnonzero(np.diff(portion)) + 1)
 
 
-def _candidates(faces: Ints, low: Ints, counts: Ints, size: int) -> tuple[Ints, Ints]:
-    """Every pixel of these triangles' bounding boxes: whose it is, and which pixel."""
-    wide = counts[faces, 0]
-    each = wide * counts[faces, 1]
-    owner = np.repeat(faces, each)
-    place = np.arange(len(owner)) - np.repeat(np.cumsum(each) - each, each)
-    row, column = np.divmod(place, np.repeat(wide, each))
-    return owner, (low[owner, 1] + row) * size + low[owner, 0] + column
-
-
-def _weights(xy: Real, pixel: Ints, size: int) -> Real:
-    """Barycentric coordinates (k, 3) of pixels in triangles (k, 3, 2); NaN without area."""
-    row, column = np.divmod(pixel, size)
-    a, u, v = xy[:, 0], xy[:, 1] - xy[:, 0], xy[:, 2] - xy[:, 0]
-    x, y = column - a[:, 0], row - a[:, 1]
-    area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-    area[area == 0] = np.nan
-    second = (x * v[:, 1] - y * v[:, 0]) / area
-    third = (u[:, 0] * y - u[:, 1] * x) / area
-    return np.stack([1 - second - third, second, third], axis=1)
-
-
-def _enter(owner: Ints, pixel: Ints, height: Real, depth: Real, face: Ints) -> None:
-    """Put what is nearer than before into the buffers `depth` and `face`."""
-    order = np.argsort(height, kind="stable")
-    order = order[height[order] > depth[pixel[order]]]
-    depth[pixel[order]] = height[order]  # a pixel that comes up twice keeps the last, the nearest
-    face[pixel[order]] = owner[order]
+def _counted(counts: Ints) -> Ints:
+    """Return 0, 1, ... up to each of these counts, one after the other."""
+    return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.planar import signed_areas
-from cembench.drawing.array_bundle import ArrayBundle
 from cembench.drawing.camera import view_rotation
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -64,7 +63,7 @@ class View:
 
 
 @dataclass(frozen=True)
-class Scene(ArrayBundle):
+class Scene:
     """A surface and its image, ready to be drawn side by side under one checkerboard.
 
     All triangles stand alone, their corners in turn. They are those of the mesh, except that some

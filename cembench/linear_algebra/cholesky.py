@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
-from importlib.util import find_spec
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -20,10 +19,11 @@ from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite, ParameterError
+from cembench.core.extras import Extra, command
+from cembench.linear_algebra.backends import Backend, available_backends, default_backend
 from cembench.linear_algebra.real_columns import by_real_columns
 
 Solves = Literal["reuse", "backslash"]
-Backend = Literal["cvxopt", "superlu", "pardiso"]
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class LinearAlgebra:
     """
 
     solves: Solves = "reuse"
-    backend: Backend = "cvxopt"
+    backend: Backend = field(default_factory=default_backend)
 
 
 #: Right-hand sides that are solved for together: enough to be fast, few enough to need no memory.
@@ -51,7 +51,7 @@ _current: ContextVar[LinearAlgebra] = ContextVar("cembench_linear_algebra", defa
 
 
 @contextmanager
-def linear_algebra(solves: str = "reuse", backend: str = "cvxopt") -> Iterator[LinearAlgebra]:
+def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterator[LinearAlgebra]:
     """Let everything enclosed solve its systems this way.
 
     Raises
@@ -62,12 +62,13 @@ def linear_algebra(solves: str = "reuse", backend: str = "cvxopt") -> Iterator[L
     """
     if solves not in get_args(Solves):
         raise ParameterError(f"solves={solves!r} is unknown; allowed: {_names(Solves)}.")
+    backend = backend or default_backend()
     if backend not in get_args(Backend):
         raise ParameterError(f"backend={backend!r} is unknown; allowed: {_names(Backend)}.")
     if backend not in available_backends():
+        brings = command(Extra.PARDISO) if backend == Extra.PARDISO else f"pip install {backend}"
         raise ParameterError(
-            f"backend={backend!r} is not installed; install it with "
-            f"`pip install 'cembench[{backend}]'`, or use one of: "
+            f"backend={backend!r} is not installed; install it with `{brings}`, or use one of: "
             f"{', '.join(available_backends())}."
         )
     choice = LinearAlgebra(solves, backend)  # type: ignore[arg-type]  # checked above
@@ -77,12 +78,6 @@ def linear_algebra(solves: str = "reuse", backend: str = "cvxopt") -> Iterator[L
         yield choice
     finally:
         _current.reset(token)
-
-
-def available_backends() -> list[str]:
-    """Which backends can be used on this machine?"""
-    module = {"cvxopt": "cvxopt", "superlu": "scipy", "pardiso": "pypardiso"}
-    return [name for name in get_args(Backend) if find_spec(module[name])]
 
 
 def _names(kind: Any) -> str:

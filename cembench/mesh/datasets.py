@@ -18,6 +18,7 @@ from platformdirs import user_cache_dir
 
 from cembench.core.atomic import write
 from cembench.core.errors import DatasetError, RecordError
+from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
 
 #: Overrides the directory of the cache.
@@ -116,12 +117,15 @@ def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None 
     DatasetError
         A server that does not answer, a download that breaks off, a file whose checksum is wrong;
         the message names file and URL.
+    MissingExtra
+        The libraries that download are not installed.
     RecordError
         The cache cannot be written to, or its disk is full.
 
     """
     if is_fetched(dataset):
         return dataset.path
+    require(Extra.FETCH, f"fetching {dataset.file} from {dataset.url}")
     try:
         write(
             dataset.path,

@@ -20,6 +20,7 @@ from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import located
 from cembench.mesh.obj_text import obj_text
+from cembench.mesh.off_reader import read_off
 from cembench.mesh.reading import READERS as _READERS
 from cembench.mesh.reading import read_soup
 from cembench.mesh.repair import Repaired, repair
@@ -39,6 +40,12 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
     ------
     MeshError
         The file is missing, empty, of unknown format or damaged, or its mesh fails a check.
+
+    Examples
+    --------
+    >>> write_mesh("triangle.obj", DiskMesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]))
+    >>> read_mesh("triangle.obj").F.tolist()
+    [[0, 1, 2]]
 
     """
     return checked(read_soup(path), mesh_type, Path(path))
@@ -137,17 +144,15 @@ def _write_ply(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
 
 
 def _write_off(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
-    import meshio  # here and not above: it is slow to load
-
-    # trimesh would write a fixed number of digits behind the point.
-    meshio.off.write(path, meshio.Mesh(mesh.V, [("triangle", mesh.F)]))
+    # Own code, because libigl and trimesh write fewer digits than a double has.
+    lines = [f"OFF\n{mesh.n} {mesh.m} 0"]
+    lines += [f"{x!r} {y!r} {z!r}" for x, y, z in mesh.V.tolist()]
+    lines += [f"3 {i} {j} {k}" for i, j, k in mesh.F.tolist()]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _write_stl(path: Path, mesh: TriangleMesh, UV: ArrayLike | None) -> None:
-    import trimesh  # as slow to load
-
-    with path.open("wb") as file:
-        trimesh.Trimesh(mesh.V, mesh.F, process=False).export(file, file_type="stl")
+    igl.writeSTL(str(path), mesh.V.copy(), mesh.F.copy(), binary=True)
 
 
 def _check_written(
@@ -175,10 +180,8 @@ def _obj_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
 
 
 def _off_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:
-    import meshio
-
-    found = meshio.off.read(path)
-    return found.points, found.cells_dict["triangle"]
+    found = read_off(path)
+    return found.V, found.triangles
 
 
 def _ply_arrays(path: Path, mesh: TriangleMesh) -> tuple[NDArray[Any], ...]:

@@ -57,6 +57,11 @@ def euler_characteristic(F: Faces, n: int) -> int:
     return n - len(undirected_edges(F)[0]) + len(F)
 
 
+def genus(F: Faces, n: int, loops: int) -> int:
+    """Return the number of handles of a connected oriented surface with so many boundary loops."""
+    return (2 - loops - euler_characteristic(F, n)) // 2
+
+
 def boundary_half_edges(F: Faces, n: int) -> Faces:
     """Which half-edges have no twin? Shape (k, 2).
 

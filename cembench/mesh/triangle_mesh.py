@@ -289,7 +289,7 @@ def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
 
 def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
     euler = topology.euler_characteristic(F, n)
-    genus = (2 - loops - euler) // 2
+    genus = topology.genus(F, n, loops)
     if not genus:
         return []
     text = (

@@ -82,6 +82,8 @@ class Table:
     notes: tuple[str, ...] = ()
     #: The one among the notes that names surfaces which the run lacks; empty where it lacks none.
     absent: str = ""
+    #: Those among the notes that tell where a cause holds, by the cause, as `Value.why` has it.
+    places: Mapping[str, str] = field(default_factory=dict)
     #: Rows at the end that hold aggregates; sorting leaves them where they are.
     footer_rows: int = 0
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cembench.core.atomic import write
+from cembench.core.extras import Extra, require
 
 
 class Format(StrEnum):
@@ -28,12 +29,22 @@ def export_rows(rows: Rows, path: Path, form: Format) -> None:
 
     In CSV lists and dictionaries are JSON in a cell. In Parquet lists are lists, and dictionaries,
     whose keys differ from row to row, are JSON.
+
+    Raises
+    ------
+    MissingExtra
+        Parquet without pyarrow.
+    RecordError
+        The place cannot be written to.
+
     """
     exporters: dict[Format, Callable[[Rows, Any], None]] = {
         Format.csv: _csv,
         Format.parquet: _parquet,
         Format.json: _json,
     }
+    if form is Format.parquet:
+        require(Extra.PARQUET, "a Parquet file")
     write(path, lambda file: exporters[form](rows, file))
 
 

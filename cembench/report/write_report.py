@@ -17,11 +17,11 @@ from pathlib import Path
 
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable
+from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import Progress, build_report
 from cembench.report.document import Report
 from cembench.report.export import Format, export_rows
-from cembench.report.render.html import write_html
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv
@@ -38,11 +38,14 @@ def write_report(
 
     Raises
     ------
+    MissingExtra
+        What only reports need is not installed.
     RecordError
         The folder `run` holds no run, or no record; `folder` holds other files than a report's,
         or such as were changed since; it cannot be written to.
 
     """
+    require(Extra.REPORT, "a report")
     evidence = Evidence.of(run)
     folders.check(folder, "report")
     try:
@@ -61,5 +64,7 @@ def _write_all(evidence: Evidence, folder: Path, command: str, progress: Progres
     write_tables_csv(report, folder)
     write_markdown(report, folder)
     write_latex(report, folder)
+    from cembench.report.render.html import write_html  # needs the extra
+
     write_html(report, folder)
     return report

@@ -19,7 +19,7 @@ THREAD_VARIABLES = (
     "IGL_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
-_LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pypardiso", "pydantic", "meshio", "trimesh")
+_LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pypardiso", "pydantic")
 
 
 def with_threads(count: int) -> dict[str, str]:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
+from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.datasets import recognised
 from cembench.mesh.files import checked, read_mesh, read_repaired
 from cembench.mesh.reading import is_named_like_a_mesh, read_soup
@@ -48,7 +49,7 @@ class MeasurementSettings:
     """What a plan's cells have in common."""
 
     solves: str = "reuse"
-    backend: str = "cvxopt"
+    backend: str = field(default_factory=default_backend)
     threads: int = 1
     repeats: int = DEFAULT_ROUNDS
 

@@ -9,8 +9,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cembench.report.render.grid import GridColumn, figures, grid, names, words
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison
+from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import Growth
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -37,32 +38,20 @@ def validation_text(validation: Validation) -> RenderableType:
 
 def _finding_lines(finding: ValidationFinding) -> Iterator[RenderableType]:
     mark = Text("  ok  ", style="green") if finding.ok else Text("  BAD ", style="bold red")
-    line = Table.grid()
-    line.add_column(width=6)
-    line.add_column()
-    line.add_row(mark, Text.assemble((finding.name, "bold"), f": {finding.measured}"))
-    yield line
+    told = Text.assemble((finding.name, "bold"), f": {finding.measured}")
+    yield grid([GridColumn(), GridColumn(wraps=True)], [[mark, told]], gap=0)
     if not finding.ok:
-        for label, words in (("allowed", finding.allowed), ("to do", finding.remedy)):
-            yield Padding(Text(f"{label}: {words}", style="dim"), (0, 0, 0, 8))
+        for label, said in (("allowed", finding.allowed), ("to do", finding.remedy)):
+            yield Padding(Text(f"{label}: {said}", style="dim"), (0, 0, 0, 8))
 
 
 def _pairs_table(against: BaselineComparison, title: str) -> Table:
-    table = Table(
-        box=None,
-        pad_edge=False,
-        collapse_padding=True,
-        header_style="bold",
+    heads = figures("faces", "E_C", "ratio", "mean °", "ratio", "seconds", "ratio")
+    return grid(
+        [names("surface", 18), *heads],
+        [_pair_cells(pair) for pair in against.pairs],
         title=f"{title} / {against.title}",
-        title_justify="left",
-        title_style="bold",
     )
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=18)
-    for heading in ("faces", "E_C", "ratio", "mean °", "ratio", "seconds", "ratio"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    for pair in against.pairs:
-        table.add_row(*_pair_cells(pair))
-    return table
 
 
 def _pair_cells(pair: Pair) -> tuple[str, ...]:
@@ -87,29 +76,20 @@ def ratio_text(ours: float | None, theirs: float | None) -> str:
 
 def growths_table(growths: tuple[Growth, ...]) -> Table:
     """Seconds by size and the fitted exponents."""
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("seconds")
-    for faces in growths[0].faces:
-        table.add_column(f"{faces:,} faces", justify="right")
-    table.add_column("exponent", justify="right")
-    table.add_column("rounds", justify="right")
-    for growth in growths:
-        table.add_row(
+    sizes = [f"{faces:,} faces" for faces in growths[0].faces]
+    rows = [
+        [
             growth.what,
             *(f"{seconds:.4f}" for seconds in growth.seconds),
             f"{growth.exponent:.2f}",
             f"{growth.low:.2f}-{growth.high:.2f}",
-        )
-    return table
-
-
-def sides_text(found: PairedComparison) -> str:
-    """On how many lower, equal, higher, and the median ratio."""
-    words = f"lower on {found.lower}, equal within 1 % on {found.equal}, higher on {found.higher}"
-    if found.ratio is None:
-        return words
-    words += f"; median ratio {found.ratio:.3f}"
-    return words if found.low is None else f"{words} ({found.low:.3f}-{found.high:.3f})"
+        ]
+        for growth in growths
+    ]
+    columns = [
+        GridColumn(head, figures=True, wraps=True) for head in (*sizes, "exponent", "rounds")
+    ]
+    return grid([*words("seconds"), *columns], rows)
 
 
 def _number(value: float | None, form: str) -> str:

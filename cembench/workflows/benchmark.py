@@ -10,12 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.errors import ParameterError
+from cembench.core.extras import Extra, require
+from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Registry, load_registry
 from cembench.results.records import DEFAULT_ROUNDS, Record
 from cembench.results.store import Store
 from cembench.running.local import DEFAULT_TIMEOUT, Options, Watcher, run_tasks
 from cembench.running.plan import MeasurementSettings, PaperRole, paper_roles, plan_cells
+from cembench.workflows.notebook import html_table
 from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 if TYPE_CHECKING:
@@ -52,12 +55,23 @@ class Run:
         """Return one row a cell: its figures, seconds with a 95 % interval, and status.
 
         `reference` is the algorithm whose speedup over the others (Eq. 33) has columns too.
+
+        Raises
+        ------
+        MissingExtra
+            pandas is not installed; :meth:`rows` does without.
+
         """
+        require(Extra.TABLES, "a DataFrame")
         import pandas as pd
 
+        return pd.DataFrame(self.rows(reference))
+
+    def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
+        """Return what :meth:`table` holds as plain data, a dictionary a cell."""
         from cembench.results.record_rows import rows
 
-        return pd.DataFrame(rows(self.records(), reference))
+        return rows(self.records(), reference)
 
     def speedups(self, reference: str = "cem") -> pd.DataFrame:
         """Return how much faster the reference is than each other algorithm, t / t_ref - 1.
@@ -79,11 +93,18 @@ class Run:
         return write_report(self.folder, target, command)
 
     def _repr_html_(self) -> str:
-        columns = ["mesh", "algorithm", "status", "seconds", "conformal_energy"]
-        columns += ["angle_error_mean_deg", "flipped_triangles"]
-        table = self.table()
-        html: str = table[[c for c in columns if c in table]].to_html(index=False)
-        return html
+        from cembench.conformal.metrics import METRICS
+
+        names = ("conformal_energy", "angle_error_mean_deg", "flipped_triangles")
+        shown = [metric for metric in METRICS if metric.name in names]
+        heads = ["surface", "algorithm", "status", "seconds", *(m.title for m in shown)]
+        lines = []
+        for row in self.rows():
+            seconds = row["seconds"]
+            line = [row["mesh"], row["algorithm"], row["status"]]
+            line.append("" if seconds is None else f"{seconds:.3g}")
+            lines.append([*line, *(m.text(row[m.name]) if m.name in row else "" for m in shown)])
+        return html_table(lines, heads)
 
 
 def benchmark(
@@ -94,7 +115,7 @@ def benchmark(
     out: str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     solves: Sequence[str] = ("reuse",),
-    backend: str = "cvxopt",
+    backend: str | None = None,
     threads: int = 1,
     timeout: float = DEFAULT_TIMEOUT,
     memory_bytes: int | None = None,
@@ -120,7 +141,8 @@ def benchmark(
     solves : sequence of "reuse" and "backslash"
         Whether a factorisation is reused as long as its matrix does not change.
     backend : str
-        The library that factors: cvxopt, superlu or pardiso.
+        The library that factors: cvxopt, superlu or pardiso; default: cvxopt where it is
+        installed, else superlu.
     threads : int
         Threads of the numerical libraries.
     timeout : float
@@ -160,7 +182,7 @@ def benchmark(
         chosen = [a for a in chosen if any(isinstance(mesh, a.mesh_type) for mesh in meshes)]
     tasks = []
     for policy in solves:
-        settings = MeasurementSettings(policy, backend, threads, rounds)
+        settings = MeasurementSettings(policy, backend or default_backend(), threads, rounds)
         tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
     options = Options(timeout=timeout, memory_bytes=memory_bytes, seed=seed)

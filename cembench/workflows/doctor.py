@@ -10,10 +10,10 @@ import importlib
 import sys
 from dataclasses import dataclass
 from importlib.metadata import EntryPoint, entry_points, version
-from importlib.util import find_spec
 
 from cembench.core.errors import CembenchError
-from cembench.linear_algebra.cholesky import available_backends
+from cembench.core.extras import Extra, command, missing
+from cembench.linear_algebra.backends import available_backends, default_backend
 from cembench.mesh.datasets import cache_directory, is_fetched
 from cembench.registry import load_registry
 from cembench.running.environment import describe_environment
@@ -21,11 +21,18 @@ from cembench.running.environment import describe_environment
 _REQUIRED = {
     "numpy": "numpy",
     "scipy": "scipy",
-    "cvxopt": "cvxopt",
     "libigl": "igl",
-    "meshio": "meshio",
-    "trimesh": "trimesh",
     "matplotlib": "matplotlib",
+}
+#: What each extra is for.
+_FOR = {
+    Extra.FETCH: "fetches public surfaces",
+    Extra.PARDISO: "another back end",
+    Extra.PARQUET: "exports runs as Parquet",
+    Extra.REPORT: "writes reports",
+    Extra.STANDINS: "makes stand-ins for the paper's models",
+    Extra.TABLES: "gives a run's figures as pandas DataFrames",
+    Extra.VIDEO: "writes films as MP4",
 }
 
 
@@ -51,10 +58,9 @@ def examine() -> list[InstallationFinding]:
         *(_library(package, module) for package, module in _REQUIRED.items()),
         _backends(),
         _plugins(),
-        _renderer(),
         *(_offered(entry) for entry in sorted(entry_points(group=CHECKS), key=lambda e: e.name)),
         *_datasets(),
-        _video(),
+        *(_extra(extra) for extra in Extra),
         _machine(),
     ]
 
@@ -81,8 +87,9 @@ def _backends() -> InstallationFinding:
     return InstallationFinding(
         "cholesky",
         "cvxopt" in there,
-        f"{', '.join(there)} (default cvxopt; its CHOLMOD is under the GPL at run time)",
-        remedy="Run `pip install cvxopt`; without it use --backend superlu, several times slower.",
+        f"{', '.join(there)} (default {default_backend()}; cvxopt is under the GPL)",
+        required=False,
+        remedy="Run `pip install cvxopt`; without it SuperLU factors, several times slower.",
     )
 
 
@@ -94,22 +101,6 @@ def _plugins() -> InstallationFinding:
     detail = f"{len(found.algorithms)} algorithms, {len(found.surfaces)} surfaces"
     return InstallationFinding(
         "plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench."
-    )
-
-
-def _renderer() -> InstallationFinding:
-    from cembench.drawing.preview import renderer_status
-
-    try:
-        ok, message = renderer_status()
-    except ImportError as error:  # a library that is required; said in its own line
-        ok, message = False, str(error)
-    return InstallationFinding(
-        "pictures",
-        ok,
-        message,
-        required=False,
-        remedy="Previews are drawn by matplotlib instead, less finely.",
     )
 
 
@@ -141,14 +132,11 @@ def _datasets() -> list[InstallationFinding]:
     ]
 
 
-def _video() -> InstallationFinding:
-    there = find_spec("imageio_ffmpeg") is not None
+def _extra(extra: Extra) -> InstallationFinding:
+    absent = missing(extra)
+    detail = _FOR[extra] + (f"; {', '.join(absent)} missing" if absent else "")
     return InstallationFinding(
-        "video",
-        there,
-        "imageio-ffmpeg writes MP4" if there else "MP4 needs imageio-ffmpeg; GIF needs nothing",
-        required=False,
-        remedy="Run `pip install 'cembench[video]'`.",
+        f"[{extra}]", not absent, detail, required=False, remedy=f"Run `{command(extra)}`."
     )
 
 

@@ -33,6 +33,13 @@ def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Resul
     AlgorithmFailed
         No algorithm found a valid map; the message says why for each.
 
+    Examples
+    --------
+    >>> import cembench
+    >>> found = cembench.holes(cembench.surface("catenoid-ring", 200))
+    >>> sorted(found)
+    ['direct-cem-holes', 'harmonic-filled', 'koebe-cem']
+
     """
     mesh = checked_surface(surface, (HoledMesh,))
     given: dict[str, Any] = {} if outer is None else {"outer": outer}

@@ -49,6 +49,14 @@ def morph(
     AlgorithmFailed
         No map or no registration without folds.
 
+    Examples
+    --------
+    >>> import cembench
+    >>> face = cembench.surface("hemi-ellipsoid", 300)
+    >>> path = cembench.morph([face, (face.V * [1, 1, 2], face.F)])
+    >>> path.at(0.5).shape == (face.n, 3)
+    True
+
     """
     if len(surfaces) < 2:
         raise ParameterError("a morph needs two surfaces or more; name at least one other.")

@@ -19,6 +19,7 @@ from cembench.registry import Algorithm, Registry, load_registry
 from cembench.results.records import Outcome
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.workflows.notebook import html_table
 from cembench.workflows.surface_input import KINDS, SurfaceInput, checked_surface
 
 if TYPE_CHECKING:
@@ -191,15 +192,10 @@ class Result:
         ]
         rows += [("iterations", str(self.iterations)), ("seconds", f"{self.seconds:.3f}")]
         rows += [("note", notice) for notice in self.notices]
-        cells = "".join(
-            f"<tr><th style='text-align:left'>{html.escape(name)}</th>"
-            f"<td>{html.escape(text)}</td></tr>"
-            for name, text in rows
-        )
         words = html.escape(self._title)
         return (
             f"<figure><img alt='{words}' style='max-width:100%' "
-            f"src='data:image/png;base64,{picture}'/></figure><table>{cells}</table>"
+            f"src='data:image/png;base64,{picture}'/></figure>{html_table(rows)}"
         )
 
 

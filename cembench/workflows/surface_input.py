@@ -60,11 +60,12 @@ def checked_surface(
                 f"{', '.join(sorted(registry.surfaces)) or 'none'}."
             )
         return _first(kinds, lambda kind: read_mesh(path, kind))
-    V, F = _pair(given)
+    V, F = pair_of_arrays(given)
     return _first(kinds, lambda kind: kind.from_arrays(V, F))
 
 
-def _pair(given: Any) -> tuple[Any, Any]:
+def pair_of_arrays(given: Any) -> tuple[Any, Any]:
+    """Return the arrays of a pair; :class:`MeshError` names what is none."""
     if isinstance(given, tuple | list) and len(given) == 2:
         return given[0], given[1]
     size = f" of {len(given)} items" if isinstance(given, tuple | list) else ""

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cembench.core import folders
+from cembench.core.atomic import draft_folder, unwritable, write_model
 from cembench.running.local import Options
 from cembench.running.plan import distribute_parameters
 from cembench.validation.examine import ValidationOptions, examine
@@ -68,3 +70,26 @@ def validate(
     solver = Solver(algorithm, plugins, arguments, in_a_process(options))
     with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
         return examine(solver, registry, Path(folder), asked)
+
+
+def write_validation(found: Validation, folder: Path) -> dict[str, str]:
+    """Lay a validation into a folder, as JSON and as a page; where is each?
+
+    Raises
+    ------
+    RecordError
+        The folder cannot be written to.
+
+    """
+    from cembench.report.render.html import FILE, write_html  # needs an extra
+    from cembench.validation.document import document_of
+
+    name = "validation.json"
+    try:
+        with draft_folder(folder) as draft:
+            write_model(draft / name, found)
+            write_html(document_of(found, folder, draft), draft)
+            folders.publish(draft, folder, "validation")
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    return {"output": str(folder / name), "page": str(folder / FILE)}

@@ -1,7 +1,8 @@
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from benchmarks.surfaces_page import BEGIN, END, PAGE, Line, models, tables
+from benchmarks.pages import marks
+from benchmarks.surfaces_page import PAGE, Line, models, tables
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.registry import load_registry
 from cembench.results.records import MeshFacts
@@ -61,7 +62,8 @@ def test_a_file_that_is_no_model_is_refused(tmp_path):
 
 
 def test_the_page_has_all_stand_ins_in_both_tables():
-    tables_of_page = PAGE.read_text(encoding="utf-8").split(BEGIN)[1].split(END)[0]
+    begin, end = marks("surfaces_page")
+    tables_of_page = PAGE.read_text(encoding="utf-8").split(begin)[1].split(end)[0]
     for surface in load_registry().surfaces.values():
         if surface.kept:
             assert tables_of_page.count(f"| {surface.name} | stand-in for ") == 2

@@ -151,7 +151,7 @@ def test_doctor_is_well(cli):
     code, out, _ = cli("doctor", "--json")
     assert code == 0
     found = {finding["name"]: finding for finding in json.loads(out)}
-    assert found["cvxopt"]["ok"]
+    assert found["cholesky"]["ok"]
     assert "cvxopt, superlu" in found["cholesky"]["detail"]
 
 

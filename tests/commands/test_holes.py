@@ -4,22 +4,16 @@ import numpy as np
 import pytest
 from cembench.surfaces.holed_disk import holed_disk
 
-from cembench.drawing import preview
 from cembench.results.exhibits import read_exhibits
 from tests import gallery
 
 
 @pytest.fixture
-def ring(cli, monkeypatch):
-    """A file with one hole; pictures come without pyvista's process."""
-    monkeypatch.setattr(preview, "_by_pyvista", _no_pyvista)
+def ring(cli):
+    """A file with one hole."""
     mesh = holed_disk(600, holes=1)
     (cli.folder / "ring.obj").write_text(gallery.obj_text(mesh.V, mesh.F))
     return mesh
-
-
-def _no_pyvista(scene, side):
-    raise preview._PyvistaFailed("not now")
 
 
 def test_the_verb_lays_down_steps_map_and_table(cli, ring):

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import sys
 from functools import lru_cache
 
 import numpy as np
@@ -8,8 +7,8 @@ import pytest
 from PIL import Image
 
 from cembench.core.errors import ParameterError, RenderError
-from cembench.drawing import compose, draw_numpy, preview
-from cembench.drawing.preview import RendererUsed, renderer_status, write_preview
+from cembench.drawing import compose, draw_numpy
+from cembench.drawing.preview import write_preview
 from cembench.drawing.scene import FILL, SQUARES, Scene
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import load_registry
@@ -49,41 +48,17 @@ def reddish(picture):
     return (picture[..., 0] > 1.8 * picture[..., 1]) & (picture[..., 0] > 80)
 
 
-@lru_cache
-def by_pyvista():
-    """The renderer that may be missing; a test that needs it says loudly that it did not run."""
-    return renderer_status()
-
-
-def need_pyvista():
-    works, reason = by_pyvista()
-    if not works:
-        pytest.skip(f"NOT TESTED: {reason}")
-
-
-@pytest.fixture(params=["matplotlib", pytest.param("pyvista", marks=pytest.mark.render)])
-def draw(request):
-    """Each renderer as a function (scene, side) -> two pictures."""
-    if request.param == "matplotlib":
-        return draw_numpy.draw
-    need_pyvista()
-    return preview._by_pyvista
-
-
 def test_png_has_the_asked_size_and_panels_with_something_in_them(tmp_path):
     mesh = flat_disk()
     path = tmp_path / "disk.png"
-    drawn = write_preview(
-        mesh, seen_from_above(mesh), path, title="A disk", size=SMALL, renderer="matplotlib"
-    )
-    assert drawn == RendererUsed("matplotlib")
+    write_preview(mesh, seen_from_above(mesh), path, title="A disk", size=SMALL)
     assert pixels(path).shape == (SMALL[1], SMALL[0], 3)
     for panel in panels(path, SMALL):
         assert 0.70 < (panel < 250).any(axis=2).mean() < 0.80  # pi / 4 of the square
     assert [file.name for file in tmp_path.iterdir()] == ["disk.png"]
 
 
-def test_squares_of_a_flat_disk_are_where_they_must_be(draw):
+def test_squares_of_a_flat_disk_are_where_they_must_be():
     mesh = flat_disk()
     side = 360
     centres = np.arange(-SQUARES // 2, SQUARES // 2) + 0.5
@@ -93,17 +68,17 @@ def test_squares_of_a_flat_disk_are_where_they_must_be(draw):
     dark = (np.floor(x) + np.floor(y)) % 2 == 1
     column = ((x * 2 * FILL / SQUARES + 1) / 2 * side).astype(int)
     row = ((1 - y * 2 * FILL / SQUARES) / 2 * side).astype(int)
-    for picture in draw(Scene.of(mesh, seen_from_above(mesh)), side):
+    for picture in draw_numpy.draw(Scene.of(mesh, seen_from_above(mesh)), side):
         blueness = picture[row, column, 2].astype(int) - picture[row, column, 0]
         np.testing.assert_array_equal(blueness > 40, dark)
 
 
-def test_square_edges_are_exact_to_a_pixel_on_a_coarse_mesh(draw):
+def test_square_edges_are_exact_to_a_pixel_on_a_coarse_mesh():
     """Colour is decided at pixels, not at triangles: a single square needs only two."""
     V = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     mesh = DiskMesh.from_arrays(V, [[0, 1, 2], [0, 2, 3]])
     side = 400
-    for picture in draw(Scene.of(mesh, seen_from_above(mesh)), side):
+    for picture in draw_numpy.draw(Scene.of(mesh, seen_from_above(mesh)), side):
         blue = picture[:, :, 2].astype(int) - picture[:, :, 0] > 20
         row = blue[int(side * (0.5 + FILL / 2 - 0.5 * FILL / SQUARES))]
         changes = np.flatnonzero(np.diff(row.astype(int))) + 1
@@ -113,11 +88,11 @@ def test_square_edges_are_exact_to_a_pixel_on_a_coarse_mesh(draw):
         assert missing < 1
 
 
-def test_folds_are_red_in_both_panels(draw):
+def test_folds_are_red_in_both_panels():
     mesh = flat_disk()
-    for picture in draw(Scene.of(mesh, folded_map(mesh)), 300):
+    for picture in draw_numpy.draw(Scene.of(mesh, folded_map(mesh)), 300):
         assert reddish(picture.astype(int)).sum() > 20
-    for picture in draw(Scene.of(mesh, seen_from_above(mesh)), 300):
+    for picture in draw_numpy.draw(Scene.of(mesh, seen_from_above(mesh)), 300):
         assert not reddish(picture.astype(int)).any()
 
 
@@ -127,19 +102,8 @@ def test_a_fold_too_small_to_be_seen_is_ringed(tmp_path):
     a, b, c = mesh.F[len(mesh.F) // 2]
     uv[[b, c]] = uv[a]  # some triangles collapse
     path = tmp_path / "collapsed.png"
-    write_preview(mesh, uv, path, size=SMALL, renderer="matplotlib")
+    write_preview(mesh, uv, path, size=SMALL)
     assert reddish(panels(path, SMALL)[1]).sum() > 5
-
-
-@pytest.mark.render
-def test_renderers_agree():
-    need_pyvista()
-    mesh = load_registry().surface("hemi-ellipsoid").function(2_000)
-    scene = Scene.of(mesh, seen_from_above(mesh))
-    for one, other in zip(
-        preview._by_pyvista(scene, 300), draw_numpy.draw(scene, 300), strict=True
-    ):
-        assert np.abs(one.astype(int) - other).mean() < 4
 
 
 def test_holes_and_images_that_are_no_disk(tmp_path):
@@ -149,7 +113,7 @@ def test_holes_and_images_that_are_no_disk(tmp_path):
     F = [f for a, b in quads for f in ((a, b, (b + 3) % 72), (a, (b + 3) % 72, (a + 3) % 72))]
     mesh = HoledMesh.from_arrays(V, F)
     path = tmp_path / "ring.png"
-    write_preview(mesh, 5 * seen_from_above(mesh) + 100, path, size=SMALL, renderer="matplotlib")
+    write_preview(mesh, 5 * seen_from_above(mesh) + 100, path, size=SMALL)
     for panel in panels(path, SMALL):
         middle = len(panel) // 2
         assert (panel[middle, middle] == 255).all()
@@ -167,7 +131,6 @@ def test_long_words_stay_on_the_page(tmp_path):
         title="a very long name of a surface $x_1 " * 20,
         caption="E_C = 1.234 · mean angle error 0.12° · " * 20,
         size=SMALL,
-        renderer="matplotlib",
     )
     picture = pixels(path)
     assert (picture[:, :8] == 255).all()
@@ -176,64 +139,14 @@ def test_long_words_stay_on_the_page(tmp_path):
     assert (picture[compose.gap_of(SMALL) + compose.side_of(SMALL) :] < 200).any()
 
 
-@pytest.mark.parametrize(
-    ("program", "said"),
-    [
-        ("import os; os.kill(os.getpid(), 9)", "died of signal SIGKILL; .*libegl1"),
-        ("import pyvista_", "No module named 'pyvista_'"),
-        ("raise ModuleNotFoundError(\"No module named 'pyvista'\")", r"not installed.*\[render\]"),
-        ("raise ImportError('libXrender.so.1: no such file')", "cannot be loaded .*libXrender"),
-        ("import time; time.sleep(60)", "more than 1 s"),
-        (
-            "import sys, numpy; white = numpy.full((9, 9, 3), 255);"
-            "numpy.savez(sys.argv[1], surface=white, image=white)",
-            "empty picture",
-        ),
-        ("pass", "No such file .*pictures.npz"),
-    ],
-)
-def test_matplotlib_takes_over_when_pyvista_fails(tmp_path, monkeypatch, program, said):
-    def command(source, target, side):
-        return [sys.executable, "-c", program, str(target)]
-
-    monkeypatch.setattr(preview, "_command", command)
-    monkeypatch.setattr(preview, "TIMEOUT", 1.0)
-    mesh = flat_disk()
-    drawn = write_preview(mesh, seen_from_above(mesh), tmp_path / "disk.png", size=SMALL)
-    assert drawn.renderer == "matplotlib"
-    assert pixels(tmp_path / "disk.png").min() < 200
-    with pytest.raises(AssertionError, match=said):  # shows the notice when it does not match
-        raise AssertionError(drawn.notice)
-    works, message = renderer_status()
-    assert not works
-    assert message.endswith("Pictures are drawn by matplotlib instead.")
-
-
-def test_matplotlib_takes_over_when_there_is_no_room_for_the_scene(tmp_path, monkeypatch):
-    def fail(self, path):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Scene, "save", fail)
-    mesh = flat_disk()
-    drawn = write_preview(mesh, seen_from_above(mesh), tmp_path / "disk.png", size=SMALL)
-    assert drawn.renderer == "matplotlib"
-    assert "No space left" in drawn.notice
-
-
-def test_status_is_a_sentence():
-    assert "pyvista" in by_pyvista()[1]
-
-
-def test_error_when_no_renderer_works(tmp_path, monkeypatch):
+def test_a_picture_that_cannot_be_drawn_is_an_error(tmp_path, monkeypatch):
     def fail(scene, side):
         raise MemoryError("no room")
 
     monkeypatch.setattr(draw_numpy, "draw", fail)
     mesh = flat_disk()
     with pytest.raises(RenderError, match="could not be drawn: MemoryError: no room"):
-        write_preview(
-            mesh, seen_from_above(mesh), tmp_path / "disk.png", size=SMALL, renderer="matplotlib"
-        )
+        write_preview(mesh, seen_from_above(mesh), tmp_path / "disk.png", size=SMALL)
     assert not list(tmp_path.iterdir())
 
 
@@ -244,9 +157,7 @@ def test_error_when_the_file_cannot_be_written(tmp_path, place):
     before = sorted(tmp_path.rglob("*"))
     mesh = flat_disk()
     with pytest.raises(RenderError, match=r"cannot be written: .*Choose another place"):
-        write_preview(
-            mesh, seen_from_above(mesh), tmp_path / place, size=SMALL, renderer="matplotlib"
-        )
+        write_preview(mesh, seen_from_above(mesh), tmp_path / place, size=SMALL)
     assert sorted(tmp_path.rglob("*")) == before
 
 
@@ -260,7 +171,7 @@ def test_an_older_picture_survives_a_full_disk(tmp_path, monkeypatch):
     monkeypatch.setattr("os.fsync", full)
     mesh = flat_disk()
     with pytest.raises(RenderError, match="No space left on device"):
-        write_preview(mesh, seen_from_above(mesh), path, size=SMALL, renderer="matplotlib")
+        write_preview(mesh, seen_from_above(mesh), path, size=SMALL)
     assert [file.name for file in tmp_path.iterdir()] == ["disk.png"]
     assert path.read_bytes() == b"older"
 

@@ -72,15 +72,6 @@ def test_a_finer_board_covers_the_same_surface_with_smaller_squares():
     assert np.nanquantile(side, 0.99) < 1.2 * look.LARGEST_SQUARE
 
 
-def test_a_scene_survives_the_way_to_another_process(tmp_path):
-    mesh = relief(lambda x, y: x * y)
-    scene = Scene.of(mesh, mesh.V[:, 0] + 1j * mesh.V[:, 1])
-    scene.save(tmp_path / "scene.npz")
-    again = Scene.load(tmp_path / "scene.npz")
-    for name, value in vars(scene).items():
-        np.testing.assert_array_equal(getattr(again, name), value)
-
-
 def test_rasterizer_covers_a_square_without_cracks_and_interpolates_exactly():
     rng = np.random.default_rng(1)
     mesh = load_registry().surface("flat-disk").function(5_000)

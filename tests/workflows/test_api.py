@@ -1,8 +1,10 @@
 """The library as a notebook uses it: arrays, meshes, files and names in; results out."""
 
 import doctest
+import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -11,11 +13,14 @@ import pytest
 import cembench
 from tests import gallery
 
-WITH_EXAMPLES = [
-    "cembench.workflows.catalogue",
-    "cembench.workflows.parameterize",
-    "cembench.workflows.theory_facts",
-]
+ROOT = Path(cembench.__file__).parents[1]
+
+#: The modules whose docstrings have examples.
+WITH_EXAMPLES = sorted(
+    path.relative_to(ROOT).with_suffix("").as_posix().replace("/", ".")
+    for path in (ROOT / "cembench").rglob("*.py")
+    if ">>> " in path.read_text()
+)
 
 
 @pytest.fixture(scope="module")
@@ -148,11 +153,67 @@ def test_validate_returns_findings():
 
 
 @pytest.mark.parametrize("module", WITH_EXAMPLES)
-def test_the_examples_in_docstrings_run(module):
-    __import__(module)
-    found = doctest.testmod(sys.modules[module])
+def test_the_examples_in_docstrings_run(module, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    found = doctest.testmod(importlib.import_module(module))
     assert found.attempted >= 1
     assert not found.failed
+
+
+def test_ten_public_names_have_an_example():
+    public = [getattr(cembench, name) for name in cembench.__all__]
+    assert sum(">>> " in (value.__doc__ or "") for value in public) >= 10
+
+
+@pytest.mark.parametrize("kind", ["path", "arrays", "mesh"])
+def test_repair_and_cut_take_what_parameterize_takes(kind, tmp_path):
+    V, F = gallery.torus()
+    (tmp_path / "torus.obj").write_text(gallery.obj_text(V, F))
+    given = {
+        "path": tmp_path / "torus.obj",
+        "arrays": (V, F),
+        "mesh": cembench.TriangleMesh(V, F),
+    }[kind]
+    disk = cembench.cut(given)
+    assert isinstance(disk.mesh, cembench.DiskMesh)
+    np.testing.assert_array_equal(disk.mesh.V, np.asarray(V)[disk.origin])
+    assert cembench.parameterize(disk.mesh).ok
+    mended = cembench.repair(given)
+    assert len(mended.mesh.loops) == 0
+    assert not any(mended.steps.values())
+    with pytest.raises(cembench.MeshError, match=r"closed|boundary"):
+        cembench.parameterize(given)
+
+
+def test_repair_says_what_it_did_and_gives_every_component():
+    V, F = (np.asarray(a) for a in gallery.two_pieces())
+    found = cembench.repair((np.vstack([V, [[np.nan, 0, 0]]]), F), components="all")
+    assert [type(mesh) for mesh in found.meshes] == [cembench.DiskMesh] * 2
+    assert found.steps["isolated_vertices_removed"] == 1
+    assert len(cembench.repair((V, F)).meshes) == 1
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "error"),
+    [
+        ((V, F), {"weld": -1}, "weld=-1"),
+        ((V, F), {"components": "some"}, "components='some'"),
+        (("nowhere.obj"), {}, "no such file"),
+        (7, {}, "pair of arrays"),
+        ((V, F + 0.5), {}, "integer|whole"),
+        ((V, F + len(V)), {}, "nothing is left to repair"),
+    ],
+)
+def test_what_repair_refuses(given, options, error):
+    with pytest.raises(cembench.CembenchError, match=error):
+        cembench.repair(given, **options)
+
+
+def test_what_cut_refuses():
+    with pytest.raises(cembench.ParameterError, match="vertex 99999"):
+        cembench.cut((V, F), through=[99999])
+    with pytest.raises(cembench.MeshError, match="components"):
+        cembench.cut((np.vstack([V, V + 99]), np.vstack([F, F + len(V)])))
 
 
 def test_every_public_name_is_there_and_documented():

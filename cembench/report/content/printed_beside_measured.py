@@ -128,7 +128,8 @@ def table_beside(
     rows = [_row(evidence, surface, quantities, policy) for surface in surfaces]
     counted = [r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.set_aside]
     last = _footer_rows(counted, len(columns), footers)
-    remarks = [*notes, *([absent] if absent else []), *_remarks(columns, rows), *_sizes(surfaces)]
+    places = _places(columns, rows)
+    remarks = [*notes, *([absent] if absent else []), *places.values(), *_sizes(surfaces)]
     return Table(
         name=name,
         title=title,
@@ -137,6 +138,7 @@ def table_beside(
         caption=caption,
         notes=tuple(remarks),
         absent=absent,
+        places=places,
         footer_rows=len(last),
     )
 
@@ -172,15 +174,15 @@ def _footer_rows(
     return [*lines, (words("n, surfaces counted"), words(""), *counts)]
 
 
-def _remarks(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> list[str]:
-    """What has to be known of single cells: gaps with their cause, misprints, unsteady times."""
+def _places(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> dict[str, str]:
+    """Where each cause of a gap, a misprint or an unsteady time holds, in words."""
     found: dict[str, list[str]] = {}
     for row in rows:
         for column, value in zip(columns, row, strict=True):
             if value.why:
                 where = f"{row[0].text} / {column.group}"
                 found.setdefault(value.why, []).append(where)
-    return [f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in found.items()]
+    return {why: f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in found.items()}
 
 
 def _sizes(surfaces: Sequence[MeasuredSurface]) -> list[str]:

@@ -227,21 +227,13 @@ def _table(
         "groups": _groups(table.columns),
         "rows": rows[: len(body)],
         "footers": rows[len(body) :],
-        "notes": [note for note in table.notes if not _explained(note, remarks)],
-        "remarks": [
-            (letters[why], next((n for n in table.notes if n.startswith(why)), why))
-            for why in remarks
-        ],
+        "notes": [note for note in table.notes if note not in table.places.values()],
+        "remarks": [(letters[why], table.places.get(why, why)) for why in remarks],
         "legend": [
             (mark, words, o) for o, (words, mark) in ORIGINS.items() if o in origins and mark
         ],
         "linked": any(c.record for row in rows for c in row),
     }
-
-
-def _explained(note: str, remarks: Sequence[str]) -> bool:
-    """Does a note say one of the remarks, and where it holds? Then it stands among them."""
-    return any(note.startswith(why) for why in remarks)
 
 
 def _sortable(number: float | None) -> str:

@@ -14,6 +14,7 @@ from rich.text import Text
 from cembench.conformal.metrics import METRICS, Metric, metrics_shown
 from cembench.mesh.datasets import Dataset
 from cembench.registry import Algorithm, Surface
+from cembench.report.render.grid import GridColumn, figures, grid, names, words
 from cembench.report.surface_facts import SurfaceFacts, row_check
 from cembench.results import paper
 from cembench.results.comparison import (
@@ -56,29 +57,30 @@ def results_table(records: Iterable[Record]) -> RenderableType:
 
 
 def _cells_table(records: Sequence[Record]) -> Table:
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
     longest = max((len(record.cell.algorithm) + 2 for record in records), default=9)
-    room = max(8, min(16, 80 - 53 - longest))
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=room)
-    table.add_column("algorithm", no_wrap=True)
-    headings = (metric.heading for metric in metrics_shown("overview"))
-    for heading in (*headings, "iter", "seconds", "±%"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("status", no_wrap=True)
+    shown = metrics_shown("overview")
+    columns = [
+        names("surface", max(8, min(16, 80 - 53 - longest))),
+        names("algorithm"),
+        *figures(*(metric.heading for metric in shown), "iter", "seconds", "±%"),
+        names("status"),
+    ]
+    rows: list[list[str | Text]] = []
     for mesh, group in groupby(records, key=lambda record: record.cell.mesh):
         for k, record in enumerate(group):
             outcome = record.outcome
-            table.add_row(
-                mesh if k == 0 else "",
-                record.cell.algorithm + ("" if record.target == "disk" else " *"),
-                *(_figure(record, metric) for metric in metrics_shown("overview")),
-                "-" if outcome.iterations is None else str(outcome.iterations),
-                "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
-                _spread(record),
-                Text(outcome.status, style=status_style(outcome.status)),
+            rows.append(
+                [
+                    mesh if k == 0 else "",
+                    record.cell.algorithm + ("" if record.target == "disk" else " *"),
+                    *(_figure(record, metric) for metric in shown),
+                    "-" if outcome.iterations is None else str(outcome.iterations),
+                    "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
+                    _spread(record),
+                    Text(outcome.status, style=status_style(outcome.status)),
+                ]
             )
-        table.add_section()
-    return table
+    return grid(columns, rows)
 
 
 def _spread(record: Record) -> Text:
@@ -95,8 +97,8 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
         kinds = sorted({f"{r.cell.algorithm}: {r.target}" for r in records if r.target != "disk"})
         remarks.append(Text(f"* not a map to the disk ({'; '.join(kinds)})", style="dim"))
     if any(is_unstable(record) for record in records):
-        words = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
-        remarks.append(Text(words, style="yellow"))
+        told = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
+        remarks.append(Text(told, style="yellow"))
     for record in records:
         name = f"{record.cell.mesh} / {record.cell.algorithm}"
         remarks += [Text(f"{name}: {note}") for note in record.outcome.notes]
@@ -126,51 +128,48 @@ def speedups_table(records: Sequence[Record], reference: str) -> RenderableType 
         f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)", style="bold"
     )
     if all(found.verdict == "too few rounds" for _, found in compared):
-        words = (
+        told = (
             f"How sure these are is not known: that takes {DEFAULT_ROUNDS} rounds "
             f"(cembench run --repeats {DEFAULT_ROUNDS})."
         )
-        return Group(heading, _bare_speedups(compared), Text(words, style="dim"))
+        return Group(heading, _bare_speedups(compared), Text(told, style="dim"))
     return Group(heading, _sure_speedups(compared, reference))
 
 
 def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str) -> Table:
     """A line a comparison."""
     several = _several_policies(compared)
-    table = _surfaces_column(16)
-    table.add_column("algorithm", no_wrap=True)
-    for heading in ("speedup", "95 % interval"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column(f"than {reference}")
+    rows = []
     for record, found in compared:
         i = found.speedup_interval
         sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
         name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
-        table.add_row(record.cell.mesh, name, f"{found.speedup:.2f}", sure, found.verdict)
-    return table
+        rows.append([record.cell.mesh, name, f"{found.speedup:.2f}", sure, found.verdict])
+    return grid(
+        [
+            names("surface", 16),
+            names("algorithm"),
+            *figures("speedup", "95 % interval"),
+            *words(f"than {reference}"),
+        ],
+        rows,
+    )
 
 
 def _bare_speedups(compared: Sequence[tuple[Record, Comparison]]) -> Table:
     """A line a surface, a column an algorithm."""
     several = _several_policies(compared)
-    names = list(dict.fromkeys(record.cell.algorithm for record, _ in compared))
-    table = _surfaces_column(28)
-    for name in names:
-        table.add_column(name, justify="right", overflow="fold")
+    algorithms = list(dict.fromkeys(record.cell.algorithm for record, _ in compared))
     lines: dict[tuple[str, str], dict[str, str]] = {}
     for record, found in compared:
         line = lines.setdefault((record.cell.mesh, record.cell.solves), {})
         line[record.cell.algorithm] = f"{found.speedup:.2f}"
-    for (mesh, solves), line in lines.items():
-        label = f"{mesh} ({solves})" if several else mesh
-        table.add_row(label, *(line.get(name, "-") for name in names))
-    return table
-
-
-def _surfaces_column(width: int) -> Table:
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=width)
-    return table
+    rows = [
+        [f"{mesh} ({solves})" if several else mesh, *(line.get(name, "-") for name in algorithms)]
+        for (mesh, solves), line in lines.items()
+    ]
+    columns = [GridColumn(name, figures=True, wraps=True) for name in algorithms]
+    return grid([names("surface", 28), *columns], rows)
 
 
 def _several_policies(compared: Sequence[tuple[Record, Comparison]]) -> bool:
@@ -179,43 +178,50 @@ def _several_policies(compared: Sequence[tuple[Record, Comparison]]) -> bool:
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:
     """What became faster or slower from one run to another: the ratio of the seconds."""
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=16)
-    table.add_column("algorithm", no_wrap=True)
-    for heading in ("before", "after", "ratio", "interval"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("verdict")
+    rows = []
     for change in changes:
         found, i = change.comparison, change.comparison.interval
-        table.add_row(
-            change.after.cell.mesh,
-            change.after.cell.algorithm,
-            f"{change.before.outcome.median_seconds:.3f}",
-            f"{change.after.outcome.median_seconds:.3f}",
-            f"{found.ratio:.2f}",
-            "unknown" if i is None else f"{i.low:.2f}-{i.high:.2f}",
-            found.verdict,
+        rows.append(
+            [
+                change.after.cell.mesh,
+                change.after.cell.algorithm,
+                f"{change.before.outcome.median_seconds:.3f}",
+                f"{change.after.outcome.median_seconds:.3f}",
+                f"{found.ratio:.2f}",
+                "unknown" if i is None else f"{i.low:.2f}-{i.high:.2f}",
+                found.verdict,
+            ]
         )
-    return table
+    return grid(
+        [
+            names("surface", 16),
+            names("algorithm"),
+            *figures("before", "after", "ratio", "interval"),
+            *words("verdict"),
+        ],
+        rows,
+    )
 
 
 def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> RenderableType:
     """What would be run: cell, triangles, what is there already, and what the rest will cost."""
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=18)
-    for heading in ("algorithm", "solves"):
-        table.add_column(heading, no_wrap=True)
-    for heading in ("faces", "a call", "in all", "memory"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("from", no_wrap=True)
+    rows = []
     for cell, faces, state, cost in lines:
-        figures = ("-", "-", "-")
+        costs = ("-", "-", "-")
         if cost is not None:
             gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
-            figures = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
-        named = (cell.mesh, cell.algorithm, cell.solves, f"{faces:,}")
-        table.add_row(*named, *figures, state)
-    return table
+            costs = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
+        rows.append([cell.mesh, cell.algorithm, cell.solves, f"{faces:,}", *costs, state])
+    return grid(
+        [
+            names("surface", 18),
+            names("algorithm"),
+            names("solves"),
+            *figures("faces", "a call", "in all", "memory"),
+            names("from"),
+        ],
+        rows,
+    )
 
 
 def _figure(record: Record, metric: Metric) -> str:
@@ -226,49 +232,45 @@ def _figure(record: Record, metric: Metric) -> str:
 def figures_table(record: Record) -> Table:
     """All figures of one record, a line each."""
     outcome, facts = record.outcome, record.mesh
-    table = Table(box=None, show_header=False, pad_edge=False)
-    table.add_column(style="bold", no_wrap=True)
-    table.add_column()
-    table.add_row(
-        "surface",
+    about = (
         f"{record.cell.mesh}: {facts.vertices:,} vertices, {facts.faces:,} "
         f"faces, {facts.boundary_vertices:,} on the boundary, "
-        f"{facts.non_delaunay_share:.1%} of the edges not Delaunay",
+        f"{facts.non_delaunay_share:.1%} of the edges not Delaunay"
     )
+    rows = [("surface", about)]
     if facts.paper_row:
-        table.add_row("in the paper", _printed(record))
-    table.add_row("algorithm", f"{record.title} ({record.target})" + _given(record))
+        rows.append(("in the paper", _printed(record)))
+    rows.append(("algorithm", f"{record.title} ({record.target})" + _given(record)))
     for metric in METRICS:
         if metric.name in outcome.metrics:
             text = metric.text(outcome.metrics[metric.name], precise=True)
-            table.add_row(metric.title, f"{text} {metric.unit}".rstrip())
+            rows.append((metric.title, f"{text} {metric.unit}".rstrip()))
     if outcome.iterations:
-        table.add_row("iterations", str(outcome.iterations))
+        rows.append(("iterations", str(outcome.iterations)))
     if outcome.seconds:
         phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
-        table.add_row("seconds", f"{outcome.median_seconds:.3f} ({phases})")
+        rows.append(("seconds", f"{outcome.median_seconds:.3f} ({phases})"))
     interval = seconds_interval(record)
     if interval is not None:
         sure = f"{interval.low:.4f} to {interval.high:.4f} s over {len(outcome.rounds)} rounds"
-        table.add_row("95 % interval", sure + (", unstable" if is_unstable(record) else ""))
-        table.add_row("fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s")
+        rows.append(("95 % interval", sure + (", unstable" if is_unstable(record) else "")))
+        rows.append(("fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s"))
     if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
-        table.add_row(
-            "memory",
+        memory = (
             f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, "
-            f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
+            f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
         )
-    for note in outcome.notes:
-        table.add_row("note", str(note))
-    return table
+        rows.append(("memory", memory))
+    rows += [("note", str(note)) for note in outcome.notes]
+    return grid([GridColumn(style="bold"), GridColumn(wraps=True)], rows, gap=2)
 
 
 def _printed(record: Record) -> str:
     """What the paper says of this surface, and of this algorithm on it; printed, not measured."""
     row, name = record.mesh.paper_row, record.cell.algorithm
     what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
-    figures = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
-    energy, mean, sd = (figures.get(name + end) for end in ("", "_mean", "_sd"))
+    printed = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
+    energy, mean, sd = (printed.get(name + end) for end in ("", "_mean", "_sd"))
     if energy is None or mean is None or sd is None:
         return what
     return f"{what}; printed: E_C {energy:.4f}, angles {mean:.2f} in the mean, SD {sd:.2f}"
@@ -282,12 +284,9 @@ def _given(record: Record) -> str:
 def algorithms_table(algorithms: Sequence[Algorithm], *, verbose: bool) -> RenderableType:
     """What algorithms are there; with `verbose` also what each is faithful to and decides."""
     if not verbose:
-        table = Table(box=None, pad_edge=False, header_style="bold")
-        for heading in ("algorithm", "maps to", "from", "parameters (defaults)"):
-            table.add_column(heading)
-        for a in algorithms:
-            table.add_row(a.name, a.target, a.mesh_type.__name__, _parameters(a))
-        return table
+        rows = [[a.name, a.target, a.mesh_type.__name__, _parameters(a)] for a in algorithms]
+        columns = words("algorithm", "maps to", "from", "parameters (defaults)")
+        return grid(columns, rows, gap=2)
     parts: list[RenderableType] = []
     for a in algorithms:
         parts += [
@@ -301,53 +300,50 @@ def algorithms_table(algorithms: Sequence[Algorithm], *, verbose: bool) -> Rende
 
 def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableType:
     """What surface families are there?"""
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("surface", "title", "parameters (defaults)"):
-        table.add_column(heading)
-    if verbose:
-        table.add_column("about")
-    for s in surfaces:
-        row = [s.name, s.title, _parameters(s)]
-        table.add_row(*row, *([_flowing(s.notes)] if verbose else []))
-    return table
+    more = ["about"] if verbose else []
+    rows = [
+        [s.name, s.title, _parameters(s), *([_flowing(s.notes)] if verbose else [])]
+        for s in surfaces
+    ]
+    return grid(words("surface", "title", "parameters (defaults)", *more), rows, gap=2)
 
 
 def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
     """Counts of surfaces, do they meet the paper's Table 2, and how hard are they to flatten?"""
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("surface", no_wrap=True)
-    for heading in ("vertices", "faces", "boundary", "not Delaunay", "span"):
-        table.add_column(heading, justify="right", no_wrap=True)
-    table.add_column("Table 2", no_wrap=True)
+    rows: list[list[str | Text]] = []
     for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
         mesh, check = facts.mesh, row_check(facts.mesh)
         verdict = "-" if check is None else "ok" if check["ok"] else "off"
-        table.add_row(
-            name,
-            f"{mesh.vertices:,}",
-            f"{mesh.faces:,}",
-            f"{mesh.boundary_vertices:,}",
-            f"{mesh.non_delaunay_share:.1%}",
-            f"{facts.conformal_factor_span:.2g}",
-            Text(verdict, style="bold red" if verdict == "off" else ""),
+        rows.append(
+            [
+                name,
+                f"{mesh.vertices:,}",
+                f"{mesh.faces:,}",
+                f"{mesh.boundary_vertices:,}",
+                f"{mesh.non_delaunay_share:.1%}",
+                f"{facts.conformal_factor_span:.2g}",
+                Text(verdict, style="bold red" if verdict == "off" else ""),
+            ]
         )
+    heads = figures("vertices", "faces", "boundary", "not Delaunay", "span")
+    table = grid([names("surface"), *heads, names("Table 2")], rows)
     folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
-    words = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
-    return Group(table, Text(f"{words}\nthumbnails: {', '.join(folders)}", style="dim"))
+    span = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
+    return Group(table, Text(f"{span}\nthumbnails: {', '.join(folders)}", style="dim"))
 
 
 def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
     """What can be fetched, and is it there already?"""
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for heading in ("dataset", "title", "in the paper"):
-        table.add_column(heading)
-    table.add_column("size", justify="right")
-    table.add_column("licence")
-    table.add_column("here")
+    rows = []
     for d, here in datasets:
         size = "-" if d.size is None else f"{d.size / 1e6:.1f} MB"
-        table.add_row(d.name, d.title, d.paper_row or "-", size, d.licence, "yes" if here else "no")
-    return table
+        rows.append([d.name, d.title, d.paper_row or "-", size, d.licence, "yes" if here else "no"])
+    columns = [
+        *words("dataset", "title", "in the paper"),
+        *figures("size"),
+        *words("licence", "here"),
+    ]
+    return grid(columns, rows, gap=2)
 
 
 def _flowing(text: str) -> str:

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
-from rich.table import Table as Lines
 from rich.text import Text
 
 from cembench.report.document import ORIGINS, Column, Report, Table, Value, marked, tables_of
+from cembench.report.render.grid import GridColumn, grid, names
 
 #: The tables that `report` and `reproduce` show, and those that stand in where there are none.
 SHOWN = ("table-1", "table-2", "table-3", "table-4")
@@ -38,28 +38,28 @@ def paper_tables(report: Report) -> RenderableType:
     return Group(*parts, Text(f"{'; '.join(marks)}; † misprint; ! unstable", style="dim"))
 
 
-def _folded(table: Table) -> Lines:
+def _folded(table: Table) -> RenderableType:
     """A line a row and kind: "printed" and "here" stand below each other, not side by side."""
     places = [k for k, column in enumerate(table.columns) if column.numeric and column.group]
     groups = list(dict.fromkeys(table.columns[k].group for k in places))
     kinds = [k for k in _BESIDE if any(table.columns[p].title == k for p in places)]
-    lines = Lines(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
     wide = [_width(table, group) for group in groups]
     room = max(NAME, WIDTH - len("paper") - 2 - sum(wide) - len(wide))
-    lines.add_column("surface", no_wrap=True, overflow="ellipsis", max_width=room)
-    lines.add_column("", no_wrap=True)
-    for group, width in zip(groups, wide, strict=True):
-        lines.add_column(group, justify="right", min_width=width)
+    heads = [
+        GridColumn(group, figures=True, wraps=True, width=width)
+        for group, width in zip(groups, wide, strict=True)
+    ]
     body = len(table.rows) - table.footer_rows
+    lines: list[list[str | Text]] = []
+    styles = []
     for number, row in enumerate(table.rows):
-        if number == body:
-            lines.add_section()
         for k, kind in enumerate(kinds):
             cells = [_cell(table.columns, row, group, kind) for group in groups]
             name = row[0].text if k == 0 or number >= body else ""
             short = "paper" if kind == "printed" else kind
-            lines.add_row(name, short, *cells, style="dim" if kind == "printed" else "")
-    return lines
+            lines.append([name, short, *cells])
+            styles.append("dim" if kind == "printed" else "")
+    return grid([names("surface", room), names(""), *heads], lines, styles=styles)
 
 
 def _width(table: Table, group: str) -> int:

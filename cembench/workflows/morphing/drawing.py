@@ -1,27 +1,18 @@
-"""Pictures of a path: each frame from the front, the side and between, under one light.
-
-pyvista draws if it can, in a process of its own; else a rasterizer in numpy does, more slowly.
-"""
+"""Pictures of a path: each frame from the front, the side and between, under one light."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import ParameterError
-from cembench.drawing.array_bundle import ArrayBundle
 from cembench.drawing.camera import viewpoints
-from cembench.drawing.draw_numpy import SAMPLES, shrunk
-from cembench.drawing.rasterizer import rasterize
-from cembench.drawing.scene import FILL, INSIDE, brightness_of, doubled_areas
+from cembench.drawing.clay import draw_clay
+from cembench.drawing.scene import FILL
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.workflows.morphing.path import position
 
@@ -30,12 +21,10 @@ Pictures = NDArray[np.uint8]
 
 #: The views there are, in the order of the paper's video.
 VIEWS = ("front", "side", "three-quarter")
-#: Colour of a surface in full light, each 0 to 1.
-CLAY = (0.90, 0.80, 0.71)
 
 
 @dataclass(frozen=True)
-class Film(ArrayBundle):
+class Film:
     """All that is needed to draw the frames of a path.
 
     Parameters
@@ -48,7 +37,7 @@ class Film(ArrayBundle):
         The time of each frame, 0 to 1.
     rotations : float64 (views, 3, 3)
         From where each panel looks, as :func:`cembench.drawing.camera.view_rotation`.
-    size : int64 ()
+    side : int
         Pixels along a panel's side.
 
     """
@@ -57,7 +46,7 @@ class Film(ArrayBundle):
     stops: Real
     times: Real
     rotations: Real
-    size: NDArray[np.int64]
+    side: int
 
     @classmethod
     def of(
@@ -85,12 +74,7 @@ class Film(ArrayBundle):
         seen = [np.ptp((at @ r.T)[:, :2], axis=0).max() for at in places for r in rotations]
         apart = [np.abs((at @ r.T)[:, :2]).max() for at in places for r in rotations]
         places *= FILL / max(max(apart), max(seen) / 2)
-        return cls(mesh.F, places, times, rotations, np.array(side))
-
-    @property
-    def side(self) -> int:
-        """Pixels along a panel's side."""
-        return int(self.size)
+        return cls(mesh.F, places, times, rotations, side)
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
@@ -109,66 +93,15 @@ def check_views(views: Sequence[str]) -> None:
             raise ParameterError(f"view {view!r} is unknown; allowed: {', '.join(VIEWS)}.")
 
 
-def draw_film(
-    film: Film, tell: Callable[[int], object] = lambda frame: None
-) -> tuple[Pictures, str]:
-    """How does each frame look? Pictures uint8 (frames, side, views side, 3), and a notice.
+def draw_film(film: Film, tell: Callable[[int], object] = lambda frame: None) -> Pictures:
+    """How does each frame look? Pictures uint8 (frames, side, views side, 3).
 
-    The notice says why it was not pyvista that drew; else it is empty. `tell` hears of each frame.
+    `tell` hears of each frame.
     """
-    try:
-        return _by_pyvista(film, tell), ""
-    except (_PyvistaFailed, OSError) as reason:  # a full temporary disk, for one
-        pictures = np.empty(film.shape, dtype=np.uint8)
-        for k in range(len(film.times)):
-            for view in range(len(film.rotations)):
-                columns = slice(view * film.side, (view + 1) * film.side)
-                pictures[k, :, columns] = draw_by_numpy(film.F, film.in_window(k, view), film.side)
-            tell(k)
-        return pictures, f"drawn by numpy, which is slow: {reason}"
-
-
-class _PyvistaFailed(Exception):  # noqa: N818 - a reason to go another way, not an error
-    """Pyvista did not draw; the message says why."""
-
-
-def _by_pyvista(film: Film, tell: Callable[[int], object]) -> Pictures:
-    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
-        source, target, log = (Path(folder, name) for name in ("film.npz", "frames.npy", "log"))
-        film.save(source)
-        command = [
-            sys.executable,
-            "-m",
-            "cembench.workflows.morphing.draw_frames",
-            str(source),
-            str(target),
-        ]
-        with (
-            log.open("w") as stderr,
-            subprocess.Popen(
-                command, cwd=folder, stdout=subprocess.PIPE, stderr=stderr, text=True
-            ) as process,
-        ):
-            for line in process.stdout or ():
-                tell(int(line))
-        if process.returncode:
-            said = log.read_text(errors="replace").strip().rpartition("\n")[2] or "no word"
-            raise _PyvistaFailed(
-                f"pyvista ended with code {process.returncode} ({said}); "
-                "`cembench doctor` says what it needs"
-            )
-        pictures: Pictures = np.load(target)
-    if (pictures == 255).all():
-        raise _PyvistaFailed("pyvista drew empty pictures; `cembench doctor` says what it needs")
+    pictures = np.empty(film.shape, dtype=np.uint8)
+    for k in range(len(film.times)):
+        for view in range(len(film.rotations)):
+            columns = slice(view * film.side, (view + 1) * film.side)
+            pictures[k, :, columns] = draw_clay(film.F, film.in_window(k, view), film.side)
+        tell(k)
     return pictures
-
-
-def draw_by_numpy(F: NDArray[np.int64], points: Real, side: int) -> Pictures:
-    """How does a surface look, its vertices in window coordinates (n, 3)? uint8 (side, side, 3)."""
-    corners = points[F].reshape(-1, 3)
-    raster = rasterize(corners, side * SAMPLES)
-    light = raster.interpolate(brightness_of(F, points)[F].ravel())
-    light = np.where(doubled_areas(corners[:, :2])[raster.face] < 0, INSIDE * light, light)
-    canvas = np.ones((raster.size**2, 3))
-    canvas[raster.pixel] = light[:, None] * np.array(CLAY)
-    return shrunk(255 * canvas.reshape(raster.size, raster.size, 3))

@@ -30,7 +30,7 @@ def strip_page(morph: Morph, side: int = 240) -> bytes:
     """How does the path look at seven moments? A PNG, a column each, from the front and aside."""
     times = np.linspace(0, 1, FRAMES)
     film = Film.of(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
-    pictures, _ = draw_film(film)
+    pictures = draw_film(film)
     rows = [
         [picture[:, row * side : (row + 1) * side] for picture in pictures]
         for row in range(len(STRIP_VIEWS))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import BinaryIO
 
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from cembench.core import atomic
 from cembench.core.errors import ParameterError
+from cembench.core.extras import Extra, require
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -34,10 +34,8 @@ def check_output(path: Path) -> None:
             f"-o {path}: {suffix!r} is unknown; allowed: .gif or .mp4 for a film, .obj or .ply for "
             "numbered meshes, a folder for PLY meshes, .npz for arrays."
         )
-    if suffix == ".mp4" and not find_spec("imageio_ffmpeg"):
-        raise ParameterError(
-            f"-o {path}: MP4 needs imageio-ffmpeg; pip install 'cembench[video]', or write a .gif."
-        )
+    if suffix == ".mp4":
+        require(Extra.VIDEO, f"-o {path}: MP4, unlike GIF,")
     if suffix and not path.parent.is_dir():
         raise ParameterError(f"-o {path}: there is no folder {path.parent}. Make it first.")
     if not suffix and path.is_file():

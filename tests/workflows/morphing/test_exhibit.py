@@ -2,9 +2,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from cembench.drawing import preview
 from cembench.results.exhibits import read_exhibits
-from cembench.workflows.morphing import drawing
 from cembench.workflows.morphing.exhibit import IN_THE_FIGURES, lay_down
 from cembench.workflows.morphing.morph import morph
 from tests.workflows.morphing.reliefs import three
@@ -16,10 +14,8 @@ def found():
 
 
 @pytest.fixture
-def run(found, tmp_path, monkeypatch):
-    """What is laid down for a morph, drawn small and without starting pyvista."""
-    monkeypatch.setattr(drawing.sys, "executable", "/bin/false")
-    monkeypatch.setattr(preview.sys, "executable", "/bin/false")
+def run(found, tmp_path):
+    """What is laid down for a morph, drawn small."""
 
     def lay(rows):
         lay_down(tmp_path, found, found.metrics(24), "cembench morph", rows, sides=(48, 64))

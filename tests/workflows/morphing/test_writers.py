@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -5,10 +6,8 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from PIL import Image
 
-from cembench import ParameterError
-from cembench.core.errors import RecordError
+from cembench.core.errors import CembenchError, RecordError
 from cembench.mesh.files import read_mesh
-from cembench.workflows.morphing import writers
 from cembench.workflows.morphing.writers import (
     check_output,
     mesh_files,
@@ -120,12 +119,12 @@ def test_arrays_hold_every_frame(tmp_path):
 
 def test_places_that_cannot_be_are_refused_before_work(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
-    monkeypatch.setattr(writers, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     for path, message in (
         (tmp_path / "a.avi", "'.avi' is unknown; allowed: .gif or .mp4"),
         (tmp_path / "no" / "a.gif", "there is no folder"),
         (tmp_path / "file", "is a file, not a folder"),
         (tmp_path / "a.mp4", r"pip install 'cembench\[video\]'"),
     ):
-        with pytest.raises(ParameterError, match=message):
+        with pytest.raises(CembenchError, match=message):
             check_output(path)

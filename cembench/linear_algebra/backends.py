@@ -1,0 +1,22 @@
+"""Which libraries can factor here: looked up without loading one."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from typing import Literal, get_args
+
+Backend = Literal["cvxopt", "superlu", "pardiso"]
+_MODULES: dict[Backend, str] = {"cvxopt": "cvxopt", "superlu": "scipy", "pardiso": "pypardiso"}
+
+
+def available_backends() -> list[Backend]:
+    """Return the back ends whose libraries are installed."""
+    return [name for name in get_args(Backend) if find_spec(_MODULES[name])]
+
+
+def default_backend() -> Backend:
+    """Return the back end that is used unless one is named: cvxopt, superlu where it is missing.
+
+    cvxopt is under the GPL; whoever must do without it uninstalls it.
+    """
+    return "cvxopt" if "cvxopt" in available_backends() else "superlu"

@@ -1,0 +1,56 @@
+"""Make a disk of what is none: closed surfaces, and surfaces with handles."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from cembench.core.errors import MeshError
+from cembench.mesh.cut import Cut, cut_open
+from cembench.mesh.defects import located
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.workflows.surface_input import SurfaceInput, checked_surface
+
+
+def cut(surface: SurfaceInput, *, through: Sequence[int] = ()) -> Cut:
+    """Cut a surface open along short curves until it is a disk.
+
+    Parameters
+    ----------
+    surface : mesh, path, name or pair of arrays (V, F)
+        A connected surface, closed or with boundary loops, of any genus.
+    through : sequence of int
+        Vertices that the cut has to reach, counted from 0. A sphere without any is cut between
+        two points that lie far from each other.
+
+    Returns
+    -------
+    Cut
+        ``.mesh``, the disk, with the surface's triangles in their order; ``.origin``, int64 (k,),
+        the vertex of the surface that each vertex of the disk is a copy of; ``.edges`` and
+        ``.length`` of the cut.
+
+    Raises
+    ------
+    MeshError
+        The surface is damaged or not connected.
+    ParameterError
+        A vertex that the surface does not have, or two neighbours and nothing else on a sphere.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> V = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]]
+    >>> F = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    >>> octahedron = cembench.cut((V, F), through=[2, 5])
+    >>> octahedron.mesh.n, len(octahedron.mesh.boundary), len(octahedron.edges)
+    (7, 4, 2)
+
+    """
+    mesh = checked_surface(surface, (TriangleMesh,))
+    try:
+        return cut_open(mesh, through)
+    except MeshError as error:
+        path = Path(surface) if isinstance(surface, str | os.PathLike) else None
+        raise located(error, path) from None

@@ -1,0 +1,126 @@
+"""What `cembench morph` reads, maps and writes: surfaces with landmarks, checked maps, films."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import AlgorithmFailed, MeshError, ParameterError
+from cembench.mesh.files import read_mesh
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import Registry
+from cembench.running.local import Options, map_once
+from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
+from cembench.workflows.morphing import writers
+from cembench.workflows.morphing.drawing import Film, draw_film
+from cembench.workflows.morphing.morph import Morph
+
+#: Hears what is being done, in words.
+Tell = Callable[[str], object]
+
+
+def disk_with_landmarks(
+    registry: Registry, name: str, faces: int | None = None
+) -> tuple[DiskMesh, Mapping[str, int]]:
+    """Return the disk of a file or of a registered name, and its landmarks by name.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or the surface is not a disk.
+    ParameterError
+        Neither a file nor a registered name.
+
+    """
+    if Path(name).suffix or name not in registry.surfaces:
+        if not Path(name).suffix and not Path(name).exists():
+            raise ParameterError(
+                f"{name!r} is neither a mesh file nor a surface; surfaces: "
+                f"{', '.join(sorted(registry.surfaces))}."
+            )
+        return read_mesh(name), {}
+    mesh = generate_surface(registry, name, faces)
+    if not isinstance(mesh, DiskMesh):
+        raise MeshError(
+            f"{name} has {len(mesh.loops)} boundary loops; a morph needs topological disks, with "
+            "exactly one."
+        )
+    find = registry.surface(name).landmarks
+    return mesh, find(mesh) if find else {}
+
+
+def checked_maps(
+    registry: Registry,
+    meshes: Sequence[DiskMesh],
+    algorithm: str,
+    parameters: Mapping[str, Any],
+    plugins: Sequence[str],
+    timeout: float,
+    tell: Tell,
+) -> list[NDArray[np.complex128]]:
+    """Map each surface to the disk in a process of its own, and check the map.
+
+    Raises
+    ------
+    AlgorithmFailed
+        A surface without a valid map.
+    ParameterError
+        An algorithm whose target is not the disk.
+
+    """
+    chosen = registry.algorithm(algorithm)
+    if chosen.target != "disk":
+        able = ", ".join(a.name for a in registry.algorithms.values() if a.target == "disk")
+        raise ParameterError(
+            f"{algorithm} maps to the target {chosen.target!r}; a morph needs the disk: {able}."
+        )
+    maps = []
+    for mesh in meshes:
+        (task,) = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1), plugins)
+        tell(f"{chosen.title} on {mesh.name}")
+        record, uv = map_once(task, Options(timeout=timeout))
+        if record.outcome.status != "ok" or uv is None:
+            raise AlgorithmFailed(f"{mesh.name}: {record.outcome.status}: {record.outcome.cause}")
+        maps.append(uv)
+    return maps
+
+
+def write_path(
+    found: Morph, outputs: Sequence[Path], frames: int, tell: Tell = lambda words: None
+) -> None:
+    """Write the meshes or the arrays of a path to every place that is not a film."""
+    times, first = np.linspace(0, 1, frames), found.meshes[0]
+    for path in outputs:
+        if path.suffix.lower() in writers.ARRAYS and not path.is_dir():
+            writers.write_arrays(path, first, times, found.at)
+        else:
+            writers.write_meshes(path, first, times, found.at, _frame_of(frames, tell))
+
+
+def write_films(
+    found: Morph,
+    outputs: Sequence[Path],
+    frames: int,
+    views: Sequence[str],
+    size: int,
+    tell: Tell = lambda words: None,
+) -> None:
+    """Draw a path once and write it to every film."""
+    film = Film.of(found.meshes[0], found.stops, np.linspace(0, 1, frames), views, size)
+    pictures = draw_film(film, _frame_of(frames, tell))
+    for path in outputs:
+        writers.write_film(path, pictures)
+
+
+def _frame_of(frames: int, tell: Tell) -> Callable[[int], object]:
+    return lambda frame: tell(f"frame {frame + 1} of {frames}")
+
+
+def rows_of_paper(registry: Registry, surfaces: Sequence[str]) -> tuple[str, ...]:
+    """Which row of the paper's Table 1 each surface stands for; empty for one that does not."""
+    roles = paper_roles(registry, [name for name in surfaces if name in registry.surfaces])
+    return tuple(roles[name].paper_row if name in roles else "" for name in surfaces)

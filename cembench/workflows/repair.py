@@ -1,0 +1,128 @@
+"""Mend what is no clean surface: a file, or arrays, become oriented manifolds."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import MeshError
+from cembench.core.notices import Notice
+from cembench.mesh.defects import as_arrays, located
+from cembench.mesh.reading import read_soup
+from cembench.mesh.repair import Components
+from cembench.mesh.repair import repair as repair_arrays
+from cembench.mesh.soup import Soup
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.workflows.surface_input import SurfaceInput, pair_of_arrays
+
+#: What a mended surface can be, the most special first.
+_KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh, TriangleMesh)
+
+
+@dataclass(frozen=True)
+class Repair:
+    """What a repair came to.
+
+    Attributes
+    ----------
+    meshes : tuple of TriangleMesh
+        The surfaces, the one with most triangles first; each is a :class:`DiskMesh` or
+        :class:`HoledMesh` if it is one.
+    steps : mapping of str to int
+        How often each step was taken, by its name, in the order of the steps.
+    notices : tuple of Notice
+        What the file's reader changed or ignored.
+
+    """
+
+    meshes: tuple[TriangleMesh, ...]
+    steps: Mapping[str, int]
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The surface with most triangles."""
+        return self.meshes[0]
+
+
+def repair(
+    surface: SurfaceInput,
+    *,
+    weld: float = 0.0,
+    fill_holes: int = 0,
+    components: Components = "largest",
+) -> Repair:
+    """Mend a surface until it is an oriented manifold, and count every step.
+
+    Parameters
+    ----------
+    surface : path, pair of arrays (V, F), or mesh
+        V is (n, 3) and may hold NaN, F is (m, 3) and counts from 0.
+    weld : float
+        Vertices at most so far apart, in the surface's units, become one; 0 welds those that
+        coincide exactly.
+    fill_holes : int
+        Boundary loops of at most so many edges are filled, except the longest of a component.
+    components : "largest" or "all"
+        Which connected components are kept.
+
+    Returns
+    -------
+    Repair
+        ``.mesh``, the surface; ``.meshes``, of all components; ``.steps``, what was done.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or nothing is left of its surface.
+    ParameterError
+        A tolerance or a number of edges below 0, or `components` is neither word.
+
+    Examples
+    --------
+    A square of two triangles that do not share their vertices:
+
+    >>> import cembench
+    >>> V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> mended = cembench.repair((V, [[0, 1, 2], [3, 4, 5]]))
+    >>> mended.mesh.n, mended.steps["vertices_welded"]
+    (4, 2)
+    >>> type(mended.mesh).__name__
+    'DiskMesh'
+
+    """
+    path = Path(surface) if isinstance(surface, str | os.PathLike) else None
+    soup = _soup(surface)
+    try:
+        found = repair_arrays(
+            soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
+        )
+        meshes = [_mesh(V, F, soup.name) for V, F in found.surfaces]
+    except MeshError as error:
+        raise located(error, path) from None
+    return Repair(tuple(meshes), found.counts, soup.notices)
+
+
+def _soup(surface: SurfaceInput) -> Soup:
+    if isinstance(surface, str | os.PathLike):
+        return read_soup(surface)
+    if isinstance(surface, TriangleMesh):
+        V, F, name = surface.V, surface.F, surface.name
+    else:
+        (V, F), name = as_arrays(*pair_of_arrays(surface)), "mesh"
+    return Soup(V, F.ravel(), np.full(len(F), 3), name)
+
+
+def _mesh(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> TriangleMesh:
+    """Return the most special kind of surface that these arrays are."""
+    for kind in _KINDS[:-1]:
+        try:
+            return kind.from_arrays(V, F, name=name)
+        except MeshError:
+            continue
+    return _KINDS[-1].from_arrays(V, F, name=name)

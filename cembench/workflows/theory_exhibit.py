@@ -1,0 +1,99 @@
+"""Section 4 of the paper on a surface, as an exhibit of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import Algorithm
+from cembench.results.exhibits import (
+    Exhibit,
+    ExhibitPicture,
+    ExhibitTable,
+    exhibit_folder,
+    write_exhibit,
+)
+from cembench.workflows.theory import Check
+from cembench.workflows.theory_facts import LOOKS, theory_facts
+from cembench.workflows.theory_plot import write_theory_plot
+
+
+def examine_theory(
+    mesh: DiskMesh, rival: Algorithm | None, iterations: int, run: Path, command: str
+) -> Exhibit:
+    """Put Section 4 to the test on a surface and lay what was found into a run.
+
+    `rival` is the algorithm whose energy is shown beside, `command` what makes the exhibit again.
+    """
+    name = f"theory-{mesh.name}"
+    folder = exhibit_folder(run, name)  # complains now of what it could not write in the end
+    found = theory_facts(mesh, rival, iterations)
+    facts = dict(found.facts)
+    write_theory_plot(
+        folder / "theory.png",
+        f"{mesh.name}: {mesh.n:,} vertices, {facts['boundary_vertices']} on the boundary",
+        found.spectrum,
+        found.trajectories,
+        found.others,
+        facts["rate_predicted"],
+    )
+    exhibit = Exhibit(
+        name=name,
+        title=f"Section 4 on {mesh.name}",
+        text=_summary(facts) + (f" {found.missing}" if found.missing else ""),
+        command=command,
+        origin="surface",
+        pictures=(
+            ExhibitPicture(
+                file="theory.png",
+                caption="Spectrum of K, conformal energy and steps of the bare iterations.",
+                alternative=_summary(facts),
+            ),
+        ),
+        tables=_tables(found.premises, found.statements, facts["energies"]),
+        facts=facts,
+    )
+    write_exhibit(run, exhibit)
+    return exhibit
+
+
+def _summary(facts: dict[str, Any]) -> str:
+    broken = [check["name"] for check in facts["premises"] if not check["holds"]]
+    fails = [check["name"] for check in facts["statements"] if not check["holds"]]
+    count = len(facts["statements"])
+    words = "All premises hold." if not broken else f"Premises that fail: {'; '.join(broken)}."
+    words += (
+        f" All {count} statements hold."
+        if not fails
+        else f" Of {count} statements these fail: {'; '.join(fails)}; the others hold."
+    )
+    speed = (
+        f" The gap of K is {facts['gap']:.4g}; a step of (23) shrinks to {facts['rate_23']:.4f} of "
+        f"the one before (predicted {facts['rate_predicted']:.4f}), of (30) to "
+        f"{facts['rate_30']:.4f}."
+    )
+    return words + speed
+
+
+def _tables(
+    given: Sequence[Check], said: Sequence[Check], energies: list[dict[str, Any]]
+) -> tuple[ExhibitTable, ...]:
+
+    def of(title: str, checks: Sequence[Check]) -> ExhibitTable:
+        rows = tuple(
+            (c.name, c.source, "yes" if c.holds else "NO", c.figure, c.meaning) for c in checks
+        )
+        return ExhibitTable(
+            title=title, columns=("what", "where", "holds", "figure", "meaning"), rows=rows
+        )
+
+    columns = ("iteration", *(f"after {k}" for k in LOOKS), "last", "iterations")
+    keys = ("name", *(f"after_{k}" for k in LOOKS), "last", "iterations")
+    rows = tuple(tuple(row[key] for key in keys) for row in energies)
+    return (
+        of("Premises", given),
+        of("Statements", said),
+        ExhibitTable(title="Conformal energy E_C", columns=columns, rows=rows),
+    )

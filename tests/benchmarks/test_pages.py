@@ -1,0 +1,43 @@
+"""Tables in pages come from records: what stands there is what the kept report says."""
+
+import shutil
+
+import pytest
+
+from benchmarks import readme_speedups
+from benchmarks.pages import ROOT, filled, marks
+
+
+def test_readme_says_what_the_kept_report_says():
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert filled(readme, "readme_speedups", readme_speedups.table()) == readme
+
+
+def test_another_report_gives_another_table(tmp_path):
+    for file in readme_speedups.POLICIES.values():
+        shutil.copy(readme_speedups.TABLES / file, tmp_path)
+    averages = tmp_path / "averages.csv"
+    averages.write_text(averages.read_text().replace("15.944080083282037", "7.25"))
+    assert "| QIEM | 8.5 | 6.8 | 7.2 |" in readme_speedups.table(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("page", "maker"),
+    [
+        ("README.md", "readme_speedups"),
+        ("docs/surfaces.md", "surfaces_page"),
+        ("docs/algorithms.md", "cem_stopping_rules"),
+    ],
+)
+def test_only_what_is_between_the_marks_is_replaced(page, maker):
+    text = (ROOT / page).read_text(encoding="utf-8")
+    new = filled(text, maker, "another")
+    begin, end = marks(maker)
+    assert new.split(begin)[0] == text.split(begin)[0]
+    assert new.split(end)[1] == text.split(end)[1]
+    assert new.split(begin)[1].split(end)[0].strip() == "another"
+
+
+def test_a_page_without_marks_is_refused():
+    with pytest.raises(SystemExit, match="lacks the marks"):
+        filled("no marks", "readme_speedups", "")
