@@ -16,6 +16,7 @@ from cembench.registry import algorithm
     title="Angenent-Haker",
     target="free boundary",
     source="The CEM paper, Eqs. 11-15; Angenent, Haker et al. 1999; Haker et al. 2000",
+    usual=False,
 )
 def angenent_haker(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     """Where does the linear map with a pole in the middle put the boundary?

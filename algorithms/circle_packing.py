@@ -34,6 +34,7 @@ BISECTIONS = 200
     title="Circle packing",
     target="disk",
     source="Orick, Collins & Stephenson, A linearized circle packing algorithm, 2017",
+    usual=False,
 )
 def circle_packing(
     mesh: DiskMesh,

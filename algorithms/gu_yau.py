@@ -35,6 +35,7 @@ SHARE = 0.9
     title="Gu-Yau",
     target="disk",
     source="Gu & Yau, Global conformal surface parameterization, 2003; Gu et al. 2004",
+    usual=False,
 )
 def gu_yau(
     mesh: DiskMesh,

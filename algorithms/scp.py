@@ -40,6 +40,7 @@ SHIFT = 1e-11
     title="SCP",
     target="free boundary",
     source="Mullen, Tong, Alliez & Desbrun, Spectral conformal parameterization, 2008",
+    usual=False,
 )
 def scp(
     mesh: DiskMesh,

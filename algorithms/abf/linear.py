@@ -16,6 +16,7 @@ from .constraints import Angles, kept_positive, placed
     title="Linear ABF",
     target="free boundary",
     source="Zayer, Levy & Seidel, Linear angle based parameterization, 2007",
+    usual=False,
 )
 def abf_linear(mesh: DiskMesh) -> Parameterization:
     """Which angles of a flat triangulation are nearest to the surface's, to first order?

@@ -23,6 +23,7 @@ LEAST_CURVATURE = 0.3
     title="ABF++",
     target="free boundary",
     source="Sheffer, Levy, Mogilnitsky & Bogomyakov, ABF++, 2005",
+    usual=False,
 )
 def abf_plus_plus(
     mesh: DiskMesh,

@@ -32,6 +32,7 @@ CROWDED = 1e13
     title="BFF",
     target="disk",
     source="Sawhney & Crane, Boundary first flattening, 2017",
+    usual=False,
 )
 def bff(
     mesh: DiskMesh,

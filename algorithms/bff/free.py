@@ -30,6 +30,7 @@ def _no_digon(corners: int) -> int:
     title="BFF, free",
     target="free boundary",
     source="Sawhney & Crane, Boundary first flattening, 2017",
+    usual=False,
 )
 def bff_free(
     mesh: DiskMesh,

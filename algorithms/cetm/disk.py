@@ -36,6 +36,7 @@ TRIED = 4
     title="CETM",
     target="disk",
     source="Springborn, Schroeder & Pinkall, Conformal equivalence of triangle meshes, 2008",
+    usual=False,
 )
 def cetm(
     mesh: DiskMesh,

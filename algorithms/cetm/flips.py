@@ -37,6 +37,7 @@ Indices = NDArray[np.int64]
     title="CETM, flips",
     target="disk",
     source="Gu, Luo, Sun & Wu 2018; Gillespie, Springborn & Crane 2021; Campen et al. 2021",
+    usual=False,
 )
 def cetm_flips(
     mesh: DiskMesh,

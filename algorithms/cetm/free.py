@@ -24,6 +24,7 @@ from .flat_metric import flat_metric
     title="CETM, free",
     target="free boundary",
     source="Springborn, Schroeder & Pinkall, Conformal equivalence of triangle meshes, 2008",
+    usual=False,
 )
 def cetm_free(
     mesh: DiskMesh,
