@@ -38,13 +38,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("meshes", type=Path, help="folder of disks; `stress` in it is read too")
     parser.add_argument("--results", type=Path, help="JSON file to continue")
+    parser.add_argument("--most-faces", type=int, default=10**9, help="measure no larger ones")
     chosen = parser.parse_args()
     warnings.simplefilter("ignore")
     kept: dict[str, Any] = {}
     if chosen.results and chosen.results.is_file():
         kept = json.loads(chosen.results.read_text(encoding="utf-8"))
     known = [a for a in load_registry().algorithms.values() if a.mesh_type is DiskMesh]
-    for name, mesh in disks(chosen.meshes):
+    found = dict(disks(chosen.meshes))
+    for name, mesh in sorted(found.items(), key=lambda item: item[1].m):
+        if mesh.m > chosen.most_faces:
+            continue
         row = kept.setdefault(name, {"triangles": mesh.m, "maps": {}})
         for spec in known:
             if spec.name not in row["maps"]:
@@ -113,7 +117,7 @@ def cell(one: dict[str, Any], figure: str) -> str:
     """A figure, the number of folds of an invalid map, or a dash."""
     if one.get("status") == "ok":
         return f"{one[figure]:.4g}"
-    return f"{one['folds']} folds" if one.get("folds") else "–"
+    return f"{one['folds']} folds" if one.get("folds") else "-"
 
 
 if __name__ == "__main__":
