@@ -76,7 +76,7 @@ def qiem(
         V = double.on_both(mesh.V)
     z = balanced_planar_map(L_double, V, double.F)
     S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
-    z = harmonic_extension(L, mesh.boundary, _boundary_on_circle(mesh, S))
+    z = harmonic_extension(L, mesh.boundary, boundary_on_circle(mesh, S))
     z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
     return Parameterization(
         z,
@@ -163,7 +163,7 @@ def _centred(S: Real | None, mass: Real) -> Real | None:
         return None
 
 
-def _boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
+def boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
     """Turn the boundary's circle to a parallel, project it from the pole beyond it, scale."""
     loop = S[mesh.boundary]
     turn = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2].T

@@ -34,7 +34,7 @@ def main() -> None:
     arguments = parser.parse_args()
 
     registry = load_registry()
-    names = arguments.algorithms.split(",") if arguments.algorithms else list(registry.algorithms)
+    names = arguments.algorithms.split(",") if arguments.algorithms else registry.usual_algorithms
     chosen = [registry.algorithm(name) for name in names]
     if arguments.mesh:
         surface = read_mesh_for(arguments.mesh, chosen)

@@ -125,6 +125,7 @@ class Algorithm(_Registered):
     mesh_type: type[TriangleMesh] = DiskMesh
     source: str = ""
     steps: Steps | None = None
+    usual: bool = True
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,7 @@ def algorithm(
     source: str = "",
     notes: str = "",
     steps: Steps | None = None,
+    usual: bool = True,
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
 
@@ -163,6 +165,8 @@ def algorithm(
         What it is faithful to, and what it had to decide; default: the docstring's second part.
     steps : callable, optional
         Takes a mesh, `sweeps` and `outer`, and yields every :class:`MapStep` on the way to the map.
+    usual : bool
+        Whether a run in which no algorithms are named measures it.
 
     The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
     Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
@@ -201,6 +205,7 @@ def algorithm(
             mesh_type=mesh_type,
             source=source,
             steps=steps,
+            usual=usual,
             **_origin(place, function),
         )
         _set_mark(function, spec)
@@ -329,6 +334,11 @@ class Registry:
     algorithms: Mapping[str, Algorithm] = field(default_factory=dict)
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     datasets: Mapping[str, Dataset] = field(default_factory=dict)
+
+    @property
+    def usual_algorithms(self) -> list[str]:
+        """The names of the algorithms that are measured where none are named."""
+        return [name for name, spec in self.algorithms.items() if spec.usual]
 
     def algorithm(self, name: str) -> Algorithm:
         """The algorithm of this name; :class:`RegistryError` lists the known ones."""

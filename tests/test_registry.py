@@ -50,6 +50,24 @@ def test_the_built_in_ones_come_by_entry_points():
     assert registry.algorithm("cem").origin == "cembench.algorithms.cem:cem"
 
 
+def test_the_families_of_the_field_are_not_measured_unless_named():
+    """The default of a run, a profile and `reproduce`."""
+    registry = load_registry()
+    assert registry.usual_algorithms == [
+        "cem",
+        "direct-cem",
+        "direct-cem-holes",
+        "fdm",
+        "harmonic-circle",
+        "harmonic-filled",
+        "koebe-cem",
+        "ldm",
+        "lscm",
+        "qiem",
+    ]
+    assert not registry.algorithm("scp").usual
+
+
 def test_a_file_adds_its_algorithms_and_surfaces(plugin):
     registry = load_registry([plugin(GOOD)])
     mine = registry.algorithm("mine")

@@ -49,9 +49,9 @@ def surface(name: str, faces: int) -> TriangleMesh:
 
 
 def algorithm_names(mesh_type: type[TriangleMesh]) -> list[str]:
-    """The registered algorithms that take this kind of surface."""
+    """The usual algorithms that take this kind of surface."""
     found = load_registry().algorithms.values()
-    return sorted(a.name for a in found if issubclass(mesh_type, a.mesh_type))
+    return sorted(a.name for a in found if a.usual and issubclass(mesh_type, a.mesh_type))
 
 
 def mapping(algorithm: str, mesh: TriangleMesh) -> Callable[[], Any]:

@@ -355,7 +355,8 @@ def run(
         typer.Option(
             "-a",
             "--algorithms",
-            help="Comma-separated; default: all, and the paper's four for `--profile quick`.",
+            help="Comma-separated; default: the usual ones (see `cembench list`), and the "
+            "paper's four for `--profile quick`.",
         ),
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006
@@ -402,7 +403,7 @@ def run(
     policies = _policies(solves)
     options = Options(timeout, memory_bytes(memory), fresh, rerun_failed, seed)
     registry = registry_with(plugin)
-    usual = algorithms_of(profile, registry) if profile else list(registry.algorithms)
+    usual = algorithms_of(profile, registry) if profile else registry.usual_algorithms
     chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
     _check_reference(reference, chosen)
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
@@ -461,7 +462,7 @@ def reproduce(
     for name in names:
         with err.status(f"making {name}", spinner="line"):
             surfaces.append(generate_surface(registry, name))
-    chosen = list(registry.algorithms.values())
+    chosen = [registry.algorithm(name) for name in registry.usual_algorithms]
     standing = paper_roles(registry, names)
     tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), standing=standing)
     records = _measure(tasks, Store(output), options)
@@ -666,7 +667,7 @@ def _registry_as_json(
         }
 
     def about_algorithm(a: Algorithm) -> dict[str, Any]:
-        return about(a) | {"target": a.target, "takes": a.mesh_type.__name__}
+        return about(a) | {"target": a.target, "takes": a.mesh_type.__name__, "usual": a.usual}
 
     def about_surface(s: Surface) -> dict[str, Any]:
         known = facts.get(s.name)

@@ -32,6 +32,15 @@ def mean_curvature(mesh: TriangleMesh) -> NDArray[np.float64]:
     return _continued_to_boundary(mesh, H)
 
 
+def mixed_vertex_areas(mesh: TriangleMesh) -> NDArray[np.float64]:
+    """What part of the surface belongs to each vertex (n,)? Mixed Voronoi areas (Meyer et al.)."""
+    a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    shares = _mixed_areas(mesh.V, mesh.F, areas)
+    owned = np.bincount(mesh.F.ravel(), shares.ravel(), mesh.n)
+    return np.asarray(owned, dtype=np.float64)
+
+
 def _mixed_areas(
     V: NDArray[np.float64], F: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> NDArray[np.float64]:

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import edge_lengths
+from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
+#: Newton's steps to a gauge, at most, and how near to 0 the mean must come.
+GAUGE_STEPS, GAUGE_ACCURACY = 200, 1e-12
 #: What is centred: the outer boundary, by length; the middle triangle; the surface, by area.
 Gauge = Literal["boundary", "triangle", "area"]
 
@@ -32,6 +36,34 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         measure[:] = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
     return measure / measure.sum()
+
+
+def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
+    """Move a map to the unit disk by a Moebius map so that its mean comes to lie at 0.
+
+    uv is (n,), all of it in the closed disk; `measure` (n,) has sum 1. By Newton's method, the
+    steps cut to 0.5.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The mean stays away from 0: a single point has too much of the measure.
+
+    """
+    middle = complex(measure @ uv)
+    for _ in range(GAUGE_STEPS):
+        if abs(middle) < GAUGE_ACCURACY:
+            return uv
+        second = complex(measure @ (uv * uv))
+        # A small b moves the mean by -b + conj(b) times the mean of z^2.
+        bottom = 1 - abs(second) ** 2
+        b = (middle + second * middle.conjugate()) / bottom if bottom > 0 else middle
+        b *= min(1.0, 0.5 / abs(b))
+        uv = (uv - b) / (1 - b.conjugate() * uv)
+        middle = complex(measure @ uv)
+    raise AlgorithmFailed(
+        f"no Moebius map of the disk brings the gauge's mean to 0 (it stays at {abs(middle):.2g})"
+    )
 
 
 def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:

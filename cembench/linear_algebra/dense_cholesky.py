@@ -17,7 +17,7 @@ Real = NDArray[np.float64]
 
 
 class DenseCholesky:
-    """Solves systems with a small dense symmetric positive definite matrix.
+    """Solves systems with a small dense Hermitian positive definite matrix, real or complex.
 
     Raises
     ------
@@ -26,7 +26,7 @@ class DenseCholesky:
 
     """
 
-    def __init__(self, A: Real) -> None:
+    def __init__(self, A: NDArray[Any]) -> None:
         with phase("dense factorisation"):
             try:
                 self._C, _ = linalg.cho_factor(A, lower=True, check_finite=False)
@@ -38,6 +38,8 @@ class DenseCholesky:
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """A x = b, real or complex."""
         with phase("solves"):
+            if np.iscomplexobj(self._C):
+                return np.asarray(linalg.cho_solve((self._C, True), b, check_finite=False))
             return by_real_columns(self._solve, b)
 
     def _solve(self, B: Real) -> Real:

@@ -130,7 +130,7 @@ def benchmark(
     surfaces : iterable of meshes, paths, names or pairs of arrays (V, F)
         Surfaces that came as arrays are called ``surface-1``, ``surface-2``, ...
     algorithms : sequence of str, optional
-        Default: every algorithm that takes at least one of the surfaces.
+        Default: every usual algorithm that takes at least one of the surfaces.
     rounds : int
         Fresh processes for every cell; fewer than six give no interval.
     out : path, optional
@@ -168,7 +168,7 @@ def benchmark(
         raise ParameterError("no surface to measure on; give at least one.")
     if rounds < 1:
         raise ParameterError(f"rounds={rounds!r} is not allowed; it takes at least 1.")
-    chosen = [registry.algorithm(name) for name in algorithms or registry.algorithms]
+    chosen = [registry.algorithm(name) for name in algorithms or registry.usual_algorithms]
     kinds = list(dict.fromkeys(a.mesh_type for a in chosen))
     meshes: list[TriangleMesh] = []
     roles: dict[str, PaperRole] = {}

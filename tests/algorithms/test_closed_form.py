@@ -22,6 +22,11 @@ FINE = 128
 DISK = {name: spec for name, spec in load_registry().algorithms.items() if spec.target == "disk"}
 #: Prescribes its boundary, so it is conformal only where symmetry makes that the right one.
 NOT_CONFORMAL = {"harmonic-circle"}
+#: Other weights, or the graph of the mesh alone: no limit on curved surfaces is promised.
+NOT_HARMONIC = {"harmonic-tutte", "mean-value", "circle-packing"}
+#: Explicit steps: too slow to converge on fine meshes within its iterations.
+SLOW = {"gu-yau"}
+DISK = {name: spec for name, spec in DISK.items() if name not in NOT_HARMONIC | SLOW}
 CONFORMAL = sorted(set(DISK) - NOT_CONFORMAL)
 #: Its fixed point converges more slowly on finer meshes: what its 20 iterations leave undone grows.
 TO_THE_END = {"cem": {"max_iterations": 2000, "tolerance": 1e-12}}

@@ -40,6 +40,6 @@ def test_a_flat_surface_comes_out_as_it_is():
 
 
 def test_a_collapsed_image_is_a_failure(monkeypatch):
-    monkeypatch.setattr("cembench.algorithms.lscm.polygon_area", lambda loop: 0.0)
+    monkeypatch.setattr("cembench.conformal.free_boundary.polygon_area", lambda loop: 0.0)
     with pytest.raises(AlgorithmFailed, match="not positive: the map has collapsed"):
         lscm(hemi_ellipsoid(100))

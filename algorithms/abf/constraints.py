@@ -1,0 +1,172 @@
+"""What the angles of a flat triangulation must satisfy, and vertices from angles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.conformal.free_boundary import far_apart, pinned_map, with_area_pi
+from cembench.conformal.laplacian import laplacian_of_weights
+from cembench.conformal.metrics import corner_angles
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
+from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Angles:
+    """The constraints on the angles of a mesh, and the pattern of what is solved.
+
+    Angles are (m, 3) in radians, as the corners of `mesh.F`. Unknowns that are left when triangles
+    are eliminated: for every interior vertex a multiplier of its sum and one of its wheel.
+    """
+
+    def __init__(self, mesh: DiskMesh) -> None:
+        if not len(mesh.interior):
+            raise AlgorithmFailed("the mesh has no interior vertex, so its angles are free")
+        self.mesh = mesh
+        self.number = np.full(mesh.n, -1)
+        self.number[mesh.interior] = np.arange(len(mesh.interior))
+        self.k = len(mesh.interior)
+        self._cholesky: Cholesky | None = None
+        with phase("assembly"):
+            # Of each triangle the six rows: the sums at its corners, then the wheels.
+            self._rows = np.concatenate([self.number[mesh.F], self.number[mesh.F]], axis=1)
+            self._rows[:, 3:] += np.where(self._rows[:, 3:] >= 0, self.k, 0)
+            i = np.repeat(self._rows, 6, axis=1).ravel()
+            j = np.tile(self._rows, (1, 6)).ravel()
+            self._inside = (i >= 0) & (j >= 0)
+            size = 2 * self.k
+            keys = j[self._inside] * size + i[self._inside]
+            unique, self._place = np.unique(keys, return_inverse=True)
+            pointers = np.searchsorted(unique // size, np.arange(size + 1))
+            self._A = sparse.csc_array(
+                (np.zeros(len(unique)), unique % size, pointers), shape=(size, size)
+            )
+
+    @property
+    def wanted(self) -> Real:
+        """The surface's own angles, round every interior vertex scaled to 2 pi in sum."""
+        F = self.mesh.F
+        own = np.deg2rad(corner_angles(self.mesh.V, F))
+        share = np.ones(self.mesh.n)
+        inside = self.mesh.interior
+        share[inside] = 2 * np.pi / np.bincount(F.ravel(), own.ravel(), self.mesh.n)[inside]
+        return np.asarray(own * share[F])
+
+    def at_vertices(self, values: Real) -> Real:
+        """Sum values (m, 3) of corners at each interior vertex, (k,)."""
+        total = np.bincount(self.mesh.F.ravel(), values.ravel(), self.mesh.n)
+        return np.asarray(total[self.mesh.interior], dtype=np.float64)
+
+    def residuals(self, angles: Real) -> tuple[Real, Real, Real]:
+        """What is missing to each triangle's pi (m,), vertex's 2 pi (k,), wheel's 0 (k,)."""
+        log_sine = np.log(np.sin(angles))
+        # Seen from a corner, the sine of the next corner over that of the one before.
+        wheel = np.roll(log_sine, -1, axis=1) - np.roll(log_sine, 1, axis=1)
+        return (
+            np.pi - angles.sum(axis=1),
+            2 * np.pi - self.at_vertices(angles),
+            -self.at_vertices(wheel),
+        )
+
+    def told(self, angles: Real) -> dict[str, float]:
+        """The largest residual of each kind, as extras."""
+        names = ("triangle_residual", "vertex_residual", "wheel_residual")
+        found = zip(names, self.residuals(angles), strict=True)
+        return {name: float(np.abs(r).max()) for name, r in found}
+
+    def step(self, angles: Real, D: Real, gradient: Real) -> tuple[Real, Real]:
+        """One Newton step on the constraints, linear in the angles at `angles`.
+
+        Minimise e^T D^-1 e / 2 + gradient e over all e that meet the constraints to first order:
+        e = D (C^T y - gradient), with the triangles' multipliers eliminated first, as each has
+        three corners of its own; the rest is one symmetric positive definite system.
+
+        Returns
+        -------
+        e : float (m, 3)
+            The change of the angles.
+        y_w : float (k,)
+            Multipliers of the wheels.
+
+        Raises
+        ------
+        AlgorithmFailed
+            The constraints are dependent up to rounding.
+
+        """
+        triangle, vertex, wheel = self.residuals(angles)
+        with phase("assembly"):
+            cot = 1 / np.tan(angles)
+            # How the six rows of a triangle depend on its three angles, (m, 6, 3).
+            J = np.zeros((len(angles), 6, 3))
+            for c in range(3):
+                J[:, c, c] = 1.0
+                J[:, 3 + c, (c + 1) % 3] = cot[:, (c + 1) % 3]
+                J[:, 3 + c, (c + 2) % 3] = -cot[:, (c + 2) % 3]
+            JD = J * D[:, None, :]
+            to_triangle = JD.sum(axis=2)
+            total = D.sum(axis=1)
+            blocks = JD @ J.transpose(0, 2, 1)
+            blocks -= to_triangle[:, :, None] * (to_triangle / total[:, None])[:, None, :]
+            self._A.data[:] = np.bincount(
+                self._place, blocks.reshape(-1)[self._inside], len(self._A.data)
+            )
+            moved = D * gradient
+            free = triangle + moved.sum(axis=1)
+            b = np.concatenate([vertex, wheel])
+            b += self._sum(
+                np.einsum("trc,tc->tr", J, moved) - to_triangle * (free / total)[:, None]
+            )
+        try:
+            if self._cholesky is None:
+                self._cholesky = Cholesky(self._A)
+            else:
+                self._cholesky.update(self._A)
+        except NotPositiveDefinite as error:
+            thin = np.rad2deg(float(np.minimum(angles, np.pi - angles).min()))
+            raise AlgorithmFailed(
+                f"the angles' constraints cannot be told apart in doubles ({error}): the sharpest "
+                f"angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
+            ) from None
+        y = self._cholesky.solve(b)
+        with phase("assembly"):
+            own = np.where(self._rows >= 0, y[self._rows], 0.0)
+            y_t = (free - (to_triangle * own).sum(axis=1)) / total
+            e = D * (np.einsum("trc,tr->tc", J, own) + y_t[:, None]) - moved
+        return e, y[self.k :]
+
+    def _sum(self, values: Real) -> Real:
+        """Sum values (m, 6) of the triangles' rows over the rows, (2 k,)."""
+        there = self._rows >= 0
+        return np.bincount(self._rows[there], values[there], 2 * self.k).astype(np.float64)
+
+
+def kept_positive(angles: Real, e: Real) -> tuple[Real, float]:
+    """Take a step, or so much of it that every angle keeps a tenth of itself; and the share."""
+    with np.errstate(divide="ignore"):
+        room = np.where(e < 0, -0.9 * angles / e, np.inf).min()
+        upper = np.where(e > 0, 0.9 * (np.pi - angles) / e, np.inf).min()
+    share = float(min(1.0, room, upper))
+    return angles + share * e, share
+
+
+def placed(
+    mesh: DiskMesh, angles: Real, told: dict[str, Any], *, iterations: int = 0
+) -> Parameterization:
+    """Vertices from angles: least squares conformal, each triangle's shape that of its angles."""
+    with phase("assembly"):
+        # Shapes need angles that sum to pi, also where a step was cut.
+        weights = 0.5 / np.tan(angles * (np.pi / angles.sum(axis=1, keepdims=True)))
+        L = laplacian_of_weights(mesh.F, weights, mesh.n)
+    uv = pinned_map(L, mesh.boundary, far_apart(mesh))
+    uv, repair = with_area_pi(mesh, uv)
+    return Parameterization(uv, iterations, extras={**told, **repair})

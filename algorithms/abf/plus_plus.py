@@ -1,0 +1,69 @@
+"""Angle based flattening by Newton's method."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+from .constraints import Angles, kept_positive, placed
+
+#: The curvature of the Lagrangian that a corner keeps at least, as a share of that of its error.
+LEAST_CURVATURE = 0.3
+
+
+@algorithm(
+    "abf++",
+    title="ABF++",
+    target="free boundary",
+    source="Sheffer, Levy, Mogilnitsky & Bogomyakov, ABF++, 2005",
+    usual=False,
+)
+def abf_plus_plus(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-8,
+    max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 50,
+) -> Parameterization:
+    """Which angles of a flat triangulation are nearest to the surface's?
+
+    Minimise the sum of (angle - wanted)^2 / wanted^2, subject to the sums of triangles, pi, and of
+    interior vertices, 2 pi, and to the wheels round interior vertices, by Newton's method on the
+    Lagrangian. Its Hessian is diagonal: it and the triangles are eliminated, and each step is one
+    symmetric solve with two unknowns an interior vertex, of one analysed pattern. The vertices are
+    then placed by least squares, as in abf-linear.
+
+    Decided here: wheels are taken as logarithms, which leaves their second derivatives diagonal;
+    of these only so much is kept that every entry stays above 0.3 of the error's own; a step is
+    cut where an angle would fall below a tenth of itself. It ends when all constraints, radians and
+    logarithms, are within `tolerance` (`triangle_residual`, `vertex_residual`, `wheel_residual`)
+    and the last step changed no angle by more than 1e-4 of itself, and fails after
+    `max_iterations`. Folds inside are mended as in LSCM (`fold_repairs`).
+    """
+    problem = Angles(mesh)
+    wanted = problem.wanted
+    angles, weight = wanted.copy(), 1 / wanted**2
+    y_w = np.zeros(problem.k)
+    number = problem.number[mesh.F]
+    for iteration in range(1, max_iterations + 1):
+        at = np.where(number >= 0, y_w[number], 0.0)
+        # A corner is next to one corner of its triangle and before the other.
+        bent = (np.roll(at, 1, axis=1) - np.roll(at, -1, axis=1)) / np.sin(angles) ** 2
+        curvature = np.maximum(weight + bent, LEAST_CURVATURE * weight)
+        e, y_w = problem.step(angles, 1 / curvature, weight * (angles - wanted))
+        angles, share = kept_positive(angles, e)
+        told = problem.told(angles)
+        moved = float(np.abs(share * e / angles).max())
+        if share == 1 and max(told.values()) <= tolerance and moved <= 1e-4:
+            return placed(mesh, angles, told, iterations=iteration)
+    raise AlgorithmFailed(
+        f"the angles have not converged after {max_iterations} Newton steps: the constraints are "
+        f"still off by up to {max(told.values()):.2g}, tolerance {tolerance:g}, and the last step "
+        f"changed an angle by {moved:.2g} of itself. Allow more with max_iterations"
+    )

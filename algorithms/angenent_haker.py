@@ -1,0 +1,41 @@
+"""The linear map with a pole: what CEM starts from, with its natural boundary."""
+
+from __future__ import annotations
+
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.boundary_iteration import pole_start
+from cembench.conformal.free_boundary import with_area_pi
+from cembench.conformal.laplacian import laplacian
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+
+@algorithm(
+    "angenent-haker",
+    title="Angenent-Haker",
+    target="free boundary",
+    source="The CEM paper, Eqs. 11-15; Angenent, Haker et al. 1999; Haker et al. 2000",
+    usual=False,
+)
+def angenent_haker(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
+    """Where does the linear map with a pole in the middle put the boundary?
+
+    Eqs. 11-14 and 18: L f = b with a dipole in the triangle nearest to the mean vertex and nothing
+    prescribed on the boundary, whose image is therefore natural, nearly a circle (Eq. 12). This is
+    what CEM starts from, before it puts the boundary on the unit circle (16) and iterates; what
+    these add can be read off beside it.
+
+    Decided here: f takes the surface to the outside of the curve, with folded triangles at the
+    pole, and is far from conformal round it, so it is no map to measure. As in CEM's own start, the
+    boundary alone is kept, mirrored so that it runs counter-clockwise, its mean moved to 0 (15),
+    and the interior is one Dirichlet solve out of the same factor. The image is scaled to area pi;
+    folds inside are mended as in LSCM (`fold_repairs`).
+    """
+    L = laplacian(mesh, delaunay=delaunay)
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    f_b = pole_start(mesh.V, mesh.F, bordered.solved_boundary)
+    f_b = f_b - f_b.mean()
+    uv = bordered.in_order(bordered.dirichlet(f_b), f_b)
+    uv, repair = with_area_pi(mesh, uv)
+    return Parameterization(uv, extras=repair)

@@ -1,0 +1,1 @@
+"""Boundary first flattening: to the disk, and with a free boundary."""

@@ -1,0 +1,101 @@
+"""Boundary first flattening to the unit disk."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.conformal.boundary_energy import in_gauge
+from cembench.conformal.circle_domain import CircleDomain
+from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.folds import without_folds
+from cembench.conformal.gauge import Gauge, gauge_measure
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+from .yamabe import YamabeBoundary
+
+Real = NDArray[np.float64]
+
+#: Boundary lengths may differ by this factor; beyond it the boundary counts as crowded.
+CROWDED = 1e13
+
+
+@algorithm(
+    "bff",
+    title="BFF",
+    target="disk",
+    source="Sawhney & Crane, Boundary first flattening, 2017",
+    usual=False,
+)
+def bff(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-3,
+    max_sweeps: Annotated[int, Field(ge=1, le=1_000_000)] = 100,
+    gauge: Gauge = "boundary",
+    delaunay: bool = False,
+) -> Parameterization:
+    """Map to the disk by a boundary whose exterior angles are in proportion to its lengths.
+
+    The exterior angles k~ of a flat image and the log scale u of its boundary depend on each other
+    linearly, k~ = k - L_bi L_ii^-1 Omega + S u with S the Schur complement of the Laplacian.
+    A circle has k~_i = 2 pi (l~_i-1 + l~_i) / (2 sum l~): from u = 0 on, u and the lengths
+    l~_ij = l_ij exp((u_i + u_j) / 2) are found from each other in turn, on the boundary alone. One
+    factorisation, interior first, serves all sweeps and the Dirichlet solve at the end.
+
+    Decided here: after each sweep the vertices are put on the circle with arcs in proportion to l~,
+    which have just those exterior angles, and a Moebius map brings them into the `gauge` of
+    direct-cem: sweeps alone drift through Moebius images and do not end. They end when no arc
+    changes by more than the share `tolerance` (`sweeps`, `change`), or with a failure after
+    `max_sweeps`; each takes about half of the error away. The interior is the harmonic extension
+    of both coordinates. `gauss_bonnet` is how far the natural k~ (u = 0) are from 2 pi in sum.
+    Folds are repaired as in CEM (`fold_repairs`).
+    """
+    yamabe = YamabeBoundary(mesh, delaunay=delaunay)
+    measure = gauge_measure(mesh, gauge, mesh.boundary)
+    weights = yamabe.bordered.swept_to_boundary(measure[:, None])[:, 0]
+    with phase("boundary sweeps"):
+        domain, sweeps, change = _circular(yamabe, weights, tolerance, max_sweeps)
+    uv = yamabe.bordered.harmonic_extension(domain.points)
+    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, yamabe.L, uv))
+    told = {
+        "sweeps": sweeps,
+        "change": change,
+        "gauss_bonnet": abs(float(yamabe.natural.sum()) - 2 * np.pi),
+    }
+    return Parameterization(uv, extras={**told, **repair})
+
+
+def _turns(lengths: Real) -> Real:
+    """Exterior angles of the polygon on a circle with these arcs, in radians."""
+    return np.asarray(np.pi * (lengths + np.roll(lengths, 1)) / lengths.sum())
+
+
+def _circular(
+    yamabe: YamabeBoundary, weights: Real, tolerance: float, most: int
+) -> tuple[CircleDomain, int, float]:
+    """The circle's arcs that go with exterior angles in proportion; the sweeps, the last change."""
+    domain = in_gauge(CircleDomain.of_arcs(yamabe.lengths), weights)
+    for sweep in range(1, most + 1):
+        u = yamabe.scale(_turns(domain.arcs))
+        if not np.ptp(u) <= np.log(CROWDED):
+            raise AlgorithmFailed(
+                f"the boundary is too crowded: in sweep {sweep} its scale differs by a factor of "
+                f"exp({np.ptp(u):.3g}) between its vertices, beyond what numbers can hold. "
+                "direct-cem keeps its vertices apart"
+            )
+        before, domain = domain, in_gauge(CircleDomain.of_arcs(yamabe.scaled(u)), weights)
+        change = float(np.abs(np.log(domain.arcs / before.arcs)).max())
+        if change <= tolerance:
+            return domain, sweep, change
+    raise AlgorithmFailed(
+        f"the boundary's arcs have not converged after {most} sweeps: the last one changed one "
+        f"by the factor exp({change:.2g}), tolerance {tolerance:g}. Allow more with max_sweeps"
+    )

@@ -1,0 +1,71 @@
+"""Boundary first flattening with a free boundary, or to a polygon."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, Field
+
+from cembench.conformal.boundary_curve import closed_curve
+from cembench.conformal.free_boundary import with_area_pi
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+from .yamabe import YamabeBoundary
+
+Real = NDArray[np.float64]
+
+
+def _no_digon(corners: int) -> int:
+    if corners in (1, 2):
+        raise ValueError("a polygon has at least 3 corners; 0 leaves the boundary free")
+    return corners
+
+
+@algorithm(
+    "bff-free",
+    title="BFF, free",
+    target="free boundary",
+    source="Sawhney & Crane, Boundary first flattening, 2017",
+    usual=False,
+)
+def bff_free(
+    mesh: DiskMesh,
+    *,
+    corners: Annotated[int, Field(ge=0, le=1_000), AfterValidator(_no_digon)] = 0,
+    delaunay: bool = False,
+) -> Parameterization:
+    """Flatten with the boundary at its own scale, or to a polygon.
+
+    By default u = 0 on the boundary, the automatic flattening of the paper: the exterior angles
+    k - L_bi L_ii^-1 Omega follow, and the boundary keeps its lengths, so that areas change least
+    there. With `corners` the boundary turns by 2 pi / corners at so many vertices, at even
+    distances along it, and nowhere else; u follows up to its mean, and with it the sides.
+
+    Decided here: the curve is closed by the least change of its lengths (`closing` is the largest
+    share), the interior is the harmonic extension of both coordinates from the one factorisation,
+    and the image is scaled to area pi. `gauss_bonnet` is how far the exterior angles are from 2 pi
+    in sum. A boundary that crosses itself stays as it is; the harness tells. Folds inside are
+    mended as in LSCM (`fold_repairs`).
+    """
+    yamabe = YamabeBoundary(mesh, delaunay=delaunay)
+    turns, lengths = yamabe.natural, yamabe.lengths
+    if corners:
+        turns = _corners(yamabe.lengths, corners)
+        lengths = yamabe.scaled(yamabe.scale(turns))
+    z, closing = closed_curve(lengths, turns)
+    uv, repair = with_area_pi(mesh, yamabe.bordered.harmonic_extension(z))
+    told = {"closing": closing, "gauss_bonnet": abs(float(turns.sum()) - 2 * np.pi)}
+    return Parameterization(uv, extras={**told, **repair})
+
+
+def _corners(lengths: Real, corners: int) -> Real:
+    """Exterior angles (B,) of a polygon with corners at even distances from the longest edge on."""
+    first = int(np.argmax(lengths))
+    along = np.cumsum(np.roll(lengths, -first)) / lengths.sum()
+    at = np.searchsorted(along, np.arange(corners) / corners, side="right")
+    turns = np.bincount(at % len(lengths), minlength=len(lengths)) * (2 * np.pi / corners)
+    return np.roll(turns, first)

@@ -1,0 +1,56 @@
+"""The linear relation between how a boundary is scaled and how it turns."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.gauss_bonnet import vertex_curvatures
+from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.laplacian import laplacian
+from cembench.core.clock import phase
+from cembench.mesh.triangle_mesh import DiskMesh
+
+Real = NDArray[np.float64]
+
+
+class YamabeBoundary:
+    """L u = (-Omega; k~ - k), the interior eliminated, for a flat image (Sawhney & Crane, Eq. 14).
+
+    Parameters
+    ----------
+    mesh : DiskMesh
+        The surface.
+    delaunay : bool
+        Whether the weights are those of the intrinsic Delaunay triangulation.
+
+    Attributes
+    ----------
+    L : sparse (n, n)
+        The Laplacian, and as `bordered` with the boundary last.
+    lengths : float (B,)
+        From each boundary vertex to the next on the surface.
+    natural : float (B,)
+        Exterior angles k~ in radians where the boundary keeps its scale, u = 0; 2 pi in sum.
+
+    """
+
+    def __init__(self, mesh: DiskMesh, *, delaunay: bool) -> None:
+        self.L = laplacian(mesh, delaunay=delaunay)
+        self.bordered = BorderedLaplacian(mesh, self.L, (mesh.boundary,))
+        self._S = self.bordered.dirichlet_to_neumann()
+        with phase("boundary"):
+            curvature = vertex_curvatures(mesh)
+            self.lengths = edge_lengths(mesh, mesh.boundary)
+        # k - L_bi L_ii^-1 Omega is the curvature swept to the boundary.
+        swept = self.bordered.swept_to_boundary(curvature[:, None] / curvature.sum())
+        self.natural: Real = 2 * np.pi * swept[:, 0]
+
+    def scale(self, turns: Real) -> Real:
+        """Which log scale u (B,), 0 in the mean, has a boundary with these exterior angles (B,)?"""
+        return np.asarray(self._S.inverse(turns - self.natural))
+
+    def scaled(self, u: Real) -> Real:
+        """The boundary's lengths (B,) where vertices are scaled by exp(u)."""
+        return np.asarray(self.lengths * np.exp((u + np.roll(u, -1)) / 2))

@@ -1,0 +1,156 @@
+"""The flat metric that is discretely conformally equivalent to a surface, by Newton's method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.discrete_metric import (
+    BlockPattern,
+    angle_sums,
+    angles,
+    half_cotangents_of,
+    scaled,
+)
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.linear_algebra.cholesky import Cholesky
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Indices = NDArray[np.int64]
+
+#: A step is taken when the energy's slope at its end is at most this share of that at its start,
+#: upward: the energy is convex, so its least value on the way lies near the end or beyond.
+UPHILL = 0.5
+#: How often a step is shortened.
+SHORTER = 40
+
+
+@dataclass(frozen=True)
+class FlatMetric:
+    """What Newton's method found.
+
+    Parameters
+    ----------
+    u : float (n,)
+        Log scale at each vertex.
+    lengths : float (m, 3)
+        Scaled, opposite to each corner.
+    angles : float (m, 3)
+        In radians.
+    residual : float
+        The largest distance of an angle sum from what it should be, in radians.
+    history : tuple of float
+        The residual at the start and after each step.
+    factorisations : int
+        How often the Hessian was factored; its pattern was analysed once.
+
+    """
+
+    u: Real
+    lengths: Real
+    angles: Real
+    residual: float
+    history: tuple[float, ...]
+    factorisations: int
+    pattern: BlockPattern
+    cholesky: Cholesky
+
+    def laid_out(self, F: Indices, fixed: NDArray[np.bool_], z: Complex) -> Complex:
+        """The flat surface in the plane: one solve with the analysed pattern.
+
+        `fixed` (n,) tells the vertices, those whose u was held among them, that are where z (n,)
+        says; other values of z are not looked at.
+        """
+        with phase("assembly"):
+            weights = half_cotangents_of(self.angles, np.zeros(len(F), dtype=bool))
+            A, right = self.pattern.dirichlet(weights, fixed, z)
+        self.cholesky.update(A)
+        out = z.copy()
+        out[self.pattern.kept] = self.cholesky.solve(right)
+        return out
+
+
+def flat_metric(
+    F: Indices,
+    lengths: Real,
+    u: Real,
+    held: Indices,
+    flat: Real,
+    *,
+    tolerance: float,
+    max_iterations: int,
+) -> FlatMetric:
+    """Scale vertices so that the angle sums are `flat` (n,) at all but the `held` ones.
+
+    Newton's method on the convex energy of Springborn, Schroeder & Pinkall 2008: its gradient is
+    what is missing to each angle sum, its Hessian the cotangent Laplacian of the scaled lengths.
+    `u` is the start, and what the held vertices (k,) keep.
+
+    Raises
+    ------
+    AlgorithmFailed
+        No vertex is free; the residual is above `tolerance` after `max_iterations`; or triangles
+        are broken at the minimum, so that the triangulation has no such metric.
+
+    """
+    n = len(u)
+    kept = np.ones(n, dtype=bool)
+    kept[held] = False
+    if not kept.any():
+        raise AlgorithmFailed("the scale of every vertex is held: the mesh has no interior vertex")
+    with phase("assembly"):
+        pattern = BlockPattern(F, kept)
+    cholesky: Cholesky | None = None
+    u = u.copy()
+    with phase("angles"):
+        here, broken = angles(scaled(lengths, F, u))
+        gradient = (flat - angle_sums(F, here, n))[kept]
+    history = [float(np.abs(gradient).max(initial=0.0))]
+    while history[-1] > tolerance and len(history) <= max_iterations:
+        with phase("assembly"):
+            A = pattern.block(half_cotangents_of(here, broken))
+        if cholesky is None:
+            cholesky = Cholesky(A)
+        else:
+            cholesky.update(A)
+        step = np.zeros(n)
+        step[kept] = -cholesky.solve(gradient)
+        with phase("angles"):
+            slope = float(gradient @ step[kept])
+            share = 1.0
+            for _ in range(SHORTER):
+                there, lost = angles(scaled(lengths, F, u + share * step))
+                missing = (flat - angle_sums(F, there, n))[kept]
+                if float(missing @ step[kept]) <= -UPHILL * slope:
+                    break
+                share /= 2
+        u, here, broken, gradient = u + share * step, there, lost, missing
+        history.append(float(np.abs(gradient).max()))
+    if cholesky is not None:
+        # Once more with the last factor: what is nearly at rounding gets there for nothing.
+        step = np.zeros(n)
+        step[kept] = -cholesky.solve(gradient)
+        there, lost = angles(scaled(lengths, F, u + step))
+        off = float(np.abs((flat - angle_sums(F, there, n))[kept]).max(initial=0.0))
+        if off < history[-1]:
+            u, here, broken, history[-1] = u + step, there, lost, off
+    told = f"the angle sums are still off by up to {history[-1]:.2g} rad, tolerance {tolerance:g}"
+    if broken.any():
+        raise AlgorithmFailed(
+            f"{int(broken.sum())} of {len(F)} triangles cannot keep the triangle inequality: this "
+            "triangulation has no flat metric that is discretely conformally equivalent to its "
+            "own. cetm-flips changes the triangulation where it must"
+        )
+    if history[-1] > tolerance:
+        raise AlgorithmFailed(
+            f"{told}, after {len(history) - 1} Newton steps. Allow more with max_iterations"
+        )
+    if cholesky is None:  # flat as it is
+        cholesky = Cholesky(pattern.block(half_cotangents_of(here, broken)))
+    return FlatMetric(
+        u, scaled(lengths, F, u), here, history[-1], tuple(history), len(history), pattern, cholesky
+    )

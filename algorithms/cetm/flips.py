@@ -1,0 +1,216 @@
+"""Conformal equivalence with flips, to the disk: it ends on every surface."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.conformal.bordered import BorderedLaplacian
+from cembench.conformal.discrete_metric import angle_sums, angles, half_cotangents_of
+from cembench.conformal.doubling import doubled
+from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.folds import without_folds
+from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
+from cembench.conformal.laplacian import laplacian, laplacian_of_weights
+from cembench.conformal.planar import folded_triangles
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.intrinsic import Triangulation
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+from .flat_metric import SHORTER, UPHILL
+from .triangle_map import K, disk_of_triangle
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Indices = NDArray[np.int64]
+
+
+@algorithm(
+    "cetm-flips",
+    title="CETM, flips",
+    target="disk",
+    source="Gu, Luo, Sun & Wu 2018; Gillespie, Springborn & Crane 2021; Campen et al. 2021",
+    usual=False,
+)
+def cetm_flips(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-9,
+    max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 200,
+    gauge: Gauge = "boundary",
+) -> Parameterization:
+    """Map to the disk by scaling edges, the triangulation kept Delaunay by flips on the way.
+
+    The surface is glued to its mirror copy and its intrinsic Delaunay triangulation taken.
+    Vertices are scaled by Newton's method on the convex energy of cetm; whenever an edge stops
+    being Delaunay it is flipped and takes the length of Ptolemy's rule, which keeps the hyperbolic
+    metric that all discretely equivalent triangulations share. So no triangle ever breaks, and a
+    flat metric with any angle sums below 2 pi at some vertices exists (discrete uniformisation).
+
+    Decided here: three boundary vertices take the angle pi / 3 and all others are flat, so that the
+    surface becomes an equilateral triangle, with no unknown and nothing at infinity; Dixon's
+    elliptic function takes it to the disk in closed form. They divide the boundary in three by
+    harmonic measure from the middle triangle. The map is discretely conformal to the triangle and
+    smoothly conformal from there, `curvature` is the largest distance of an angle sum from what it
+    should be (radians), `flips` counts flips, `layout` is by how much edges differ from their
+    lengths, relative, as laid out triangle by triangle. The images of vertices are the map; the
+    surface's own triangles, between straight edges, are other ones than the flipped: those of them
+    that fold are told (`folds_of_own_triangles`), and repaired as in CEM (`fold_repairs`).
+    """
+    b = mesh.boundary
+    L = laplacian(mesh)
+    cones = _cones(mesh, BorderedLaplacian(mesh, laplacian(mesh, delaunay=True), (b,)))
+    double = doubled(mesh)
+    with phase("flips"):
+        T = Triangulation.doubled(mesh.F, mesh.V, double.mirror)
+        T.make_delaunay(np.zeros(double.size), flat=True)
+    u, residual, iterations = _flattened(T, double.size, cones, tolerance, max_iterations)
+    with phase("layout"):
+        z, off = _laid_out(T, u, cones, mesh.n)
+        uv = disk_of_triangle(z)
+    if not np.isfinite(uv).all():
+        raise AlgorithmFailed("a vertex came to lie on the wrong side of the boundary")
+    uv[b] /= np.abs(uv[b])
+    uv /= np.maximum(np.abs(uv), 1.0)
+    uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
+    uv[b] /= np.abs(uv[b])
+    folds = len(folded_triangles(uv, mesh.F))
+    try:
+        uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
+    except AlgorithmFailed as error:  # the map is told as it is
+        repair = {"fold_repairs": 0, "no_repair": str(error)}
+    told = {
+        "curvature": residual,
+        "flips": T.flips,
+        "layout": off,
+        "folds_of_own_triangles": folds,
+        "corners": cones.tolist(),
+    }
+    return Parameterization(uv, iterations, extras={**told, **repair})
+
+
+def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:
+    """Three boundary vertices in order, a third of the boundary apart as the middle sees it."""
+    b = mesh.boundary
+    seen = bordered.swept_to_boundary(gauge_measure(mesh, "triangle", b)[:, None])[:, 0]
+    first = int(np.argmax(np.linalg.norm(mesh.V[b] - mesh.V.mean(axis=0), axis=1)))
+    along = np.cumsum(np.roll(np.maximum(seen, 0), -first))
+    at = np.searchsorted(along / along[-1], [0.0, 1 / 3, 2 / 3])
+    if len(np.unique(at % len(b))) < 3:
+        at = np.arange(3) * len(b) // 3
+    return b[(first + at) % len(b)]
+
+
+def _sides(T: Triangulation, u: Real) -> Real:
+    """Lengths (m, 3) opposite to each corner, each triangle's longest 1."""
+    log_length = T.scaled(u).reshape(-1, 3)
+    log_length = log_length - log_length.max(axis=1, keepdims=True)
+    return np.exp(np.roll(log_length, -1, axis=1))
+
+
+def _flattened(
+    T: Triangulation, n: int, cones: Indices, tolerance: float, most: int
+) -> tuple[Real, float, int]:
+    """Scale u (n,), the triangulation being flipped with it; the residual; the Newton steps."""
+    flat = np.full(n, 2 * np.pi)
+    flat[cones] = 2 * np.pi / 3
+    u = np.zeros(n)
+    free = np.arange(n) != cones[0]
+
+    def missing(u: Real) -> tuple[Real, Real, NDArray[np.bool_]]:
+        with phase("flips"):
+            T.make_delaunay(u)
+        with phase("angles"):
+            here, broken = angles(_sides(T, u))
+            return flat - angle_sums(T.F, here, n), here, broken
+
+    gradient, here, broken = missing(u)
+    best = float(np.abs(gradient).max())
+    for iteration in range(most):
+        if best <= tolerance:
+            return u, best, iteration
+        with phase("assembly"):
+            H = laplacian_of_weights(T.F, half_cotangents_of(here, broken), n)
+            H = H[free][:, free]
+        step = np.zeros(n)
+        step[free] = -Cholesky(H).solve(gradient[free])
+        slope, share = float(gradient @ step), 1.0
+        for _ in range(SHORTER):
+            there, now, lost = missing(u + share * step)
+            if float(there @ step) <= -UPHILL * slope:
+                break
+            share /= 2
+        u, gradient, here, broken = u + share * step, there, now, lost
+        best = float(np.abs(gradient).max())
+    raise AlgorithmFailed(
+        f"the angle sums are still off by up to {best:.2g} rad after {most} Newton steps, "
+        f"tolerance {tolerance:g}. Allow more with max_iterations"
+    )
+
+
+def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Complex, float]:
+    """Where the surface's vertices (n,) lie in the plane of the triangle of `disk_of_triangle`.
+
+    Triangles are unfolded in turn from the largest one on; a vertex beyond an edge of the
+    equilateral triangle lies in one of its mirror images, whose corners are those of a lattice.
+    """
+    log_length = T.scaled(u)
+    sides = np.exp(log_length - log_length.max()).reshape(-1, 3)
+    corner, _ = angles(_sides(T, u))
+    P = np.full(T.F.shape, np.nan + 0j)
+    root = int(np.argmax(sides.min(axis=1)))
+    P[root] = [0, sides[root, 0], sides[root, 2] * np.exp(1j * corner[root, 0])]
+    reached = np.zeros(len(T.F), dtype=bool)
+    reached[root] = True
+    front = np.array([root])
+    while len(front):
+        h = (3 * front[:, None] + np.arange(3)).ravel()
+        g = T.twin[h]
+        new = ~reached[g // 3]
+        h, g = h[new], g[new]
+        front, first = np.unique(g // 3, return_index=True)
+        h, g = h[first], g[first]
+        t, c, s, d = h // 3, h % 3, g // 3, g % 3
+        p, q = P[t, c], P[t, (c + 1) % 3]
+        direction = (p - q) / np.maximum(np.abs(p - q), np.finfo(float).tiny)
+        P[s, d], P[s, (d + 1) % 3] = q, p
+        P[s, (d + 2) % 3] = q + direction * sides[s, (d + 2) % 3] * np.exp(1j * corner[s, d])
+        reached[front] = True
+    off = np.abs(np.abs(np.roll(P, -1, axis=1) - P) / sides - 1)
+    to_disk = _to_corners(T, P, cones)
+    z = np.empty(u.shape, dtype=np.complex128)
+    z[T.F.ravel()] = to_disk[0] * (P.ravel() - to_disk[1])
+    return z[:n], float(off[np.isfinite(off)].max())
+
+
+def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, complex]:
+    """Factor and centre that take an image of the equilateral triangle to the standard one.
+
+    Two corners that are a side apart determine it: the surface lies on the left of the way from
+    one to the next.
+    """
+    images = [np.unique(np.round(P[np.int64(v) == T.F], 13)) for v in cones]
+    area = np.abs(np.imag(np.conj(P[:, 1] - P[:, 0]) * (P[:, 2] - P[:, 0]))).sum() / 4
+    side = np.sqrt(area * 4 / np.sqrt(3))
+    found: list[tuple[float, int, complex, complex]] = []
+    for k in range(3):
+        one, other = images[k], images[(k + 1) % 3]
+        off = np.abs(np.abs(other - one[:, None]) / side - 1)
+        i, j = np.unravel_index(int(np.argmin(off)), off.shape)
+        found.append((float(off[i, j]), k, complex(one[i]), complex(other[j])))
+    off, k, here, there = min(found, key=lambda one: one[0])
+    if not off < 1e-3:
+        raise AlgorithmFailed(
+            f"the flat surface is no equilateral triangle as laid out (off by {off:.2g}): its "
+            "places differ by more than doubles can hold"
+        )
+    third = here + (there - here) * np.exp(1j * np.pi / 3)
+    centre = (here + there + third) / 3
+    return K / ((here, third, there)[k] - centre), centre

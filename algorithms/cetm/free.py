@@ -1,0 +1,81 @@
+"""Conformal equivalence of triangle meshes with a free boundary."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.conformal.boundary_curve import closed_curve
+from cembench.conformal.discrete_metric import angle_sums, length_cross_ratios, side_lengths
+from cembench.conformal.free_boundary import with_area_pi
+from cembench.conformal.harmonic import edge_lengths
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+from .flat_metric import flat_metric
+
+
+@algorithm(
+    "cetm-free",
+    title="CETM, free",
+    target="free boundary",
+    source="Springborn, Schroeder & Pinkall, Conformal equivalence of triangle meshes, 2008",
+    usual=False,
+)
+def cetm_free(
+    mesh: DiskMesh,
+    *,
+    tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-10,
+    max_iterations: Annotated[int, Field(ge=0, le=10_000)] = 50,
+) -> Parameterization:
+    """Flatten by scaling edges at their vertices, the boundary keeping its lengths.
+
+    Lengths l~_ij = l_ij exp((u_i + u_j) / 2) with u = 0 on the boundary, such that the angles round
+    every interior vertex sum to 2 pi: the minimum of a convex energy, by Newton's method with one
+    analysed pattern (`factorisations`). The length cross ratios of the map are those of the surface
+    (`cross_ratios` is the largest change of their logarithms).
+
+    Decided here: a step is halved while the energy rises steeply at its end; it ends when all angle
+    sums are within `tolerance` (`curvature`, radians), and fails where triangles break the triangle
+    inequality, as flips are not made. The boundary is laid out by its lengths and angles (`closing`
+    is the share by which a length changed to close it), the interior by one solve in the flat
+    metric, and the image scaled to area pi. Folds inside are mended as in LSCM (`fold_repairs`),
+    after which cross ratios are no longer kept.
+    """
+    b = mesh.boundary
+    lengths = side_lengths(mesh.V, mesh.F)
+    flat = np.full(mesh.n, 2 * np.pi)
+    found = flat_metric(
+        mesh.F,
+        lengths,
+        np.zeros(mesh.n),
+        b,
+        flat,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+    )
+    turns = np.pi - angle_sums(mesh.F, found.angles, mesh.n)[b]
+    z = np.zeros(mesh.n, dtype=np.complex128)
+    z[b], closing = closed_curve(edge_lengths(mesh, b), turns)
+    fixed = np.zeros(mesh.n, dtype=bool)
+    fixed[b] = True
+    uv = found.laid_out(mesh.F, fixed, z)
+    uv, repair = with_area_pi(mesh, uv)
+    told = {
+        "curvature": found.residual,
+        "factorisations": found.factorisations,
+        "closing": closing,
+        "cross_ratios": cross_ratio_change(mesh, uv),
+    }
+    return Parameterization(uv, len(found.history) - 1, extras={**told, **repair})
+
+
+def cross_ratio_change(mesh: DiskMesh, uv: NDArray[np.complex128]) -> float:
+    """By how much does the logarithm of a length cross ratio change, at most?"""
+    plane = np.stack([uv.real, uv.imag], axis=1)
+    before, after = (length_cross_ratios(mesh.F, side_lengths(V, mesh.F)) for V in (mesh.V, plane))
+    return float(np.abs(after - before).max(initial=0.0))

@@ -1,0 +1,75 @@
+"""Floater's map: convex combinations with mean value coordinates."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import linalg
+
+from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.folds import interior_without_folds
+from cembench.conformal.harmonic import arc_length_circle
+from cembench.conformal.laplacian import corner_products
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import algorithm
+
+Real = NDArray[np.float64]
+
+
+@algorithm(
+    "mean-value",
+    title="Mean value",
+    target="disk",
+    source="Floater, Mean value coordinates, 2003; the CEM paper, Remark 5",
+    usual=False,
+)
+def mean_value(mesh: DiskMesh) -> Parameterization:
+    """What do weights give that know the geometry and are always positive?
+
+    As harmonic-circle, with the weight (tan(a / 2) + tan(b / 2)) / |ij| from i to j, a and b the
+    angles at i beside that edge. They are positive, so that nothing folds but triangles whose
+    corners all lie on the boundary, and exact on flat surfaces; they are not symmetric, so this is
+    no minimum of an energy. The boundary keeps its arc length.
+
+    Decided here: the matrix is not symmetric, so that the shared Cholesky class cannot factor it;
+    it is factored by SuperLU with an ordering for symmetric patterns. Folds are mended as in LSCM
+    (`fold_repairs`).
+    """
+    if not len(mesh.interior):
+        raise AlgorithmFailed("the mesh has no interior vertex, so the map has no freedom")
+    i, b = mesh.interior, mesh.boundary
+    with phase("laplacian"):
+        W = _weights(mesh)
+    with phase("assembly"):
+        rows = W[i]
+        A = sparse.csc_array(sparse.diags_array(rows.sum(axis=1)) - rows[:, i])
+        z = np.zeros(mesh.n, dtype=np.complex128)
+        z[b] = arc_length_circle(mesh)
+        right = rows[:, b] @ z[b]
+    with phase("factorisation"):
+        factor = linalg.splu(
+            A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    with phase("solves"):
+        z[i] = factor.solve(right.real) + 1j * factor.solve(right.imag)
+    z, repair = accepted_repair(mesh, z, interior_without_folds(mesh, z))
+    return Parameterization(z, extras=repair)
+
+
+def _weights(mesh: DiskMesh) -> sparse.csr_array:
+    """The mean value weight from i to j, (n, n)."""
+    F = mesh.F
+    dots, double_area = corner_products(mesh.V, F)
+    after, before = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
+    to_after = np.linalg.norm(mesh.V[after] - mesh.V[F], axis=2)
+    to_before = np.linalg.norm(mesh.V[before] - mesh.V[F], axis=2)
+    # tan(a / 2) = sin a / (1 + cos a), both multiplied by the lengths of the sides.
+    tangent = double_area[:, None] / (to_after * to_before + dots)
+    i = np.concatenate([F.ravel(), F.ravel()])
+    j = np.concatenate([after.ravel(), before.ravel()])
+    w = np.concatenate([(tangent / to_after).ravel(), (tangent / to_before).ravel()])
+    return sparse.csr_array(sparse.coo_array((w, (i, j)), shape=(mesh.n, mesh.n)))

@@ -1,0 +1,151 @@
+"""Discrete metrics: edge lengths of triangles, scaled at vertices (discrete conformal equivalence).
+
+Lengths are kept by triangle, ``lengths[t, c]`` opposite to the corner ``F[t, c]``. A vertex that is
+scaled by u multiplies each of its edges by exp(u / 2).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.mesh.gluing import edges_of_half_edges
+
+Real = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Half the cotangent that a triangle counts with whose lengths make none: 60 degrees.
+REGULAR = 0.5 / np.sqrt(3)
+
+
+def side_lengths(V: Real, F: Indices) -> Real:
+    """How long is the side opposite to each corner? Shape (m, 3)."""
+    return np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
+
+
+def scaled(lengths: Real, F: Indices, u: Real) -> Real:
+    """Lengths (m, 3) with vertices scaled by u (n,): l exp((u_i + u_j) / 2)."""
+    corners = u[F]
+    return np.asarray(lengths * np.exp((corners.sum(axis=1, keepdims=True) - corners) / 2))
+
+
+def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
+    """Angles (m, 3) in radians, and which triangles are broken (m,).
+
+    Where one side is as long as both others, the angle opposite to it is pi and the others are 0:
+    so the energy whose gradient they are stays convex (Springborn et al. 2008, Sec. 3).
+    """
+    a, b, c = lengths.T
+    # Twice what is missing to each side: the three factors of Heron's formula.
+    spare = np.stack([b + c - a, c + a - b, a + b - c], axis=1)
+    broken = np.asarray((spare <= 0).any(axis=1))
+    spare[broken] = 1.0
+    whole = spare.sum(axis=1)
+    root = np.sqrt(spare.prod(axis=1) / whole)
+    found = 2 * np.arctan2(root[:, None], spare)
+    found[broken] = np.where(
+        lengths[broken] == lengths[broken].max(axis=1, keepdims=True), np.pi, 0.0
+    )
+    return found, broken
+
+
+def half_cotangents_of(angles: Real, broken: NDArray[np.bool_]) -> Real:
+    """Half the cotangent of each angle (m, 3); of broken triangles that of 60 degrees."""
+    with np.errstate(divide="ignore"):
+        weights = 0.5 / np.tan(angles)
+    weights[broken] = REGULAR
+    return weights
+
+
+def angle_sums(F: Indices, angles: Real, n: int) -> Real:
+    """The sum of the angles (m, 3) at each vertex, (n,)."""
+    return np.bincount(F.ravel(), weights=angles.ravel(), minlength=n).astype(np.float64)
+
+
+def length_cross_ratios(F: Indices, lengths: Real) -> Real:
+    """Logarithms (e,) of the length cross ratio of every interior edge, in an order of its own.
+
+    For the edge ij with triangles ijk and jil it is l_ik l_jl / (l_kj l_li). Two metrics on the
+    same triangles are discretely conformally equivalent where these agree.
+    """
+    _, edge, faces = edges_of_half_edges(F)
+    side = np.log(lengths)
+    # Half-edge c of a triangle runs from corner c to the next; beside it lie, from its start on
+    # counter-clockwise, the sides opposite to the next corner and to corner c.
+    ratio = (np.roll(side, -1, axis=1) - side).ravel()
+    total = np.bincount(edge, weights=ratio, minlength=len(faces))
+    return np.asarray(total[faces == 2])
+
+
+class BlockPattern:
+    """Laplacians of changing weights on the same triangles, restricted to some vertices.
+
+    Each has the same stored entries, zeros included, so that one analysis serves all.
+
+    Parameters
+    ----------
+    F : int64 (m, 3)
+        The triangles.
+    kept : bool (n,)
+        Which vertices have a row and a column.
+
+    """
+
+    def __init__(self, F: Indices, kept: NDArray[np.bool_]) -> None:
+        ends, self._edge, _ = edges_of_half_edges(F)
+        self._ends, self.kept, self._n = ends, kept, len(kept)
+        number = np.cumsum(kept) - 1
+        self._inside = np.flatnonzero(kept[ends].all(axis=1))
+        i, j = number[ends[self._inside]].T
+        size = int(kept.sum())
+        diagonal = np.arange(size)
+        rows, columns = np.concatenate([i, j, diagonal]), np.concatenate([j, i, diagonal])
+        entry = np.arange(1, len(rows) + 1)
+        self._A = sparse.csc_array(sparse.coo_array((entry, (rows, columns)), shape=(size, size)))
+        self._A.sort_indices()
+        self._entry = self._A.data - 1
+        self._A = self._A.astype(np.float64)
+
+    def weights_of_edges(self, weights: Real) -> Real:
+        """Sum weights (m, 3), for the edge opposite to each corner, over each edge; (e,)."""
+        # The side opposite to corner c is half-edge c + 1.
+        return np.bincount(
+            self._edge, weights=np.roll(weights, 1, axis=1).ravel(), minlength=len(self._ends)
+        ).astype(np.float64)
+
+    def block(self, weights: Real) -> sparse.csc_array:
+        """The rows and columns of the kept vertices of the Laplacian with weights (m, 3)."""
+        w = self.weights_of_edges(weights)
+        return self._filled(-w[self._inside], self._degrees(w))
+
+    def dirichlet(
+        self, weights: Real, fixed: NDArray[np.bool_], f: NDArray[np.complex128]
+    ) -> tuple[sparse.csc_array, NDArray[np.complex128]]:
+        """A and b of A x = b for the harmonic map that is f (n,) at the fixed vertices (n,).
+
+        All that are not kept are fixed; kept ones that are get the equation x = f, in the same
+        pattern.
+        """
+        w = self.weights_of_edges(weights)
+        free = ~fixed & self.kept
+        known = np.where(free, 0, f)
+        i, j = self._ends.T
+        right = np.zeros(self._n, dtype=np.complex128)
+        for here, there in ((i, j), (j, i)):
+            given = w * known[there]
+            right += np.bincount(here, given.real, self._n) + 1j * np.bincount(
+                here, given.imag, self._n
+            )
+        right[~free] = f[~free]
+        open_ = free[self._ends[self._inside]].all(axis=1)
+        inside = np.where(open_, -w[self._inside], 0.0)
+        return self._filled(inside, np.where(free, self._degrees(w), 1.0)), right[self.kept]
+
+    def _degrees(self, w: Real) -> Real:
+        return np.bincount(self._ends.ravel(), np.repeat(w, 2), self._n).astype(np.float64)
+
+    def _filled(self, inside: Real, diagonal: Real) -> sparse.csc_array:
+        values = np.concatenate([inside, inside, diagonal[self.kept]])
+        self._A.data[:] = values[self._entry]
+        return self._A.copy()

@@ -1,0 +1,79 @@
+"""What maps with a free boundary share: the energy as a form, two pins, the scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.folds import interior_without_folds
+from cembench.conformal.planar import polygon_area
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import DiskMesh
+
+Complex = NDArray[np.complex128]
+
+
+def conformal_energy_form(L: sparse.csc_array, b: NDArray[np.int64]) -> sparse.csc_array:
+    """Q with E_C = x^T Q x / 2 for x = (u, v): diag(L, L) less the Hessian of the area (Eq. 8)."""
+    after = np.roll(b, -1)
+    half = np.full(len(b), 0.5)
+    D = sparse.coo_array((np.r_[half, -half], (np.r_[b, after], np.r_[after, b])), shape=L.shape)
+    return sparse.block_array([[L, -D], [D, L]], format="csc")
+
+
+def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
+    """The boundary vertex farthest from the mean vertex, and the one farthest from that; (2,)."""
+    loop = mesh.V[mesh.boundary]
+    first = int(np.argmax(np.linalg.norm(loop - mesh.V.mean(axis=0), axis=1)))
+    second = int(np.argmax(np.linalg.norm(loop - loop[first], axis=1)))
+    return mesh.boundary[[first, second]]
+
+
+def pinned_map(L: sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np.int64]) -> Complex:
+    """Which map (n,) has the least E_C with two vertices `pins` (2,) at -1 and 1?
+
+    L (n, n) is the Laplacian, b the boundary loop.
+    """
+    n = L.shape[0]
+    with phase("assembly"):
+        Q = sparse.csr_array(conformal_energy_form(L, b))
+        fixed = np.concatenate([pins, pins + n])
+        free = np.delete(np.arange(2 * n), fixed)
+        x = np.zeros(2 * n)
+        x[fixed] = [-1.0, 1.0, 0.0, 0.0]
+        rows = Q[free]
+        Q_ff, Q_fp = rows[:, free], rows[:, fixed]
+    x[free] = Cholesky(Q_ff).solve(-(Q_fp @ x[fixed]))
+    return x[:n] + 1j * x[n:]
+
+
+def with_area_pi(mesh: DiskMesh, uv: Complex) -> tuple[Complex, dict[str, Any]]:
+    """Scale a map so that its boundary encloses pi, as a disk does, and repair folds inside.
+
+    Returns
+    -------
+    uv : complex (n,)
+        The map.
+    extras : dict
+        What :func:`cembench.conformal.fold_repair.accepted_repair` tells.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The boundary encloses no positive area.
+
+    """
+    area = polygon_area(uv[mesh.boundary])
+    if not area > 0:
+        raise AlgorithmFailed(
+            f"the image of the boundary encloses an area of {area:.3g}, which is not positive: "
+            "the map has collapsed or crosses itself. A disk map, such as direct-cem, cannot"
+        )
+    uv = uv * np.sqrt(np.pi / area)
+    return accepted_repair(mesh, uv, interior_without_folds(mesh, uv))

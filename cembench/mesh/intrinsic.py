@@ -1,0 +1,158 @@
+"""Triangulations whose edges are flipped without moving a vertex: glued triangles with lengths.
+
+Half-edge ``h = 3 t + c`` is the side of triangle t from its corner c to the next. Two triangles may
+share several edges, and an edge may be a loop: nothing is known by its end points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import AlgorithmFailed
+from cembench.mesh.gluing import edges_of_half_edges, paired_half_edges
+
+Real = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: An edge is flipped where the cosines opposite to it sum to less than this.
+SURELY = -1e-10
+#: Rounds of flips of edges that share no triangle.
+MOST_ROUNDS = 20_000
+
+
+@dataclass
+class Triangulation:
+    """Triangles, glued along half-edges, with the logarithm of each one's length.
+
+    Parameters
+    ----------
+    F : int64 (m, 3)
+        The corners' vertices.
+    twin : int64 (3 m,)
+        The half-edge on the other side of each; there is no boundary.
+    log_length : float (3 m,)
+        Alike for twins.
+    flips : int
+        How many there were.
+
+    """
+
+    F: Indices
+    twin: Indices
+    log_length: Real
+    flips: int = 0
+
+    @classmethod
+    def doubled(cls, F: Indices, V: Real, mirror: Indices) -> Triangulation:
+        """Both copies of a surface with boundary: its own triangles, then the mirrored ones.
+
+        `mirror` (n,) gives each vertex's copy, a boundary vertex being its own.
+        """
+        m = len(F)
+        _, edge, faces = edges_of_half_edges(F)
+        twin = np.full(3 * m, -1)
+        left, right = paired_half_edges(edge, faces).T
+        twin[left], twin[right] = right, left
+        h = np.arange(3 * m)
+        t, c = h // 3, h % 3
+        copy = 3 * (m + t) + 2 - (c + 1) % 3
+        both = np.empty(6 * m, dtype=np.int64)
+        inside = twin >= 0
+        both[h] = np.where(inside, twin, copy)
+        both[copy] = np.where(inside, copy[twin], h)
+        length = np.linalg.norm(V[np.roll(F, -1, axis=1)] - V[F], axis=2).ravel()
+        log_length = np.empty(6 * m)
+        log_length[h] = log_length[copy] = np.log(length)
+        return cls(np.concatenate([F, mirror[F][:, ::-1]]), both, log_length)
+
+    def scaled(self, u: Real) -> Real:
+        """Logarithms of the lengths with vertices scaled by exp(u); of each half-edge (3 m,)."""
+        following = np.roll(self.F, -1, axis=1)
+        return np.asarray(self.log_length + (u[self.F] + u[following]).ravel() / 2)
+
+    def make_delaunay(self, u: Real, *, flat: bool = False) -> None:
+        """Flip edges until all are Delaunay where vertices are scaled by u (n,).
+
+        With `flat` the triangles are Euclidean, and a flipped edge has the distance of its ends in
+        them (u is 0); otherwise it has the length that Ptolemy's rule gives, the hyperbolic metric
+        with cusps being kept, for which scaling does not matter.
+
+        Raises
+        ------
+        AlgorithmFailed
+            Flips do not come to an end.
+
+        """
+        candidates = np.flatnonzero(np.arange(len(self.twin)) < self.twin)
+        for _ in range(MOST_ROUNDS):
+            h = candidates
+            h = h[h // 3 != self.twin[h] // 3]
+            cosines = self._cosine(h, u) + self._cosine(self.twin[h], u)
+            bad = h[cosines < SURELY]
+            if not len(bad):
+                return
+            bad = bad[np.argsort(cosines[cosines < SURELY], kind="stable")]
+            chosen = self._apart(bad)
+            touched = self._flip(chosen, flat=flat)
+            rest = np.setdiff1d(bad, chosen, assume_unique=True)
+            around = (3 * touched[:, None] + np.arange(3)).ravel()
+            candidates = np.unique(np.concatenate([self._moved[rest], around]))
+            candidates = np.unique(np.minimum(candidates, self.twin[candidates]))
+        raise AlgorithmFailed(f"edges are still being flipped after {MOST_ROUNDS} rounds")
+
+    def _cosine(self, h: Indices, u: Real) -> Real:
+        """The cosine of the angle opposite to half-edges, as if their triangles were flat."""
+        t, c = h // 3, h % 3
+        corner = u[self.F[t]]
+        own = self.log_length.reshape(-1, 3)[t] + (corner + np.roll(corner, -1, axis=1)) / 2
+        k = np.arange(len(h))
+        e, a, b = (own[k, (c + d) % 3] for d in range(3))
+        with np.errstate(over="ignore"):
+            return np.asarray((np.exp(a - b) + np.exp(b - a) - np.exp(2 * e - a - b)) / 2)
+
+    def _apart(self, edges: Indices) -> Indices:
+        """Edges no two of which share a triangle, the first of them first."""
+        rank = np.arange(len(edges))
+        first = np.full(len(self.F), len(edges))
+        sides = edges // 3, self.twin[edges] // 3
+        for side in sides:
+            np.minimum.at(first, side, rank)
+        return edges[(first[sides[0]] == rank) & (first[sides[1]] == rank)]
+
+    def _flip(self, h: Indices, *, flat: bool) -> Indices:
+        """Flip edges that share no triangle; the triangles that changed."""
+        g = self.twin[h]
+        t, s = h // 3, g // 3
+        n1, n2 = (3 * t + (h + d) % 3 for d in (1, 2))
+        m1, m2 = (3 * s + (g + d) % 3 for d in (1, 2))
+        flat_F = self.F.ravel()
+        i, j, k, ell = flat_F[h], flat_F[g], flat_F[n2], flat_F[m2]
+        lam = self.log_length
+        e = lam[h]
+        if flat:
+            new = _across(*(np.exp(lam[x] - e) for x in (n2, n1, m1, m2))) + e
+        else:
+            new = np.logaddexp(lam[n2] + lam[m2], lam[n1] + lam[m1]) - e
+        moved = np.arange(len(self.twin))
+        for old, now in ((n2, 3 * t), (m1, 3 * t + 1), (h, 3 * t + 2)):
+            moved[old] = now
+        for old, now in ((m2, 3 * s), (n1, 3 * s + 1), (g, 3 * s + 2)):
+            moved[old] = now
+        twin, lengths = np.empty_like(self.twin), np.empty_like(lam)
+        twin[moved], lengths[moved] = moved[self.twin], lam
+        lengths[3 * t + 2] = lengths[3 * s + 2] = new
+        self.F[t] = np.stack([k, i, ell], axis=1)
+        self.F[s] = np.stack([ell, j, k], axis=1)
+        self.twin, self.log_length, self._moved = twin, lengths, moved
+        self.flips += len(h)
+        return np.concatenate([t, s])
+
+
+def _across(ki: Real, jk: Real, il: Real, lj: Real) -> Real:
+    """The logarithm of the distance from k to l across the edge ij of length 1, k on its left."""
+    x, z = (1 + ki**2 - jk**2) / 2, (1 + il**2 - lj**2) / 2
+    y, w = np.sqrt(np.maximum(ki**2 - x**2, 0)), np.sqrt(np.maximum(il**2 - z**2, 0))
+    return np.asarray(np.log(np.hypot(x - z, y + w)))

@@ -1,0 +1,34 @@
+from itertools import pairwise
+
+import pytest
+from cembench.algorithms.gu_yau import gu_yau
+from cembench.algorithms.qiem import qiem
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+from cembench import AlgorithmFailed, DiskMesh
+from cembench.conformal.metrics import all_metrics
+from tests import gallery
+
+
+def test_the_energy_falls_towards_that_of_implicit_steps():
+    mesh = hemi_ellipsoid(300, x=1.5)
+    found = gu_yau(mesh, tolerance=0, max_iterations=3000)
+    history = found.energy_history
+    assert all(after <= before for before, after in pairwise(history))
+    limit = qiem(mesh, tolerance=1e-9).energy_history[-1]
+    assert history[-1] == pytest.approx(limit, rel=0.01)
+    assert history[0] > 1.02 * limit
+
+
+def test_it_says_that_it_was_stopped():
+    mesh = hemi_ellipsoid(300, x=1.5)
+    found = gu_yau(mesh, max_iterations=5)
+    assert found.extras["stopped"] == "iterations"
+    assert found.iterations == 5
+    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+    assert gu_yau(mesh, tolerance=1e-3).extras["stopped"] == "energy"
+
+
+def test_it_needs_an_interior():
+    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
+        gu_yau(DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6)))

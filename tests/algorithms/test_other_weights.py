@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+from cembench.algorithms.harmonic_tutte import harmonic_tutte
+from cembench.algorithms.mean_value import mean_value
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+from cembench import AlgorithmFailed, DiskMesh
+from cembench.conformal.harmonic import arc_length_circle
+from cembench.conformal.metrics import all_metrics
+from cembench.mesh.topology import vertex_graph
+from tests import gallery
+from tests.hard_surfaces import hard_surface
+
+
+def test_tutte_puts_every_vertex_in_the_middle_of_its_neighbours():
+    mesh = hemi_ellipsoid(600)
+    z = harmonic_tutte(mesh).uv
+    graph = vertex_graph(mesh.F, mesh.n).astype(bool).astype(float)
+    mean = (graph @ z) / graph.sum(axis=1)
+    assert abs(mean - z)[mesh.interior].max() < 1e-12
+
+
+def test_mean_values_give_a_flat_disk_as_it_is():
+    """They are linearly precise: with its own circle as the boundary, nothing moves."""
+    mesh = flat_disk(600)
+    z = mean_value(mesh).uv
+    turn = arc_length_circle(mesh)[0] / (mesh.V[mesh.boundary[0]] @ [1, 1j, 0])
+    assert abs(z - turn * (mesh.V @ [1, 1j, 0])).max() < 1e-12
+
+
+@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("f", [harmonic_tutte, mean_value])
+def test_positive_weights_do_not_fold(f, seed):
+    mesh = hard_surface(seed)
+    found = f(mesh)
+    if found.extras["fold_repairs"]:  # only triangles with all corners on the boundary do
+        on = np.isin(mesh.F, mesh.boundary).all(axis=1)
+        assert found.extras["before_repair"]["flipped_triangles"] <= on.sum()
+    else:
+        assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+
+
+def test_mean_values_need_an_interior():
+    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
+        mean_value(DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6)))
