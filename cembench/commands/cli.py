@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -53,9 +53,11 @@ from cembench.commands.options import (
 from cembench.core.errors import MeshError, ParameterError
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
+from cembench.workflows.places import Place
 
 if TYPE_CHECKING:
     from cembench.commands.progress import PlainProgress
+    from cembench.core.notices import Notice
     from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Algorithm, Registry, Surface
     from cembench.report.surface_facts import SurfaceFacts
@@ -63,6 +65,7 @@ if TYPE_CHECKING:
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import Task
+    from cembench.workflows.map_files import Wishes
 
 app = typer.Typer(
     cls=Verbs,
@@ -205,9 +208,33 @@ def map_(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Surface with UVs: OBJ or PLY. Of several surfaces: a folder."
+            "-o",
+            "--output",
+            help="Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. Of several surfaces: a folder, or "
+            "a file with all of them.",
         ),
     ] = None,
+    place: Annotated[
+        Place, typer.Option("--uv", help="UVs in the unit square, or as the map is (a disk).")
+    ] = Place.unit,
+    checker: Annotated[
+        bool, typer.Option("--checker", help="Add a checkerboard texture; GLB has it always.")
+    ] = False,
+    bake: Annotated[
+        Path | None,
+        typer.Option(help="A texture made for the OBJ's own UVs: paint it anew for these."),
+    ] = None,
+    samples: Annotated[
+        Path | None,
+        typer.Option("--geometry-image", help="Sample the surface on a grid: NPY, EXR or PNG."),
+    ] = None,
+    remeshed: Annotated[
+        Path | None,
+        typer.Option("--remesh", help="Mesh the surface anew through the map, into this file."),
+    ] = None,
+    side: Annotated[
+        int, typer.Option(min=4, max=8192, help="Samples along a side, for the two above.")
+    ] = 129,
     preview: Annotated[
         bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
     ] = False,
@@ -238,9 +265,10 @@ def map_(
 ) -> None:
     """Map surfaces, check the maps, and write them.
 
-    The UVs are the map itself (the unit disk for target "disk"), as the shortest decimals that read
-    back as the same numbers. An OBJ file keeps what else it has: groups, materials, normals,
-    colours, polygons. Of a surface that is --cut, the uncut one is written, with a UV per corner.
+    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
+    hold all digits; PLY and GLB single precision. An OBJ file keeps what else it has: groups,
+    materials, normals, colours, polygons. Of a surface that is --cut, the uncut one is written,
+    with a UV per corner. Several surfaces in one file share the square, each in its own part.
     """
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.drawing.own_pictures import check_replaceable
@@ -248,22 +276,27 @@ def map_(
     from cembench.results.record_rows import row
     from cembench.running.local import Options, map_once
     from cembench.running.plan import MeasurementSettings, paper_role_of_file, plan_cells
-    from cembench.running.surface_file import read_surface_file, write_map
+    from cembench.running.surface_file import read_surface_file
+    from cembench.workflows import map_files
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     registry = registry_with(plugin)
     candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
     if cut:
         _check_takes_disks(candidates)
-    outputs = _outputs(meshes, output, cut=cut)
+    outputs = _outputs(meshes, output)
+    wishes = map_files.Wishes(place, checker, bake)
+    extra = _Extra(samples, remeshed, side, place)
+    _check_extras(meshes, outputs, wishes, extra)
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
     sources = [fetched.get(path, path) for path in meshes]
-    targets = [target for target in outputs if target is not None]
-    for target in targets:
-        refuse_inputs(target, sources, force=force)
-    if output not in outputs:
-        refuse_present(targets, force=force)
+    targets = list(dict.fromkeys(target for target in outputs if target is not None))
+    others = [path for target in targets for path in map_files.beside(target, wishes)]
+    for target in (*targets, *others, *extra.files):
+        refuse_inputs(target, [*sources, *([bake] if bake else [])], force=force)
+    refuse_present(others if output in outputs else [*targets, *others], force=force)
+    together = len(meshes) > 1 and output in outputs
     found = []
     for source in sources:
         with err.status(f"reading {source}", spinner="line"):
@@ -271,7 +304,7 @@ def map_(
     chosen = [next(a for a in candidates if isinstance(file.mesh, a.mesh_type)) for file in found]
     pictures: list[Path] = []
     if preview:
-        pictures = _pictures(sources, chosen, outputs)
+        pictures = _pictures(sources, chosen, [None] * len(outputs) if together else outputs)
         for picture in pictures if not force else ():
             check_replaceable(picture)
     how = MeasurementSettings(solves.value, _installed(backend), threads, repeats=1)
@@ -283,6 +316,7 @@ def map_(
     for folder in {target.parent for target in targets}:
         folder.mkdir(exist_ok=True)
     rows, failures = [], []
+    maps: list[Any] = []
     for k, (file, task) in enumerate(zip(found, tasks, strict=True)):
         with err.status(f"{task.algorithm.title} on {file.mesh.m:,} triangles", spinner="line"):
             record, uv = map_once(task, options)
@@ -290,9 +324,12 @@ def map_(
         written: dict[str, str] = {}
         if uv is not None and (ok or keep_invalid):
             where_to = outputs[k]
+            maps.append(uv)
+            if where_to is not None and not together:
+                _tell(where_to, map_files.write_map(where_to, file, uv, wishes))
             if where_to is not None:
-                write_map(where_to, file, uv)
                 written["output"] = str(where_to)
+            written |= extra.write(file.mesh, uv)
             if preview:
                 with err.status("drawing", spinner="line"):
                     written["preview"] = str(pictures[k])
@@ -312,6 +349,10 @@ def map_(
             kept = " (this map was written all the same: --keep-invalid)" if written else ""
             which = f"{file.path}: " if len(found) > 1 else ""
             failures.append(f"{which}{record.outcome.status}: {record.outcome.cause}{kept}")
+    if output is not None and together and len(maps) == len(found):
+        _tell(output, map_files.write_atlas(output, found, maps, wishes))
+    elif together:
+        failures.append(f"{output} was not written, because a map is missing in it")
     if as_json:
         print_json(rows if len(rows) > 1 else rows[0])
     for failure in failures:
@@ -546,34 +587,87 @@ def _pictures(
     return pictures
 
 
-def _outputs(meshes: Sequence[Path], output: Path | None, *, cut: bool) -> list[Path | None]:
+@dataclass(frozen=True)
+class _Extra:
+    """What `map` writes of a surface beside its map."""
+
+    samples: Path | None
+    remeshed: Path | None
+    side: int
+    place: Place
+
+    @property
+    def files(self) -> list[Path]:
+        return [path for path in (self.samples, self.remeshed) if path is not None]
+
+    def write(self, mesh: TriangleMesh, z: Any) -> dict[str, str]:
+        from cembench.conformal.resample import regular_remesh
+        from cembench.workflows.geometry_images import write_geometry_image
+        from cembench.workflows.map_files import Wishes, save_map
+
+        if self.samples is not None:
+            write_geometry_image(self.samples, mesh, z, self.side)
+        if self.remeshed is not None:
+            new, new_z = regular_remesh(mesh, z, self.side)
+            _tell(self.remeshed, save_map(self.remeshed, new, new_z, Wishes(self.place)))
+        named = {"geometry_image": self.samples, "remeshed": self.remeshed}
+        return {what: str(path) for what, path in named.items() if path is not None}
+
+
+def _check_extras(
+    meshes: Sequence[Path], outputs: Sequence[Path | None], wishes: Wishes, extra: _Extra
+) -> None:
+    """Raise what would be raised for a texture or an extra file, before anything is mapped."""
+    from cembench.mesh.files import check_writable_format
+    from cembench.workflows.geometry_images import check_image_format
+    from cembench.workflows.map_files import check_wishes
+
+    check_wishes(meshes, wishes)
+    if wishes.textured and None in outputs:
+        raise ParameterError("--checker and --bake need a file that uses the texture: add -o.")
+    if len(set(outputs)) < len(outputs) and outputs[0] and wishes.place is not Place.unit:
+        raise ParameterError("surfaces that share one file share the unit square: leave --uv away.")
+    if extra.files and len(meshes) > 1:
+        raise ParameterError("--geometry-image and --remesh take one surface; map them one by one.")
+    if extra.samples is not None:
+        check_image_format(extra.samples)
+    if extra.remeshed is not None:
+        check_writable_format(extra.remeshed, with_uv=True)
+
+
+def _tell(path: Path, notices: Sequence[Notice]) -> None:
+    for notice in notices:
+        note(f"{path}: {notice}")
+
+
+def _outputs(meshes: Sequence[Path], output: Path | None) -> list[Path | None]:
     """Return where the map of each surface goes: a file, or files of a folder for several.
+
+    A file for several surfaces comes as often as there are surfaces.
 
     Raises
     ------
     MeshError
         A format that cannot hold the UVs, or a folder that is not there.
     ParameterError
-        Two surfaces of one name, or a file for several surfaces.
+        Two surfaces of one name.
 
     """
     from cembench.mesh.files import check_writable_format
-    from cembench.running.surface_file import check_map_format
 
     if output is None:
         return [None] * len(meshes)
-    if len(meshes) == 1 and not output.is_dir():
+    if not output.is_dir() and (len(meshes) == 1 or output.suffix):
         check_writable_format(output, with_uv=True)
-        check_map_format(output, cut=cut)
-        return [output]
-    if output.is_file() or output.suffix:
+        return [output] * len(meshes)
+    if output.is_file():
         raise ParameterError(
             f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with -o."
         )
     if not output.parent.is_dir():
         raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")
     files = [
-        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' and not cut else '.obj'}"
+        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' else '.obj'}"
         for path in meshes
     ]
     twice = [file for file in files if files.count(file) > 1]
