@@ -235,6 +235,10 @@ def map_(
     side: Annotated[
         int, typer.Option(min=4, max=8192, help="Samples along a side, for the two above.")
     ] = 129,
+    page: Annotated[
+        Path | None,
+        typer.Option("--html", help="A page on which to turn surface and map; needs no network."),
+    ] = None,
     preview: Annotated[
         bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
     ] = False,
@@ -286,7 +290,7 @@ def map_(
         _check_takes_disks(candidates)
     outputs = _outputs(meshes, output)
     wishes = map_files.Wishes(place, checker, bake)
-    extra = _Extra(samples, remeshed, side, place)
+    extra = _Extra(samples, remeshed, side, place, page)
     _check_extras(meshes, outputs, wishes, extra)
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
@@ -329,7 +333,7 @@ def map_(
                 _tell(where_to, map_files.write_map(where_to, file, uv, wishes))
             if where_to is not None:
                 written["output"] = str(where_to)
-            written |= extra.write(file.mesh, uv)
+            written |= extra.write(file.mesh, uv, record)
             if preview:
                 with err.status("drawing", spinner="line"):
                     written["preview"] = str(pictures[k])
@@ -595,12 +599,13 @@ class _Extra:
     remeshed: Path | None
     side: int
     place: Place
+    page: Path | None
 
     @property
     def files(self) -> list[Path]:
-        return [path for path in (self.samples, self.remeshed) if path is not None]
+        return [path for path in (self.samples, self.remeshed, self.page) if path is not None]
 
-    def write(self, mesh: TriangleMesh, z: Any) -> dict[str, str]:
+    def write(self, mesh: TriangleMesh, z: Any, record: Record) -> dict[str, str]:
         from cembench.conformal.resample import regular_remesh
         from cembench.workflows.geometry_images import write_geometry_image
         from cembench.workflows.map_files import Wishes, save_map
@@ -610,7 +615,15 @@ class _Extra:
         if self.remeshed is not None:
             new, new_z = regular_remesh(mesh, z, self.side)
             _tell(self.remeshed, save_map(self.remeshed, new, new_z, Wishes(self.place)))
-        named = {"geometry_image": self.samples, "remeshed": self.remeshed}
+        if self.page is not None:
+            from cembench.report.render.view_page import write_view_page
+            from cembench.workflows.view import map_page
+
+            told = [*map(str, mesh.notices), *map(str, record.outcome.notes)]
+            with err.status("drawing", spinner="line"):
+                page = map_page(mesh, z, record.outcome, record.title, told)
+            write_view_page(self.page, page)
+        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
         return {what: str(path) for what, path in named.items() if path is not None}
 
 
@@ -628,7 +641,13 @@ def _check_extras(
     if len(set(outputs)) < len(outputs) and outputs[0] and wishes.place is not Place.unit:
         raise ParameterError("surfaces that share one file share the unit square: leave --uv away.")
     if extra.files and len(meshes) > 1:
-        raise ParameterError("--geometry-image and --remesh take one surface; map them one by one.")
+        raise ParameterError(
+            "--geometry-image, --remesh and --html take one surface; map them one by one."
+        )
+    if extra.page is not None and extra.page.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError(f"{extra.page}: --html writes a page; name it with .html.")
+    if extra.page is not None and not extra.page.parent.is_dir():
+        raise MeshError(f"{extra.page}: there is no folder {extra.page.parent}. Make it first.")
     if extra.samples is not None:
         check_image_format(extra.samples)
     if extra.remeshed is not None:

@@ -117,12 +117,16 @@ class Figure:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures that are looked at side by side: one surface, a picture for every algorithm."""
+    """Figures that are looked at side by side: one surface, a picture for every algorithm.
+
+    `scene` is the same to be turned, for forms that can (:mod:`cembench.drawing.view_scene`).
+    """
 
     name: str
     title: str
     figures: tuple[Figure, ...]
     caption: str = ""
+    scene: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -241,6 +245,12 @@ def tables_of(report: Report) -> Iterator[Table]:
     """All tables in the order of reading."""
     for _, section in sections_of(report):
         yield from (item for item in section.items if isinstance(item, Table))
+
+
+def galleries_of(report: Report) -> Iterator[Gallery]:
+    """All galleries in the order of reading."""
+    for _, section in sections_of(report):
+        yield from (item for item in section.items if isinstance(item, Gallery))
 
 
 def figures_of(report: Report) -> Iterator[Figure]:

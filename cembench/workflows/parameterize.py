@@ -199,6 +199,43 @@ class Result:
         figure.figimage(pixels)
         return figure
 
+    def show(self, path: str | os.PathLike[str] | None = None) -> Path:
+        """Open a page in the browser on which the surface and its image can be turned.
+
+        The page needs no network and no other file.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where to write it, an HTML file; then it is not opened. Default: a temporary file.
+
+        Returns
+        -------
+        Path
+            The page.
+
+        Raises
+        ------
+        RenderError
+            It cannot be written.
+
+        """
+        import tempfile
+        import webbrowser
+
+        from cembench.core.names import file_name
+        from cembench.report.render.view_page import write_view_page
+        from cembench.workflows.view import map_page
+
+        page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title, self.notices)
+        if path is not None:
+            write_view_page(Path(path), page)
+            return Path(path)
+        shown = Path(tempfile.mkdtemp(prefix="cembench-")) / f"{file_name(self.mesh.name)}.html"
+        write_view_page(shown, page)
+        webbrowser.open(shown.as_uri())
+        return shown
+
     def _png(self) -> bytes:
         from cembench.drawing.preview import preview_png
 
@@ -222,15 +259,11 @@ class Result:
         )
 
     def _repr_html_(self) -> str:
-        from cembench.conformal.metrics import METRICS
+        from cembench.workflows.view import metric_facts
 
         picture = base64.b64encode(self._png()).decode()
         rows = [("status", self.outcome.status + (f": {self.cause}" if self.cause else ""))]
-        rows += [
-            (metric.title, f"{metric.text(self.metrics[metric.name], precise=True)} {metric.unit}")
-            for metric in METRICS
-            if metric.name in self.metrics
-        ]
+        rows += metric_facts(self.outcome)
         rows += [("iterations", str(self.iterations)), ("seconds", f"{self.seconds:.3f}")]
         rows += [("note", notice) for notice in self.notices]
         cells = "".join(
