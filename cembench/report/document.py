@@ -27,7 +27,9 @@ ORIGINS: Mapping[Origin, tuple[str, str]] = {
 }
 
 #: Does a claim of the paper hold in this run?
-Verdict = Literal["holds", "holds in part", "does not hold here", "not tested here"]
+Verdict = Literal[
+    "holds", "holds in part", "does not hold here", "not tested here", "too few rounds"
+]
 
 
 @dataclass(frozen=True)
@@ -188,6 +190,27 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """A figure that a run found, and what it is of."""
+
+    number: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a run found, for the head of its report.
+
+    `picture` and `plot` are figures that stand in the report too.
+    """
+
+    sentence: str
+    figures: tuple[Finding, ...] = ()
+    picture: Figure | None = None
+    plot: Figure | None = None
+
+
+@dataclass(frozen=True)
 class Report:
     """A whole report.
 
@@ -201,6 +224,7 @@ class Report:
     sections: tuple[Section, ...]
     #: Records by key, as rows (cembench.results.record_rows), to which the values link.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    findings: Findings | None = None
 
 
 def missing(why: str, text: str = "-") -> Value:

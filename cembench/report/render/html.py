@@ -62,6 +62,7 @@ VERDICTS: Mapping[str, str] = {
     "holds": "✓",
     "holds in part": "◐",
     "does not hold here": "✗",
+    "too few rounds": "…",
     "not tested here": "○",
 }
 #: Bytes up to which a figure's data is a part of the page; beyond, only the file beside it.
