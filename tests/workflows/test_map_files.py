@@ -171,6 +171,8 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("--geometry-image", "a.tif"), "allowed: .npy, .exr, .png"),
         (("--geometry-image", "no/a.npy"), "there is no folder no"),
         (("--remesh", "a.fbx"), "is unknown; allowed here"),
+        (("--html", "a.obj"), "--html writes a page; name it with .html"),
+        (("--html", "no/a.html"), "there is no folder no"),
         (("-o", "a.obj", "--uv", "square"), "'square' is not one of"),
         (("-a", "lscm", "--remesh", "a.obj"), "is not onto the disk"),
     ],
@@ -199,6 +201,23 @@ def test_the_map_of_an_invalid_result_is_written_only_on_request(cli, given):
     assert not list(cli.folder.iterdir())
     assert cli(*broken, "-o", "a.glb", "--keep-invalid")[0] == 1
     assert (cli.folder / "a.glb").exists()
+
+
+def test_a_page_to_turn_the_map_is_written_and_opened(cli, given, result, monkeypatch):
+    code, out, err = cli("map", given, "-a", "harmonic-circle", "--html", "a.html")
+    assert code == 0, err
+    assert "a.html" in out
+    text = (cli.folder / "a.html").read_text()
+    assert 'class="view"' in text
+    assert "http://" not in text
+    assert "https://" not in text
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    page = result.show()
+    assert opened == [page.as_uri()]
+    assert page.read_text().startswith("<!DOCTYPE html>")
+    with pytest.raises(cembench.RenderError, match="cannot be written"):
+        result.show(given / "a.html")
 
 
 def test_exr_says_what_it_needs(monkeypatch, tmp_path):
