@@ -701,8 +701,12 @@ def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Reco
     """Run the tasks with a live table on a terminal, and with a line a cell elsewhere."""
     from cembench.running.local import run_tasks
 
-    with _progress(len(tasks)) as progress:
-        return run_tasks(tasks, store, options, progress)
+    try:
+        with _progress(len(tasks)) as progress:
+            return run_tasks(tasks, store, options, progress)
+    except KeyboardInterrupt:
+        err.print("Stopped; the same command resumes.")
+        raise
 
 
 @contextmanager

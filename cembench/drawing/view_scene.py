@@ -28,7 +28,7 @@ Complex = NDArray[np.complex128]
 #: Triangles of a surface that is shown; larger ones are simplified.
 MOST = 50_000
 #: Triangles of all surfaces on one page, which keep it small; but each has some.
-TOGETHER, LEAST = 250_000, 5_000
+TOGETHER, LEAST = 200_000, 5_000
 #: Where the scales of the colours end: degrees, |mu|, and powers of two of the area's scaling.
 DEGREES, MU, DOUBLINGS = 10.0, 0.3, 6.0
 #: Maps up to this many keep image coordinates as float32, for squares far within a finger.

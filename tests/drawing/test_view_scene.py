@@ -80,5 +80,5 @@ def test_maps_are_turned_alike(bowl):
 
 def test_many_surfaces_share_what_a_page_may_hold():
     assert most_each(1) == MOST
-    assert most_each(20) == 12_500
+    assert most_each(20) == 10_000
     assert most_each(1000) == 5_000
