@@ -471,11 +471,11 @@ def test_a_map_on_a_full_disk_leaves_the_older_file_and_says_so(cli):
     assert tree(cli.folder) == before
 
 
-@pytest.mark.parametrize("suffix", [".obj", ".ply", ".off", ".stl"])
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".vtp", ".npz", ".off", ".stl"])
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5, 0.999])
 def test_a_mesh_on_a_full_disk_is_whole_or_as_before(suffix, share, tmp_path):
     mesh = flat_disk(600)
-    uv = mesh.V[:, 0] + 1j * mesh.V[:, 1] if suffix in (".obj", ".ply") else None
+    uv = mesh.V[:, 0] + 1j * mesh.V[:, 1] if suffix not in (".off", ".stl") else None
     path = tmp_path / f"a{suffix}"
     write_mesh(path, mesh, uv)
     whole = path.read_bytes()

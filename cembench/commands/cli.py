@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -55,9 +55,11 @@ from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
+from cembench.workflows.places import Place
 
 if TYPE_CHECKING:
     from cembench.commands.progress import PlainProgress
+    from cembench.core.notices import Notice
     from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Algorithm, Registry, Surface
     from cembench.report.surface_facts import SurfaceFacts
@@ -65,6 +67,7 @@ if TYPE_CHECKING:
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import Task
+    from cembench.workflows.map_files import Wishes
 
 app = typer.Typer(
     cls=Verbs,
@@ -207,8 +210,36 @@ def map_(
     output: Annotated[
         Path | None,
         typer.Option(
-            "-o", "--output", help="Surface with UVs: OBJ or PLY. Of several surfaces: a folder."
+            "-o",
+            "--output",
+            help="Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. Of several surfaces: a folder, or "
+            "a file with all of them.",
         ),
+    ] = None,
+    place: Annotated[
+        Place, typer.Option("--uv", help="UVs in the unit square, or as the map is (a disk).")
+    ] = Place.unit,
+    checker: Annotated[
+        bool, typer.Option("--checker", help="Add a checkerboard texture; GLB has it always.")
+    ] = False,
+    bake: Annotated[
+        Path | None,
+        typer.Option(help="A texture made for the OBJ's own UVs: paint it anew for these."),
+    ] = None,
+    samples: Annotated[
+        Path | None,
+        typer.Option("--geometry-image", help="Sample the surface on a grid: NPY, EXR or PNG."),
+    ] = None,
+    remeshed: Annotated[
+        Path | None,
+        typer.Option("--remesh", help="Mesh the surface anew through the map, into this file."),
+    ] = None,
+    side: Annotated[
+        int, typer.Option(min=4, max=8192, help="Samples along a side, for the two above.")
+    ] = 129,
+    page: Annotated[
+        Path | None,
+        typer.Option("--html", help="A page on which to turn surface and map; needs no network."),
     ] = None,
     preview: Annotated[
         bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
@@ -240,9 +271,10 @@ def map_(
 ) -> None:
     """Map surfaces, check the maps, and write them.
 
-    The UVs are the map itself (the unit disk for target "disk"), as the shortest decimals that read
-    back as the same numbers. An OBJ file keeps what else it has: groups, materials, normals,
-    colours, polygons. Of a surface that is --cut, the uncut one is written, with a UV per corner.
+    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
+    hold all digits; PLY and GLB single precision. An OBJ file keeps what else it has: groups,
+    materials, normals, colours, polygons. Of a surface that is --cut, the uncut one is written,
+    with a UV per corner. Several surfaces in one file share the square, each in its own part.
     """
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.drawing.own_pictures import check_replaceable
@@ -250,8 +282,9 @@ def map_(
     from cembench.results.record_rows import row
     from cembench.running.local import Options, map_once
     from cembench.running.plan import MeasurementSettings, paper_role_of_file, plan_cells
-    from cembench.running.surface_file import read_surface_file, write_map
-    from cembench.workflows.map_files import (
+    from cembench.running.surface_file import read_surface_file
+    from cembench.workflows import map_files
+    from cembench.workflows.map_places import (
         check_takes_disks,
         draw_map,
         output_files,
@@ -263,15 +296,19 @@ def map_(
     candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
     if cut:
         check_takes_disks(candidates)
-    outputs = output_files(meshes, output, cut=cut)
+    outputs = output_files(meshes, output)
+    wishes = map_files.Wishes(place, checker, bake)
+    extra = _Extra(samples, remeshed, side, place, page)
+    _check_extras(meshes, outputs, wishes, extra)
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
     sources = [fetched.get(path, path) for path in meshes]
-    targets = [target for target in outputs if target is not None]
-    for target in targets:
-        refuse_inputs(target, sources, force=force)
-    if output not in outputs:
-        refuse_present(targets, force=force)
+    targets = list(dict.fromkeys(target for target in outputs if target is not None))
+    others = [path for target in targets for path in map_files.beside(target, wishes)]
+    for target in (*targets, *others, *extra.files):
+        refuse_inputs(target, [*sources, *([bake] if bake else [])], force=force)
+    refuse_present(others if output in outputs else [*targets, *others], force=force)
+    together = len(meshes) > 1 and output in outputs
     found = []
     for source in sources:
         with err.status(f"reading {source}", spinner="line"):
@@ -279,7 +316,7 @@ def map_(
     chosen = [next(a for a in candidates if isinstance(file.mesh, a.mesh_type)) for file in found]
     pictures: list[Path] = []
     if preview:
-        pictures = picture_files(sources, chosen, outputs)
+        pictures = picture_files(sources, chosen, [None] * len(outputs) if together else outputs)
         for picture in pictures if not force else ():
             check_replaceable(picture)
     how = MeasurementSettings(solves.value, _installed(backend), threads, repeats=1)
@@ -291,6 +328,7 @@ def map_(
     for folder in {target.parent for target in targets}:
         folder.mkdir(exist_ok=True)
     rows, failures = [], []
+    maps: list[Any] = []
     for k, (file, task) in enumerate(zip(found, tasks, strict=True)):
         with err.status(f"{task.algorithm.title} on {file.mesh.m:,} triangles", spinner="line"):
             record, uv = map_once(task, options)
@@ -298,9 +336,12 @@ def map_(
         written: dict[str, str] = {}
         if uv is not None and (ok or keep_invalid):
             where_to = outputs[k]
+            maps.append(uv)
+            if where_to is not None and not together:
+                _tell(where_to, map_files.write_map(where_to, file, uv, wishes))
             if where_to is not None:
-                write_map(where_to, file, uv)
                 written["output"] = str(where_to)
+            written |= extra.write(file.mesh, uv, record)
             if preview:
                 with err.status("drawing", spinner="line"):
                     written["preview"] = str(pictures[k])
@@ -320,6 +361,10 @@ def map_(
             kept = " (this map was written all the same: --keep-invalid)" if written else ""
             which = f"{file.path}: " if len(found) > 1 else ""
             failures.append(f"{which}{record.outcome.status}: {record.outcome.cause}{kept}")
+    if output is not None and together and len(maps) == len(found):
+        _tell(output, map_files.write_atlas(output, found, maps, wishes))
+    elif together:
+        failures.append(f"{output} was not written, because a map is missing in it")
     if as_json:
         print_json(rows if len(rows) > 1 else rows[0])
     for failure in failures:
@@ -520,12 +565,84 @@ for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 
 
+@dataclass(frozen=True)
+class _Extra:
+    """What `map` writes of a surface beside its map."""
+
+    samples: Path | None
+    remeshed: Path | None
+    side: int
+    place: Place
+    page: Path | None
+
+    @property
+    def files(self) -> list[Path]:
+        return [path for path in (self.samples, self.remeshed, self.page) if path is not None]
+
+    def write(self, mesh: TriangleMesh, z: Any, record: Record) -> dict[str, str]:
+        from cembench.conformal.resample import regular_remesh
+        from cembench.workflows.geometry_images import write_geometry_image
+        from cembench.workflows.map_files import Wishes, save_map
+
+        if self.samples is not None:
+            write_geometry_image(self.samples, mesh, z, self.side)
+        if self.remeshed is not None:
+            new, new_z = regular_remesh(mesh, z, self.side)
+            _tell(self.remeshed, save_map(self.remeshed, new, new_z, Wishes(self.place)))
+        if self.page is not None:
+            from cembench.report.render.view_page import write_view_page
+            from cembench.workflows.view import map_page
+
+            told = [*map(str, mesh.notices), *map(str, record.outcome.notes)]
+            with err.status("drawing", spinner="line"):
+                page = map_page(mesh, z, record.outcome, record.title, told)
+            write_view_page(self.page, page)
+        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
+        return {what: str(path) for what, path in named.items() if path is not None}
+
+
+def _check_extras(
+    meshes: Sequence[Path], outputs: Sequence[Path | None], wishes: Wishes, extra: _Extra
+) -> None:
+    """Raise what would be raised for a texture or an extra file, before anything is mapped."""
+    from cembench.mesh.files import check_writable_format
+    from cembench.workflows.geometry_images import check_image_format
+    from cembench.workflows.map_files import check_wishes
+
+    check_wishes(meshes, wishes)
+    if wishes.textured and None in outputs:
+        raise ParameterError("--checker and --bake need a file that uses the texture: add -o.")
+    if len(set(outputs)) < len(outputs) and outputs[0] and wishes.place is not Place.unit:
+        raise ParameterError("surfaces that share one file share the unit square: leave --uv away.")
+    if extra.files and len(meshes) > 1:
+        raise ParameterError(
+            "--geometry-image, --remesh and --html take one surface; map them one by one."
+        )
+    if extra.page is not None and extra.page.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError(f"{extra.page}: --html writes a page; name it with .html.")
+    if extra.page is not None and not extra.page.parent.is_dir():
+        raise MeshError(f"{extra.page}: there is no folder {extra.page.parent}. Make it first.")
+    if extra.samples is not None:
+        check_image_format(extra.samples)
+    if extra.remeshed is not None:
+        check_writable_format(extra.remeshed, with_uv=True)
+
+
+def _tell(path: Path, notices: Sequence[Notice]) -> None:
+    for notice in notices:
+        note(f"{path}: {notice}")
+
+
 def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
     """Run the tasks with a live table on a terminal, and with a line a cell elsewhere."""
     from cembench.running.local import run_tasks
 
-    with _progress(len(tasks)) as progress:
-        return run_tasks(tasks, store, options, progress)
+    try:
+        with _progress(len(tasks)) as progress:
+            return run_tasks(tasks, store, options, progress)
+    except KeyboardInterrupt:
+        err.print("Stopped; the same command resumes.")
+        raise
 
 
 @contextmanager

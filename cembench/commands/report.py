@@ -70,7 +70,8 @@ def show_report(report: Report, folder: Path) -> None:
 
     out.print(paper_tables(report))
     verdicts = summary(report, folder)["verdicts"]
-    out.print("Claims: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items()))
+    if verdicts:
+        out.print("Claims: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items()))
     out.print(f"Report: {(folder / 'index.html').resolve()}", soft_wrap=True, markup=False)
 
 

@@ -33,6 +33,8 @@ class NoticeKind(StrEnum):
     HOLES_NOT_CIRCULAR = "holes_not_circular"
     #: A figure is not finite, or only rounding can have made it.
     LOST_IN_ROUNDING = "lost_in_rounding"
+    #: Triangles fold in a file, because it holds fewer digits than the map needs.
+    FOLDED_BY_ROUNDING = "folded_by_rounding"
     #: The iteration ended early, because the boundary is too crowded for it.
     CROWDED_BOUNDARY = "crowded_boundary"
     FAR_FROM_CONFORMAL = "far_from_conformal"

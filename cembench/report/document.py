@@ -27,7 +27,9 @@ ORIGINS: Mapping[Origin, tuple[str, str]] = {
 }
 
 #: Does a claim of the paper hold in this run?
-Verdict = Literal["holds", "holds in part", "does not hold here", "not tested here"]
+Verdict = Literal[
+    "holds", "holds in part", "does not hold here", "not tested here", "too few rounds"
+]
 
 
 @dataclass(frozen=True)
@@ -119,12 +121,16 @@ class Figure:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures that are looked at side by side: one surface, a picture for every algorithm."""
+    """Figures that are looked at side by side: one surface, a picture for every algorithm.
+
+    `scene` is the same to be turned, for forms that can (:mod:`cembench.drawing.view_scene`).
+    """
 
     name: str
     title: str
     figures: tuple[Figure, ...]
     caption: str = ""
+    scene: bytes = b""
 
 
 @dataclass(frozen=True)
@@ -186,6 +192,27 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Finding:
+    """A figure that a run found, and what it is of."""
+
+    number: str
+    words: str
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a run found, for the head of its report.
+
+    `picture` and `plot` are figures that stand in the report too.
+    """
+
+    sentence: str
+    figures: tuple[Finding, ...] = ()
+    picture: Figure | None = None
+    plot: Figure | None = None
+
+
+@dataclass(frozen=True)
 class Report:
     """A whole report.
 
@@ -199,6 +226,7 @@ class Report:
     sections: tuple[Section, ...]
     #: Records by key, as rows (cembench.results.record_rows), to which the values link.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    findings: Findings | None = None
 
 
 def missing(why: str, text: str = "-") -> Value:
@@ -243,6 +271,12 @@ def tables_of(report: Report) -> Iterator[Table]:
     """All tables in the order of reading."""
     for _, section in sections_of(report):
         yield from (item for item in section.items if isinstance(item, Table))
+
+
+def galleries_of(report: Report) -> Iterator[Gallery]:
+    """All galleries in the order of reading."""
+    for _, section in sections_of(report):
+        yield from (item for item in section.items if isinstance(item, Gallery))
 
 
 def figures_of(report: Report) -> Iterator[Figure]:

@@ -1,4 +1,4 @@
-"""A surface in a file, made ready to be mapped, and its map written with what the file had."""
+"""A surface in a file, made ready to be mapped."""
 
 from __future__ import annotations
 
@@ -6,15 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.defects import located
-from cembench.mesh.files import checked, read_repaired, write_mesh
-from cembench.mesh.obj_text import obj_text, with_uv
+from cembench.mesh.files import checked, read_repaired
 from cembench.mesh.reading import read_soup
 from cembench.mesh.repair import Repaired
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -57,37 +52,3 @@ def read_surface_file(
     except MeshError as error:
         raise located(error, path) from None
     return SurfaceFile(path, found.mesh, repaired, uncut, found)
-
-
-def check_map_format(output: Path, *, cut: bool) -> None:
-    """Raise :class:`MeshError` where the map of a surface cannot be written to such a file."""
-    if cut and output.suffix.lower() != ".obj":
-        raise MeshError(
-            f"{output}: the UVs of a cut surface belong to corners, not to vertices; allowed here: "
-            ".obj. Write OBJ, or cut the surface with `cembench cut` and map the disk."
-        )
-
-
-def write_map(output: Path, surface: SurfaceFile, uv: NDArray[np.complex128]) -> None:
-    """Write a surface with its map as UVs.
-
-    An OBJ file that was not repaired keeps all that it had, and gets the UVs. A surface that was
-    cut is written uncut, with a UV for each corner.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be written.
-
-    """
-    cut, uncut = surface.cut, surface.uncut
-    if output.suffix.lower() == ".obj" == surface.path.suffix.lower() and not surface.repaired:
-        original = surface.path.read_text(encoding="latin-1")  # any bytes, as they are
-        corners = (uncut.F, cut.mesh.F) if uncut and cut else ()
-        text = with_uv(original, uv, *corners)
-    elif uncut and cut:
-        text = obj_text(uncut.V, uncut.F, uv, cut.mesh.F)
-    else:
-        write_mesh(output, surface.mesh, uv)
-        return
-    write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)

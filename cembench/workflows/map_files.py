@@ -1,92 +1,275 @@
-"""Where the maps of `cembench map` and their pictures go, and the pictures themselves."""
+"""Files of a map that other programs open: surface, texture coordinates, textures, samples."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.metrics import caption
-from cembench.core.errors import MeshError, ParameterError
-from cembench.core.names import file_name
-from cembench.drawing.preview import write_preview
-from cembench.mesh.files import check_writable_format
-from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-from cembench.registry import Algorithm
-from cembench.results.records import Record
-from cembench.running.surface_file import check_map_format
+from cembench.conformal.laplacian import corner_products
+from cembench.conformal.planar import orientations
+from cembench.core.atomic import write_bytes
+from cembench.core.errors import MeshError, ParameterError, RenderError
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.files import SINGLE, write_textured
+from cembench.mesh.obj_text import with_uv
+from cembench.mesh.obj_uv import read_obj_uv
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.unit_square import packed, to_unit_square
+from cembench.mesh.writers.glb import glb_bytes
+from cembench.mesh.writers.obj import mtl_bytes, obj_bytes, with_material
+from cembench.mesh.writers.textured import Textured
+from cembench.running.surface_file import SurfaceFile
+from cembench.workflows.places import Place
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
-def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
-    """Raise :class:`ParameterError` where no algorithm maps what a cut makes."""
-    if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
-        raise ParameterError(
-            f"--cut makes a disk, which {candidates[0].name} does not take; name an algorithm for "
-            "disks (see `cembench list algorithms`)."
-        )
+@dataclass(frozen=True)
+class Wishes:
+    """What is written of a map beside the surface and its texture coordinates.
+
+    Parameters
+    ----------
+    place : Place
+        Where the texture coordinates lie.
+    checker : bool
+        Whether a checkerboard is added as a texture. GLB has one always.
+    bake : Path, optional
+        A texture for the coordinates that the surface's file had, to be painted anew for these.
+
+    """
+
+    place: Place = Place.unit
+    checker: bool = False
+    bake: Path | None = None
+
+    @property
+    def textured(self) -> bool:
+        """Whether there is a texture beside formats that hold none."""
+        return self.checker or self.bake is not None
 
 
-def picture_files(
-    sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
-) -> list[Path]:
-    """Return where the picture of each surface goes: beside its output, or here.
+def beside(output: Path, wishes: Wishes) -> list[Path]:
+    """Return the files that are written with an output, beside it.
 
     Raises
     ------
     ParameterError
-        Two would have one name.
+        A texture is wished for a format that has none.
 
     """
-    pictures = [
-        Path(f"{file_name(f'{source.stem}_{algorithm.name}')}.png")
-        if target is None
-        else target.with_suffix(".png")
-        for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
-    ]
-    twice = [picture for picture in pictures if pictures.count(picture) > 1]
-    if twice:
-        raise ParameterError(f"two pictures would be {twice[0]}; draw them one after another.")
-    return pictures
+    suffix = output.suffix.lower()
+    if not wishes.textured or suffix == ".glb":
+        return []
+    texture = output.with_name(f"{output.stem}_texture.png")
+    if suffix == ".obj":
+        return [texture, output.with_suffix(".mtl")]
+    if suffix == ".ply":
+        return [texture]
+    raise ParameterError(
+        f"{output}: {suffix} names no texture; --checker and --bake go with .glb, .obj and .ply."
+    )
 
 
-def output_files(meshes: Sequence[Path], output: Path | None, *, cut: bool) -> list[Path | None]:
-    """Return where the map of each surface goes: a file, or files of a folder for several.
+def check_wishes(meshes: Sequence[Path], wishes: Wishes) -> None:
+    """Raise what :func:`write_map` would raise for a texture, before anything is mapped.
 
     Raises
     ------
-    MeshError
-        A format that cannot hold the UVs, or a folder that is not there.
     ParameterError
-        Two surfaces of one name, or a file for several surfaces.
+        A checkerboard and a texture, or a texture for several surfaces.
+    RenderError
+        The texture cannot be read.
 
     """
-    if output is None:
-        return [None] * len(meshes)
-    if len(meshes) == 1 and not output.is_dir():
-        check_writable_format(output, with_uv=True)
-        check_map_format(output, cut=cut)
-        return [output]
-    if output.is_file() or output.suffix:
-        raise ParameterError(
-            f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with -o."
-        )
-    if not output.parent.is_dir():
-        raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")
-    files = [
-        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' and not cut else '.obj'}"
-        for path in meshes
+    if wishes.bake is None:
+        return
+    from cembench.drawing.texture import read_texture
+
+    if wishes.checker:
+        raise ParameterError("--checker and --bake are two textures; choose one.")
+    if len(meshes) > 1:
+        raise ParameterError("--bake paints the texture of one surface; map them one by one.")
+    read_texture(wishes.bake)
+
+
+def write_map(
+    output: Path, surface: SurfaceFile, z: Complex, wishes: Wishes | None = None
+) -> tuple[Notice, ...]:
+    """Write a surface with its map as texture coordinates.
+
+    An OBJ file that was not repaired keeps all that it had, and gets the coordinates. A surface
+    that was cut is written uncut, with coordinates for each corner, where the format can hold that.
+
+    Parameters
+    ----------
+    output : Path
+        OBJ, PLY, GLB, VTP or NPZ.
+    surface : SurfaceFile
+        The surface, and the file that it came from.
+    z : complex128 (n,)
+        Its map.
+    wishes : Wishes, optional
+        Where the coordinates lie, and which texture goes with them.
+
+    Returns
+    -------
+    tuple of Notice
+        Whether rounding folded triangles in the file.
+
+    Raises
+    ------
+    MeshError, ParameterError, RenderError
+        A file cannot be written, or the texture cannot be read or does not fit.
+
+    """
+    wishes = wishes or Wishes()
+    moved = placed(z, wishes.place)
+    textured = _textured(surface, moved)
+    texture = _texture(surface, textured, wishes, output)
+    original = None
+    suffix = output.suffix.lower()
+    if suffix == ".obj" == surface.path.suffix.lower() and not surface.repaired:
+        text = surface.path.read_text(encoding="latin-1")  # any bytes, as they are
+        corners = (surface.uncut.F, surface.cut.mesh.F) if surface.uncut and surface.cut else ()
+        original = with_uv(text, moved, *corners)
+    _write(output, textured, texture, wishes, original)
+    return _folded_by_rounding(output, z, moved, surface.mesh.F)
+
+
+def save_map(
+    output: Path, mesh: TriangleMesh, z: Complex, wishes: Wishes | None = None
+) -> tuple[Notice, ...]:
+    """Write a surface that came from no file; as :func:`write_map`."""
+    wishes = wishes or Wishes()
+    if wishes.bake is not None:
+        raise ParameterError("a texture is baked for surfaces that are read from an OBJ file.")
+    moved = placed(z, wishes.place)
+    surface = Textured(mesh.V, mesh.F, _columns(moved), name=mesh.name)
+    _write(output, surface, _checker(wishes, output), wishes, None)
+    return _folded_by_rounding(output, z, moved, mesh.F)
+
+
+def write_atlas(
+    output: Path, surfaces: Sequence[SurfaceFile], maps: Sequence[Complex], wishes: Wishes
+) -> tuple[Notice, ...]:
+    """Write several surfaces into one file, their maps side by side in the unit square.
+
+    A GLB file has a node for each; other formats one mesh of all.
+    """
+    areas = [float(corner_products(file.mesh.V, file.mesh.F)[1].sum()) for file in surfaces]
+    moved = packed(maps, areas)
+    parts = [_textured(file, z) for file, z in zip(surfaces, moved, strict=True)]
+    texture = _checker(wishes, output)
+    if output.suffix.lower() == ".glb":
+        whole = glb_bytes(*(replace(part, texture=texture) for part in parts))
+        write_bytes(output, whole, error=MeshError, parents=False)
+    else:
+        _write(output, _joined(parts), texture, wishes, None)
+    told = [
+        _folded_by_rounding(output, z, after, file.mesh.F)
+        for file, z, after in zip(surfaces, maps, moved, strict=True)
     ]
-    twice = [file for file in files if files.count(file) > 1]
-    if twice:
+    return tuple(notice for notices in told for notice in notices)
+
+
+def placed(z: Complex, place: Place) -> Complex:
+    """Move a map to where its texture coordinates are wished."""
+    return to_unit_square(z) if place is Place.unit else z
+
+
+def _textured(surface: SurfaceFile, moved: Complex) -> Textured:
+    mesh, corners = surface.mesh, None
+    if surface.uncut and surface.cut:
+        mesh, corners = surface.uncut, surface.cut.mesh.F
+    return Textured(mesh.V, mesh.F, _columns(moved), corners, name=surface.mesh.name)
+
+
+def _columns(z: Complex) -> Real:
+    return np.stack([z.real, z.imag], axis=1)
+
+
+def _texture(
+    surface: SurfaceFile, textured: Textured, wishes: Wishes, output: Path
+) -> bytes | None:
+    if wishes.bake is None:
+        return _checker(wishes, output)
+    from cembench.drawing.texture import baked_png, read_texture
+
+    if surface.repaired:
         raise ParameterError(
-            f"two surfaces would be written to {twice[0]}; map them into different folders."
+            "--bake needs the faces as the file has them; write the surface with `cembench repair` "
+            "and look at what it changed."
         )
-    return list(files)
+    old = read_obj_uv(surface.path, textured.F)
+    assert textured.uv is not None
+    corners = textured.F if textured.corners is None else textured.corners
+    return baked_png(read_texture(wishes.bake), old, textured.uv[corners])
 
 
-def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, record: Record) -> None:
-    """Draw a surface and its map into a PNG, with the figures that were recorded."""
-    title = f"{record.cell.mesh}: {record.title}"
-    write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
+def _checker(wishes: Wishes, output: Path) -> bytes | None:
+    if not wishes.checker and output.suffix.lower() != ".glb":
+        return None
+    from cembench.drawing.texture import checker_png
+
+    return checker_png()
+
+
+def _write(
+    output: Path, surface: Textured, texture: bytes | None, wishes: Wishes, original: str | None
+) -> None:
+    """Write the files of a surface, the texture first: no file names one that is not there."""
+    for path in beside(output, wishes):
+        if path.suffix == ".png":
+            assert texture is not None
+            write_bytes(path, texture, error=RenderError, parents=False)
+            surface = replace(surface, texture_file=path.name)
+        else:
+            assert surface.texture_file is not None
+            write_bytes(path, mtl_bytes(surface.texture_file), error=MeshError, parents=False)
+    if output.suffix.lower() != ".obj":
+        write_textured(output, replace(surface, texture=texture))
+        return
+    text = original or obj_bytes(surface).decode()
+    if wishes.textured:
+        library = output.with_suffix(".mtl").name.encode("utf-8", "surrogateescape")
+        text = with_material(text, library.decode("latin-1"))
+    write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
+
+
+def _joined(parts: Sequence[Textured]) -> Textured:
+    """Return several surfaces as one mesh."""
+    starts = np.cumsum([0, *(len(part.V) for part in parts)])
+    coordinates = [part.uv for part in parts if part.uv is not None]
+    uv_starts = np.cumsum([0, *(len(uv) for uv in coordinates)])
+    corners = [part.F if part.corners is None else part.corners for part in parts]
+    return Textured(
+        np.concatenate([part.V for part in parts]),
+        np.concatenate([part.F + k for part, k in zip(parts, starts, strict=False)]),
+        np.concatenate(coordinates),
+        np.concatenate([c + k for c, k in zip(corners, uv_starts, strict=False)]),
+    )
+
+
+def _folded_by_rounding(
+    output: Path, z: Complex, moved: Complex, F: NDArray[np.int64]
+) -> tuple[Notice, ...]:
+    """Say how many triangles the file folds that the map does not."""
+    single = output.suffix.lower() in SINGLE
+    written = _columns(moved).astype(np.float32 if single else np.float64).astype(np.float64)
+    after = orientations(written @ np.array([1, 1j]), F)
+    count = int(((orientations(z, F) > 0) & (after <= 0)).sum())
+    if not count:
+        return ()
+    precision = "single precision" if single else "the unit square"
+    remedy = "write OBJ, VTP or NPZ" if single else "--uv disk keeps the map as it is"
+    told = (
+        f"{count} of {len(F)} triangles are so small in the map that rounding to {precision} folds "
+        f"them or takes their area; {remedy}"
+    )
+    return (Notice(NoticeKind.FOLDED_BY_ROUNDING, told),)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import base64
 import html
 import os
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import AlgorithmFailed, ParameterError
+from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry, load_registry
 from cembench.results.records import Outcome
@@ -104,15 +106,27 @@ class Result:
         """What else the algorithm reports of itself."""
         return self.outcome.extras
 
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        uv: Literal["unit", "disk"] = "unit",
+        checker: bool = False,
+        overwrite: bool = False,
+    ) -> Path:
         """Write the surface with the map as its texture coordinates.
 
         Parameters
         ----------
         path : path
-            OBJ or PLY, by its suffix.
+            OBJ, PLY, GLB, VTP or NPZ, by its suffix. GLB has a checkerboard as its texture.
+        uv : {"unit", "disk"}
+            Whether the map is moved into the unit square, where engines look for textures
+            (``(z + 1 + 1j) / 2`` for a disk), or written as it is.
+        checker : bool
+            Whether an OBJ or PLY file gets a checkerboard too, as files beside it.
         overwrite : bool
-            Whether a file that is there may be replaced.
+            Whether files that are there may be replaced.
 
         Raises
         ------
@@ -122,12 +136,40 @@ class Result:
 
         """
         from cembench.core.outputs import refuse_existing
-        from cembench.mesh.files import write_mesh
+        from cembench.workflows.map_files import Wishes, beside, save_map
+        from cembench.workflows.places import Place
 
         path = Path(path)
-        refuse_existing(path, overwrite=overwrite)
-        write_mesh(path, self.mesh, self.z)
+        if uv not in tuple(Place):
+            raise ParameterError(f"uv={uv!r} is unknown; allowed: 'unit', 'disk'.")
+        wishes = Wishes(Place(uv), checker)
+        check_writable_format(path, with_uv=True)
+        for file in (path, *beside(path, wishes)):
+            refuse_existing(file, overwrite=overwrite)
+        for notice in save_map(path, self.mesh, self.z, wishes):
+            warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
+
+    def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
+        """Return the surface sampled on a regular grid of the map, float64 (side, side, 3).
+
+        A map onto the disk is sampled on the square, see
+        :func:`cembench.conformal.resample.geometry_image`.
+        """
+        from cembench.conformal.resample import geometry_image
+
+        square = self.algorithm.target == "disk"
+        return geometry_image(self.mesh, self.z, side, "square" if square else "disk")
+
+    def remesh(self, side: int = 65) -> DiskMesh:
+        """Return the surface meshed anew, with triangles that are equilateral on its disk.
+
+        `side` lattice points lie along the disk's diameter; see
+        :func:`cembench.conformal.resample.regular_remesh`.
+        """
+        from cembench.conformal.resample import regular_remesh
+
+        return regular_remesh(self.mesh, self.z, side)[0]
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """Draw the surface and its image under one checkerboard.
@@ -158,6 +200,43 @@ class Result:
         figure.figimage(pixels)
         return figure
 
+    def show(self, path: str | os.PathLike[str] | None = None) -> Path:
+        """Open a page in the browser on which the surface and its image can be turned.
+
+        The page needs no network and no other file.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where to write it, an HTML file; then it is not opened. Default: a temporary file.
+
+        Returns
+        -------
+        Path
+            The page.
+
+        Raises
+        ------
+        RenderError
+            It cannot be written.
+
+        """
+        import tempfile
+        import webbrowser
+
+        from cembench.core.names import file_name
+        from cembench.report.render.view_page import write_view_page
+        from cembench.workflows.view import map_page
+
+        page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title, self.notices)
+        if path is not None:
+            write_view_page(Path(path), page)
+            return Path(path)
+        shown = Path(tempfile.mkdtemp(prefix="cembench-")) / f"{file_name(self.mesh.name)}.html"
+        write_view_page(shown, page)
+        webbrowser.open(shown.as_uri())
+        return shown
+
     def _png(self) -> bytes:
         from cembench.drawing.preview import preview_png
 
@@ -181,15 +260,11 @@ class Result:
         )
 
     def _repr_html_(self) -> str:
-        from cembench.conformal.metrics import METRICS
+        from cembench.workflows.view import metric_facts
 
         picture = base64.b64encode(self._png()).decode()
         rows = [("status", self.outcome.status + (f": {self.cause}" if self.cause else ""))]
-        rows += [
-            (metric.title, f"{metric.text(self.metrics[metric.name], precise=True)} {metric.unit}")
-            for metric in METRICS
-            if metric.name in self.metrics
-        ]
+        rows += metric_facts(self.outcome)
         rows += [("iterations", str(self.iterations)), ("seconds", f"{self.seconds:.3f}")]
         rows += [("note", notice) for notice in self.notices]
         words = html.escape(self._title)

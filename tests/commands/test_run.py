@@ -185,3 +185,13 @@ def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):
         write_mesh(cli.folder / name, flat_disk(100))
     found = json.loads(cli("run", "-a", "cem", "--mesh-dir", ".", "--dry-run", "--json")[1])
     assert [cell["mesh"] for cell in found["cells"]] == ["a"]
+
+
+def test_ctrl_c_says_that_the_same_command_resumes(cli, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("cembench.running.local.run_tasks", interrupted)
+    code, _, err = cli("run", "--surfaces", "flat-disk", "--faces", "60", "-a", "cem")
+    assert code == 130
+    assert "Stopped; the same command resumes." in err

@@ -2,8 +2,11 @@
 
 from pathlib import PurePosixPath
 
+import numpy as np
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from PIL import Image, ImageDraw
 
+from cembench.drawing.view_scene import ViewedMap, view_scene
 from cembench.report.document import (
     Claim,
     Column,
@@ -182,8 +185,19 @@ def _page(folder, place, name):
                 alternative=f"The disk of {name} under a checkerboard, mapped by {algorithm}",
             )
         )
-    gallery = Gallery(f"maps-{place}", "Maps.", tuple(pictures), "One checkerboard for all.")
+    scene = _scene() if place == 0 else b""
+    gallery = Gallery(f"maps-{place}", "Maps.", tuple(pictures), "One checkerboard for all.", scene)
     return Section(f"surface-{place}", name, (Text(f"All on {name}."), gallery), page=True)
+
+
+def _scene():
+    """A bowl by two maps; the second folds it in the middle."""
+    mesh = hemi_ellipsoid(600)
+    z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    folded = np.where(np.abs(z) < 0.3 * np.abs(z).max(), -z, z)
+    return view_scene(
+        mesh, [ViewedMap("cem", z, "cem, a line."), ViewedMap("qiem", folded)], "Foot"
+    )
 
 
 def _picture(path, colour):

@@ -11,6 +11,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.document import (
     Claim,
     Gap,
+    Table,
     figures_of,
     sections_of,
     tables_of,
@@ -148,7 +149,13 @@ def test_a_run_of_other_surfaces_alone_has_a_report(tmp_path):
         if record.mesh.paper_row:
             next((tmp_path / "run" / "records").glob(f"{record.cell.label}.json")).unlink()
     report = write_report(store.folder, tmp_path / "out", "c")
-    assert any(gap.title.startswith("Tables 1 to 4") for gap in items_of(report, Gap))
+    assert report.title == "flat-disk, mapped by 5 algorithms"
+    assert {section.name for section in report.sections} == {"summary", "results", "surfaces"}
+    assert not list(items_of(report, Gap))
+    assert not list(items_of(report, Claim))
+    tables = list(items_of(report, Table))
+    assert not any(column.title == "printed" for table in tables for column in table.columns)
+    assert "cells ended with a valid map" in report.findings.figures[-1].words
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(paper_tables(report))
     assert "flat-disk" in console.export_text()

@@ -15,6 +15,7 @@ from cembench.conformal.metrics import angle_errors
 from cembench.core.atomic import write_bytes
 from cembench.core.names import digest, distinct_slugs
 from cembench.drawing import shading
+from cembench.drawing.view_scene import ViewedMap, most_each, turned_onto, upright, view_scene
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import (
     DISK,
@@ -70,6 +71,8 @@ class Inspection:
     curvature: Figure | None = None
     mesh: Figure | None = None
     angles: Mapping[str, Angles] = field(default_factory=lambda: MappingProxyType({}))
+    #: The surface and its maps to be turned; empty where there are none.
+    scene: bytes = b""
 
     @property
     def why_not(self) -> str:
@@ -91,9 +94,12 @@ def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) 
     checkerboards: dict[str, Figure] = {}
     angles: dict[str, Angles] = {}
     shown: tuple[AlgorithmSeries, shading.RasterPanel] | None = None
-    for series, record, uv in maps:
-        if uv is None:
+    viewed: list[ViewedMap] = []
+    for series, record, found_uv in maps:
+        if found_uv is None:
             continue
+        uv = turned_onto(found_uv, viewed[0].z) if viewed else upright(mesh, found_uv)
+        viewed.append(ViewedMap(series.label, uv, _about(series, record)))
         panel = shading.image_panel(mesh, uv, SIDE)
         checkerboards[series.label] = drawer.checkerboard(series, record, panel, uv)
         if series.target == DISK:
@@ -101,7 +107,18 @@ def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) 
         if shown is None or (series.algorithm == REFERENCE and series.main):
             shown = (series, panel)
     curved, meshed = drawer.curvature_and_mesh(*shown) if shown else (None, None)
-    return Inspection(surface, True, checkerboards, curved, meshed, angles)
+    most = most_each(len(evidence.surfaces))
+    scene = view_scene(mesh, viewed, surface.title, most) if viewed else b""
+    return Inspection(surface, True, checkerboards, curved, meshed, angles, scene)
+
+
+def _about(series: AlgorithmSeries, record: Record) -> str:
+    """Say what is to be known of a map in a line below its view."""
+    metrics = record.outcome.metrics
+    error, folds = metrics.get("angle_error_mean_deg"), metrics.get("flipped_triangles")
+    target = "" if series.target == DISK else f" (not a map to the disk: {series.target})"
+    off = "" if error is None else f"; angles off by {error:.2f} degrees in the mean"
+    return f"{series.label}{target}{off}; {folds} folded triangles."
 
 
 def _angles(mesh: TriangleMesh, uv: NDArray[np.complex128], record: Record) -> Angles:
@@ -136,11 +153,7 @@ class _Drawer:
             shading.paint(p, shading.checkerboard(p, self.mesh, uv, self.space))
             for p in (self.space, panel)
         ]
-        metrics = record.outcome.metrics
-        error, folds = metrics.get("angle_error_mean_deg"), metrics.get("flipped_triangles")
-        target = "" if series.target == DISK else f" (not a map to the disk: {series.target})"
-        words = "" if error is None else f"; angles off by {error:.2f} degrees in the mean"
-        caption = f"{self.surface.title}, {series.label}{target}{words}; {folds} folded triangles."
+        caption = f"{self.surface.title}, {_about(series, record)}"
         return self._figure(
             f"{self.labels[series.label]}-checkerboard",
             f"{series.label}",

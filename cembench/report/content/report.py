@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cembench import __version__
@@ -19,9 +20,10 @@ from cembench.report.content.figures.energy_by_iteration import energy_by_iterat
 from cembench.report.content.figures.over_models import angles_over_models, energy_over_models
 from cembench.report.content.figures.performance_profile import performance_profile
 from cembench.report.content.figures.time_by_phase import time_by_phase
+from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.other_targets import other_targets
-from cembench.report.content.surface_page import surface_page
+from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.content.table_1 import table_1
 from cembench.report.content.table_2 import table_2
 from cembench.report.content.table_3 import table_3
@@ -44,6 +46,10 @@ PICTURES = (
 )
 
 
+PAPER = "Conformal surface parameterizations: the paper's tables and figures, measured"
+#: The plot at the head: how good maps are against what they cost.
+FIRST_PLOT = "accuracy-against-time"
+
 #: What is said of surfaces by their origin.
 _KINDS: Mapping[MeshOrigin, str] = {
     "model": "of the paper's models",
@@ -62,19 +68,27 @@ def build_report(
         progress(f"surface {surface.title}", k, n)
         inspections[surface.mesh_hash] = inspect_surface(evidence, surface, folder)
     progress("tables, plots and claims", n - 2, n)
-    sections = [
-        _summary(evidence),
-        _tables(evidence),
-        Section("claims", "Claims of the paper", tuple(claims(evidence, inspections))),
-        _figures(evidence, inspections, folder),
-        _beyond(evidence, folder),
-        *exhibit_sections(evidence, folder),
-    ]
+    of_paper = bool(evidence.models)
+    tested = claims(evidence, inspections) if of_paper else []
+    beyond = _beyond(evidence, folder)
+    sections = [_summary(evidence)]
+    if of_paper:
+        sections += [
+            _tables(evidence),
+            Section("claims", "Claims of the paper", tuple(tested)),
+            _figures(evidence, inspections, folder),
+            beyond,
+        ]
+    else:
+        sections.append(_own(evidence, inspections, folder, beyond))
+    sections += exhibit_sections(evidence, folder)
     progress("pages of the surfaces", n - 1, n)
     sections.append(_pages(evidence, inspections, folder))
     progress("done", n, n)
+    found = findings(evidence, inspections, tested)
     return Report(
-        title="Conformal surface parameterizations: the paper's tables and figures, measured",
+        title=PAPER if of_paper else _own_title(evidence),
+        findings=replace(found, plot=_first_plot(beyond)) if found else None,
         command=command,
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
@@ -126,6 +140,8 @@ def _machine(about: Mapping[str, object]) -> str:
 
 
 def _summary(evidence: Evidence) -> Section:
+    if not evidence.models:
+        return Section("summary", "What this is", (not_ok(evidence),))
     marks = "; ".join(
         f"{words}{f' ({mark})' if mark else ''}" for words, mark in ORIGINS.values() if words
     )
@@ -149,14 +165,6 @@ def _summary(evidence: Evidence) -> Section:
 
 def _tables(evidence: Evidence) -> Section:
     items: list[Item] = []
-    if not evidence.models:
-        items.append(
-            Gap(
-                "Tables 1 to 4 beside the printed ones",
-                "no surface of this run is or stands for a model of the paper.",
-                f"cembench run --profile quick -o {evidence.store.folder}",
-            )
-        )
     for make in (table_1, table_2, table_3, table_4):
         items += make(evidence)
     return Section("tables", "Tables 1 to 4", tuple(items))
@@ -226,6 +234,34 @@ def _beyond(evidence: Evidence, folder: Path) -> Section:
     if others:
         items.append(others)
     return Section("beyond", "Beyond the paper", tuple(items))
+
+
+def _own_title(evidence: Evidence) -> str:
+    """Name a run of surfaces that are not the paper's by what is in it."""
+    algorithms = len({series.algorithm for series in evidence.series})
+    surfaces = evidence.surfaces
+    named = [surface.title for surface in surfaces]
+    of = " and ".join(named) if len(named) < 3 else f"{len(named)} surfaces"
+    return f"{of}, mapped by {algorithms} algorithm{'s' if algorithms > 1 else ''}"
+
+
+def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Section) -> Section:
+    """What is measured on surfaces that are not the paper's: without its columns and claims."""
+    items: list[Item] = [
+        figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
+        for surface in evidence.surfaces
+    ]
+    angles, _ = angle_histograms(evidence, inspections)
+    energies, _ = energy_by_iteration(evidence)
+    items += [item for item in beyond.items if not isinstance(item, Gap)]
+    items += _drawn([angles, energies, cost_by_faces(evidence)], folder)
+    return Section("results", "Results", tuple(items))
+
+
+def _first_plot(section: Section) -> Figure | None:
+    """The plot for the head of the report; it stands in this section."""
+    figures = [item for item in section.items if isinstance(item, Figure)]
+    return next((f for f in figures if f.name == FIRST_PLOT), figures[0] if figures else None)
 
 
 def _pages(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:

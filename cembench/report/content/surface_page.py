@@ -44,7 +44,9 @@ def surface_page(
                 "The surface and its image by each algorithm, under one checkerboard",
                 tuple(seen.checkerboards.values()),
                 "Squares stay squares where a map is conformal. Where they would be large on the "
-                "surface they are divided 3 by 3, in both panels alike. Folded triangles are red.",
+                "surface they are divided 3 by 3, in both panels alike. Folded triangles are red. "
+                "Images are turned so that what is up on the surface is up in them.",
+                seen.scene,
             )
         )
     if seen.curvature and seen.mesh:

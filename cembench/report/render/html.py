@@ -43,6 +43,7 @@ from cembench.report.document import (
     Value,
     csv_of,
     figures_of,
+    galleries_of,
 )
 from cembench.report.pictures import (
     THUMBNAIL,
@@ -61,6 +62,7 @@ VERDICTS: Mapping[str, str] = {
     "holds": "✓",
     "holds in part": "◐",
     "does not hold here": "✗",
+    "too few rounds": "…",
     "not tested here": "○",
 }
 #: Bytes up to which a figure's data is a part of the page; beyond, only the file beside it.
@@ -94,10 +96,12 @@ def render(report: Report, folder: Path) -> str:
     everything = [s for top in sections for s in _all_sections(top)]
     figures = list(figures_of(report))
     pictures = _embed_all(figures, folder)
-    script = (_TEMPLATES / "report.js").read_text()
+    script, style = template_text("report.js"), template_text("report.css")
+    if any(gallery.scene for gallery in galleries_of(report)):
+        script, style = script + template_text("view.js"), style + template_text("view.css")
     library = _plotly_source() if any(f.plot is not None for f in figures) else b""
     return (
-        _environment()
+        environment()
         .get_template("report.html")
         .render(
             report=report,
@@ -113,10 +117,11 @@ def render(report: Report, folder: Path) -> str:
             table_data=lambda table: (
                 _data(folder, p) if (folder / (p := csv_of(table))).exists() else ""
             ),
-            style=Markup((_TEMPLATES / "report.css").read_text()),
+            style=Markup(style),
+            scene=lambda gallery: base64.b64encode(gallery.scene).decode(),
             script=Markup(script),
             library=Markup(_squeezed(library)),
-            policy=_policy([script.encode(), library]),
+            policy=policy([script.encode(), library]),
         )
     )
 
@@ -350,7 +355,8 @@ def _words(value: Any) -> str:
 # --- the page --------------------------------------------------------------------------------
 
 
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """Return the templates with their filters."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(_TEMPLATES),
         autoescape=True,
@@ -381,7 +387,7 @@ def _symbols(words: str) -> Markup:
     return Markup(symbol.sub(r"<i>\1</i><sub>\2</sub>", str(escape(words))))
 
 
-def _policy(scripts: Sequence[bytes]) -> str:
+def policy(scripts: Sequence[bytes]) -> str:
     """What may the page do? Run the scripts it was written with, and ask nobody for anything."""
     hashes = [base64.b64encode(hashlib.sha256(s).digest()).decode() for s in scripts if s]
     allowed = " ".join(f"'sha256-{value}'" for value in hashes)
@@ -389,6 +395,11 @@ def _policy(scripts: Sequence[bytes]) -> str:
         "default-src 'none'; base-uri 'none'; form-action 'none'; img-src data: blob:; "
         f"style-src 'unsafe-inline'; script-src {allowed}"
     )
+
+
+def template_text(name: str) -> str:
+    """Return a part of a page that is no template: style or script."""
+    return (_TEMPLATES / name).read_text()
 
 
 @cache

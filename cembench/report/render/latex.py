@@ -71,7 +71,8 @@ def write_latex(report: Report, folder: Path) -> Path:
         _write(folder / tex_of(table), table_lines(table))
     lines = [f"% Made by: {escape(report.command)}", PREAMBLE]
     lines += [rf"\title{{{escape(report.title)}}}", r"\author{}", r"\date{}"]
-    lines += [r"\begin{document}", r"\maketitle", rf"Made by \texttt{{{escape(report.command)}}}."]
+    lines += [r"\begin{document}", r"\maketitle", *_findings(report)]
+    lines += [rf"Made by \texttt{{{escape(report.command)}}}."]
     lines += [r"\begin{description}"]
     lines += [rf"\item[{escape(name)}] {escape(words)}" for name, words in report.facts]
     lines += [r"\end{description}", r"\tableofcontents", r"\clearpage"]
@@ -81,6 +82,17 @@ def write_latex(report: Report, folder: Path) -> Path:
     path = folder / "report.tex"
     _write(path, lines)
     return path
+
+
+def _findings(report: Report) -> list[str]:
+    found = report.findings
+    if found is None:
+        return []
+    lines = [rf"\textbf{{{escape(found.sentence)}}}", r"\begin{itemize}"]
+    lines += [
+        rf"\item \textbf{{{escape(one.number)}}} {escape(one.words)}" for one in found.figures
+    ]
+    return [*lines, r"\end{itemize}"]
 
 
 def escape(text: str) -> str:

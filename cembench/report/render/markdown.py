@@ -31,7 +31,8 @@ _SPECIAL = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#"})
 def write_markdown(report: Report, folder: Path) -> Path:
     """Write ``report.md`` with what it links to; where is it?"""
     pages: list[Section] = []
-    lines = [f"# {escape(report.title)}", "", f"Made by `{report.command}`.", ""]
+    lines = [f"# {escape(report.title)}", "", *_findings(report)]
+    lines += [f"Made by `{report.command}`.", ""]
     lines += [f"- **{escape(name)}**: {escape(words)}" for name, words in report.facts]
     lines += ["", "Numbers link to their records; every record is a line of [records.csv]"]
     lines[-1] += "(records.csv)."
@@ -50,6 +51,14 @@ def write_markdown(report: Report, folder: Path) -> Path:
 def escape(text: str) -> str:
     """Text in which no character means anything to Markdown."""
     return text.translate(_SPECIAL).replace("\n", " ")
+
+
+def _findings(report: Report) -> list[str]:
+    found = report.findings
+    if found is None:
+        return []
+    figures = [f"- **{escape(one.number)}** {escape(one.words)}" for one in found.figures]
+    return [f"**{escape(found.sentence)}**", "", *figures, ""]
 
 
 def _page(section: Section) -> PurePosixPath:

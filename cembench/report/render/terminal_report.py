@@ -19,14 +19,17 @@ WIDTH, NAME = 80, 12
 
 
 def paper_tables(report: Report) -> RenderableType:
-    """The paper's four tables, what was printed above what was measured, surface by surface."""
+    """What was found, and the paper's four tables, what was printed above what was measured.
+
+    A run without the paper's surfaces has no such tables.
+    """
     tables = {table.name: table for table in tables_of(report)}
     chosen = [
         tables[name]
         for name in (n if n in tables else f"{n}-other-surfaces" for n in SHOWN)
         if name in tables
     ]
-    parts: list[RenderableType] = []
+    parts: list[RenderableType] = _findings(report)
     for table in chosen:
         parts += [Text(table.title, style="bold"), _folded(table)]
         notes = [note for note in table.notes if note != table.absent]
@@ -34,8 +37,20 @@ def paper_tables(report: Report) -> RenderableType:
         parts.append(Text(""))
     absent = {table.absent for table in chosen if table.absent}
     parts += [Text(note, style="dim") for note in sorted(absent)]
+    if not chosen:
+        return Group(*parts)
     marks = [f"{mark} {words}" for words, mark in ORIGINS.values() if mark and mark != "ᵖ"]
     return Group(*parts, Text(f"{'; '.join(marks)}; † misprint; ! unstable", style="dim"))
+
+
+def _findings(report: Report) -> list[RenderableType]:
+    parts: list[RenderableType] = [Text(report.title, style="bold")]
+    if report.findings is not None:
+        parts.append(Text(report.findings.sentence))
+        for found in report.findings.figures:
+            line = Text.assemble((found.number, "bold"), f"  {found.words}")
+            parts.append(Padding(line, (0, 0, 0, 2)))
+    return [*parts, Text("")]
 
 
 def _folded(table: Table) -> RenderableType:

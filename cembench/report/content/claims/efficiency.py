@@ -16,14 +16,20 @@ from cembench.report.content.averages import (
     percent,
     saving_of_mean,
 )
-from cembench.report.content.claims.verdicts import OURS, tested_on, under, verdict_of
+from cembench.report.content.claims.verdicts import (
+    OURS,
+    tested_on,
+    timed_verdict,
+    under,
+    verdict_of,
+)
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.content.table_2 import measured_rates
 from cembench.report.document import Claim, Verdict
 from cembench.results import paper
-from cembench.results.records import DEFAULT_ROUNDS
+from cembench.results.records import DEFAULT_ROUNDS, Record
 
 Inspections = Mapping[str, Inspection]
 #: A figure agrees with a stated one where it reaches this share of it.
@@ -48,7 +54,17 @@ def _tally(
     found = list(_compared(evidence))
     words = [f"{label}: {told(rates)} (n = {len(rates)})" for _, label, rates in found]
     held = sum(holds(algorithm, rates) for algorithm, _, rates in found)
-    return "; ".join(words) or "No pair of times in this run.", verdict_of(held, len(found))
+    verdict = timed_verdict(held, len(found), _timed(evidence))
+    return "; ".join(words) or "No pair of times in this run.", verdict
+
+
+def _timed(evidence: Evidence) -> list[Record]:
+    """The records on whose seconds the averages rest."""
+    return [
+        record
+        for record in evidence.records
+        if record.cell.algorithm in (REFERENCE, *COMPARED) and record.mesh.paper_row
+    ]
 
 
 def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
@@ -70,7 +86,7 @@ def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
         (f"rates above 0: {'; '.join(parts)}. The 95 % interval excludes equality in {sure}.")
         if parts
         else "No pair of times in this run.",
-        verdict_of(held, tested),
+        timed_verdict(held, tested, _timed(evidence)),
         f"{tested_on(evidence.one_each)} {OURS} An interval needs {DEFAULT_ROUNDS} rounds.",
     )
 
@@ -141,12 +157,14 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
     """Does CEM map more than 100,000 triangles in less than a second?"""
     series = evidence.series_of(REFERENCE)
     times: list[tuple[float, str, int, str]] = []
+    used: list[Record] = []
     for surface in evidence.surfaces if series else ():
         for policy in evidence.policies:
             record = evidence.find(surface, series, policy) if series else None
             seconds = record.outcome.median_seconds if record else None
             if surface.faces > 100_000 and seconds is not None:
                 times.append((seconds, surface.title, surface.faces, policy))
+                used += [record] if record else []
     largest = max((t for t in times if t[0] < 1), key=lambda t: t[2], default=None)
     fits = f", the largest {largest[2]:,} triangles ({largest[1]})" if largest else ""
     smallest = min(times, key=lambda t: (t[2], t[0]), default=None)
@@ -164,7 +182,7 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
         "CEM takes less than a second on the smallest surface above 100,000 triangles ('can be'); "
         "it need not on all larger ones.",
         words,
-        verdict_of(int(bool(smallest and smallest[0] < 1)), int(bool(times))),
+        timed_verdict(int(bool(smallest and smallest[0] < 1)), int(bool(times)), used),
         f"{OURS} The machine is in the report's head.",
     )
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.document import Verdict
+from cembench.results.comparison import seconds_interval
+from cembench.results.records import Record
 
 OURS = (
     "All algorithms are this project's implementations on one linear algebra; the paper timed the "
@@ -20,6 +22,17 @@ def verdict_of(held: int, tested: int) -> Verdict:
     if held == tested:
         return "holds"
     return "holds in part" if held else "does not hold here"
+
+
+def timed_verdict(held: int, tested: int, records: Iterable[Record]) -> Verdict:
+    """Give a verdict that rests on seconds: none where a record has too few rounds for an interval.
+
+    Of one round nobody can say how far the next one would be.
+    """
+    timed = [r for r in records if r.outcome.median_seconds is not None]
+    if tested and any(seconds_interval(record) is None for record in timed):
+        return "too few rounds"
+    return verdict_of(held, tested)
 
 
 def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:

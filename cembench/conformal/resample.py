@@ -1,0 +1,206 @@
+"""A surface sampled through its map: geometry images, and meshes with equilateral triangles.
+
+Both need points of the plane found on the surface. A conformal map keeps small shapes, so squares
+and equilateral triangles of the plane are nearly squares and equilateral on the surface; their
+sizes follow the map's scaling.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special
+from scipy.spatial import Delaunay
+
+from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+
+Real = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Complex = NDArray[np.complex128]
+Grid = Literal["square", "disk"]
+
+#: Samples along a side that are allowed.
+LEAST, MOST = 4, 8192
+#: A map lies on the disk if its boundary is this close to the unit circle.
+_ON_CIRCLE = 1e-9
+
+
+def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "square") -> Real:
+    """Sample a surface on a regular grid of its map's domain.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    z : complex128 (n,)
+        Its map.
+    side : int
+        Samples along a side of the grid, 4 to 8192.
+    grid : {"square", "disk"}
+        ``"square"`` maps the disk to the square, conformally but for the corners, so that all of
+        the grid is surface; only for maps onto the disk. ``"disk"`` lays the grid over the map.
+
+    Returns
+    -------
+    float64 (side, side, 3)
+        Points of the surface; the first row is the top. NaN where the grid is off the surface.
+
+    Raises
+    ------
+    ParameterError
+        The side is out of its range, or the map is not onto the disk.
+
+    References
+    ----------
+    .. [1] X. Gu, S. Gortler, H. Hoppe, "Geometry images", SIGGRAPH 2002.
+
+    """
+    _check_side(side)
+    if grid == "square":
+        _check_disk(mesh, z)
+        x = np.linspace(-1, 1, side)
+        points = square_to_disk(x[None, :] + 1j * x[::-1, None])
+    else:
+        low = complex(z.real.min(), z.imag.min())
+        extent = max(np.ptp(z.real), np.ptp(z.imag))
+        middle = low + complex(np.ptp(z.real), np.ptp(z.imag)) / 2
+        x = (np.arange(side) + 0.5) / side - 0.5
+        points = np.asarray(middle + extent * (x[None, :] + 1j * x[::-1, None]))
+    face, weights = locate(z, mesh.F, points.ravel(), nearest=grid == "square")
+    found = np.full((side * side, 3), np.nan)
+    inside = face >= 0
+    found[inside] = np.einsum("kc,kcd->kd", weights[inside], mesh.V[mesh.F[face[inside]]])
+    return found.reshape(side, side, 3)
+
+
+def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh, Complex]:
+    """Mesh a surface anew with triangles that are equilateral on its disk.
+
+    A triangular lattice of the disk, and points at even distances on its circle, are joined by a
+    Delaunay triangulation (Qhull) and lifted to the surface. Where the map shrinks the surface, the
+    new triangles are large: a lattice of the disk cannot be even on the surface too.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    z : complex128 (n,)
+        Its map onto the unit disk.
+    side : int
+        Lattice points along the disk's diameter, 4 to 8192.
+
+    Returns
+    -------
+    mesh : DiskMesh
+        The new mesh; its vertices lie on triangles of the old one.
+    z : complex128 (k,)
+        Where they lie on the disk.
+
+    Raises
+    ------
+    ParameterError
+        The side is out of its range, or the map is not onto the disk.
+
+    """
+    _check_side(side)
+    _check_disk(mesh, z)
+    step = 2 / (side - 1)
+    rows = np.arange(-np.ceil(2 / step), np.ceil(2 / step) + 1)
+    row, column = np.meshgrid(rows, rows, indexing="ij")
+    lattice = (step * (column + row / 2 + 1j * row * np.sqrt(0.75))).ravel()
+    inner = lattice[np.abs(lattice) < 1 - 0.6 * step]
+    around = np.exp(2j * np.pi * np.arange(np.ceil(2 * np.pi / step)) / np.ceil(2 * np.pi / step))
+    points = np.concatenate([around, inner])
+    F = Delaunay(np.stack([points.real, points.imag], axis=1)).simplices.astype(np.int64)
+    a, b, c = (points[F[:, k]] for k in range(3))
+    clockwise = (np.conj(b - a) * (c - a)).imag < 0
+    F[clockwise] = F[clockwise, ::-1]
+    face, weights = locate(z, mesh.F, points, nearest=True)
+    V = np.einsum("kc,kcd->kd", weights, mesh.V[mesh.F[face]])
+    return DiskMesh.from_arrays(V, F, name=mesh.name), points
+
+
+def locate(z: Complex, F: Ints, points: Complex, *, nearest: bool = False) -> tuple[Ints, Real]:
+    """Find points of the plane in the image's triangles.
+
+    Parameters
+    ----------
+    z, F : complex128 (n,), int64 (m, 3)
+        A map and its triangles.
+    points : complex128 (k,)
+        Points of the plane.
+    nearest : bool
+        Whether a point outside is moved to the nearest triangle, as on the thin caps between the
+        boundary's polygon and the circle.
+
+    Returns
+    -------
+    face : int64 (k,)
+        The triangle; -1 for points outside.
+    weights : float64 (k, 3)
+        Barycentric coordinates, none negative.
+
+    """
+    import shapely
+
+    corners = np.stack([z.real, z.imag], axis=1)[F]
+    rings = np.concatenate([corners, corners[:, :1]], axis=1)
+    tree = shapely.STRtree(shapely.polygons(rings))
+    places = shapely.points(points.real, points.imag)
+    face = np.full(len(points), -1, dtype=np.int64)
+    which, triangle = tree.query(places, predicate="intersects")
+    face[which[::-1]] = triangle[::-1]
+    if nearest:
+        lost = np.flatnonzero(face < 0)
+        face[lost] = tree.nearest(places[lost])
+    return face, _weights(z[F[face]], points)
+
+
+def square_to_disk(w: Complex) -> Complex:
+    """Map the square with corners (+-1, +-1) to the unit disk, conformally; the middle stays.
+
+    The map is an elliptic function of modulus 1/sqrt(2) [1]_; corners go to the diagonals.
+
+    References
+    ----------
+    .. [1] H. A. Schwarz, "Ueber einige Abbildungsaufgaben", J. reine angew. Math. 70 (1869).
+
+    """
+    quarter = special.ellipk(0.5)
+    u = quarter * ((1 + 1j) / 2 * w - 1)
+    sn, cn, dn, _ = special.ellipj(u.real, 0.5)
+    sn_i, cn_i, dn_i, _ = special.ellipj(u.imag, 0.5)
+    value = (cn * cn_i - 1j * sn * dn * sn_i * dn_i) / (1 - (dn * sn_i) ** 2)
+    return np.asarray((1 - 1j) / np.sqrt(2) * value)
+
+
+def _weights(corners: Complex, points: Complex) -> Real:
+    a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    p = points - a
+    area = (np.conj(u) * v).imag
+    safe = np.where(area == 0, 1.0, area)
+    second, third = (np.conj(p) * v).imag / safe, (np.conj(u) * p).imag / safe
+    weights = np.stack([1 - second - third, second, third], axis=1).clip(0)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+def _check_side(side: int) -> None:
+    if not LEAST <= side <= MOST:
+        raise ParameterError(f"the side is {side}; allowed: {LEAST} to {MOST} samples.")
+
+
+def _check_disk(mesh: TriangleMesh, z: Complex) -> None:
+    if len(mesh.loops) == 1:
+        off = float(np.abs(np.abs(z[mesh.loops[0]]) - 1).max())
+        if off <= _ON_CIRCLE:
+            return
+        why = f"its boundary lies off the unit circle by up to {off:.2g}"
+    else:
+        why = f"the surface has {len(mesh.loops)} boundaries"
+    raise ParameterError(
+        f"the map of {mesh.name} is not onto the disk: {why}. Use an algorithm whose target is the "
+        "disk, as direct-cem on a surface with one boundary."
+    )

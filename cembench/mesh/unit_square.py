@@ -1,0 +1,98 @@
+"""Maps moved to where engines look for textures: the unit square, in which they do not repeat."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Complex = NDArray[np.complex128]
+
+#: How far outside the unit disk a map onto it may lie: its boundary is on the circle but for that.
+_ROUNDING = 1e-9
+#: Share of an atlas's side that stays free between shells, so that their texels do not mix.
+_GAP = 1 / 128
+#: The smallest shell's side, as a share of the largest's.
+_SMALLEST = 1 / 16
+
+
+def to_unit_square(z: Complex) -> Complex:
+    """Move a map into the unit square by a scaling and a shift; angles stay.
+
+    Parameters
+    ----------
+    z : complex128 (n,)
+        Image of each vertex.
+
+    Returns
+    -------
+    complex128 (n,)
+        ``(z + 1 + 1j) / 2`` where the map lies in the unit disk and reaches its circle. Any other
+        map is scaled until it fills the square's width or height, and put in the middle.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> to_unit_square(np.array([-1, 1j, 0.6 - 0.8j]))
+    array([0. +0.5j, 0.5+1.j , 0.8+0.1j])
+
+    """
+    if abs(np.abs(z).max() - 1) <= _ROUNDING:
+        moved = (z + (1 + 1j)) / 2
+    else:
+        low = complex(z.real.min(), z.imag.min())
+        high = complex(z.real.max(), z.imag.max())
+        side = max((high - low).real, (high - low).imag) or 1.0
+        moved = (z - (low + high) / 2) / side + (0.5 + 0.5j)
+    return np.asarray(moved.real.clip(0, 1) + 1j * moved.imag.clip(0, 1))
+
+
+def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
+    """Put several maps side by side into the unit square, one shell each.
+
+    Shells lie in rows, the largest first, each in a square of its own and in its shape. A square's
+    side goes with the root of its surface's area, but is at least a sixteenth of the largest: files
+    come in different units.
+
+    Parameters
+    ----------
+    maps : sequence of complex128 (n,)
+        Images of the vertices of each surface.
+    areas : sequence of float
+        Area of each surface.
+
+    Returns
+    -------
+    list of complex128 (n,)
+        The maps, in the order given, without overlap.
+
+    """
+    if len(maps) == 1:
+        return [to_unit_square(maps[0])]
+    sides = np.sqrt(np.asarray(areas) / np.max(areas)).clip(min=_SMALLEST)
+    order = np.argsort(-sides, kind="stable")
+    low, high = 0.0, 1.0  # the largest scale at which the rows fit
+    for _ in range(50):
+        scale = (low + high) / 2
+        fits = _rows(sides[order] * scale) is not None
+        low, high = (scale, high) if fits else (low, scale)
+    places = _rows(sides[order] * low) or []
+    moved: list[Complex] = [np.empty(0, np.complex128)] * len(maps)
+    for k, place in zip(order, places, strict=True):
+        moved[k] = place + to_unit_square(maps[k]) * (sides[k] * low)
+    return moved
+
+
+def _rows(sides: NDArray[np.float64]) -> list[complex] | None:
+    """Return the lower left corners of squares in rows; None where they do not fit."""
+    places = []
+    x = y = height = 0.0
+    for side in sides.tolist():
+        if x + side > 1:
+            x, y, height = 0.0, y + height + _GAP, 0.0
+        if x + side > 1 or y + side > 1:
+            return None
+        places.append(complex(x, y))
+        x, height = x + side + _GAP, max(height, side)
+    return places

@@ -1,0 +1,139 @@
+"""Binary glTF 2.0 (`.glb`): surface, texture coordinates and texture in one file.
+
+glTF knows single precision only. So the vertices are written about the middle of the surface, and
+a node moves them back.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+from numpy.typing import NDArray
+
+from cembench.mesh.writers.textured import Textured, in_single_precision
+
+_FLOAT, _UINT32, _VERTICES, _INDICES, _REPEAT, _LINEAR, _MIPMAPS = (
+    5126, 5125, 34962, 34963, 10497, 9729, 9987,
+)  # fmt: skip
+
+
+def glb_bytes(*surfaces: Textured) -> bytes:
+    """Compose a file with a mesh for each surface; one with a texture shows it, from both sides.
+
+    Seams are cut open: a vertex of glTF has one texture coordinate. Its v points down.
+    """
+    file = _File()
+    for surface in surfaces:
+        _add(file, surface.cut_at_seams())
+    return file.packed()
+
+
+class _File:
+    """The parts of a file, as they grow."""
+
+    def __init__(self) -> None:
+        self.parts: dict[str, list[dict[str, Any]]] = {}
+        self.content = b""
+
+    def add(self, kind: str, part: dict[str, Any]) -> int:
+        """Add a part, unless there is an equal one, and return its index."""
+        known = self.parts.setdefault(kind, [])
+        if part not in known:
+            known.append(part)
+        return known.index(part)
+
+    def view(self, content: bytes, **more: Any) -> int:
+        """Add bytes, and return the index of their view."""
+        start = len(self.content)
+        self.content += content + bytes(-len(content) % 4)
+        view = {"buffer": 0, "byteOffset": start, "byteLength": len(content), **more}
+        return self.add("bufferViews", view)
+
+    def array(self, values: NDArray[Any], kind: str, target: int, *, bounds: bool = False) -> int:
+        """Add an array, and return the index of its accessor."""
+        component = _FLOAT if values.dtype.kind == "f" else _UINT32
+        view = self.view(values.tobytes(), target=target)
+        about = {
+            "bufferView": view,
+            "componentType": component,
+            "count": len(values),
+            "type": kind,
+        }
+        if bounds:
+            about |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
+        return self.add("accessors", about)
+
+    def packed(self) -> bytes:
+        """Compose the file: a header, the parts as JSON, the bytes."""
+        described = {
+            "asset": {"version": "2.0", "generator": "cembench"},
+            "scene": 0,
+            "scenes": [{"nodes": list(range(len(self.parts["nodes"])))}],
+            **self.parts,
+            "buffers": [{"byteLength": len(self.content)}],
+        }
+        text = json.dumps(described, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        chunks = [(b"JSON", text), (b"BIN\0", self.content)]
+        body = b"".join(struct.pack("<I4s", len(part), kind) + part for kind, part in chunks)
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+
+
+def _add(file: _File, surface: Textured) -> None:
+    middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
+    points = in_single_precision(surface.V - middle, "glTF")
+    in_single_precision(middle, "glTF")
+    attributes = {
+        "POSITION": file.array(points, "VEC3", _VERTICES, bounds=True),
+        "NORMAL": file.array(surface.normals().astype("<f4"), "VEC3", _VERTICES),
+    }
+    if surface.uv is not None:
+        downwards = surface.uv * [1, -1] + [0, 1]
+        st = in_single_precision(downwards, "glTF")
+        attributes["TEXCOORD_0"] = file.array(st, "VEC2", _VERTICES)
+    primitive = {
+        "attributes": attributes,
+        "indices": file.array(surface.F.ravel().astype("<u4"), "SCALAR", _INDICES),
+        "material": _material(file, surface.texture if surface.uv is not None else None),
+    }
+    mesh = file.add("meshes", {"name": _name(surface.name), "primitives": [primitive]})
+    node: dict[str, Any] = {"name": _name(surface.name), "mesh": mesh}
+    file.parts.setdefault("nodes", []).append(node | _moved(middle.tolist()))
+
+
+def _moved(middle: Sequence[float]) -> dict[str, Any]:
+    return {"translation": list(middle)} if any(middle) else {}
+
+
+def _material(file: _File, texture: bytes | None) -> int:
+    surface: dict[str, Any] = {"metallicFactor": 0, "roughnessFactor": 1}
+    if texture is not None:
+        known = [
+            k
+            for k, image in enumerate(file.parts.get("images", []))
+            if _bytes_of(file, image["bufferView"]) == texture
+        ]
+        if not known:
+            image = {"bufferView": file.view(texture), "mimeType": "image/png"}
+            known = [file.add("images", image)]
+        sampler = {
+            "magFilter": _LINEAR,
+            "minFilter": _MIPMAPS,
+            "wrapS": _REPEAT,
+            "wrapT": _REPEAT,
+        }
+        source = {"sampler": file.add("samplers", sampler), "source": known[0]}
+        surface["baseColorTexture"] = {"index": file.add("textures", source)}
+    return file.add("materials", {"pbrMetallicRoughness": surface, "doubleSided": True})
+
+
+def _bytes_of(file: _File, view: int) -> bytes:
+    place = file.parts["bufferViews"][view]
+    return file.content[place["byteOffset"] : place["byteOffset"] + place["byteLength"]]
+
+
+def _name(name: str) -> str:
+    return name.encode("utf-8", "replace").decode()

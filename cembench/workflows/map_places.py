@@ -1,0 +1,92 @@
+"""Where the maps of `cembench map` and their pictures go, and the pictures themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.metrics import caption
+from cembench.core.errors import MeshError, ParameterError
+from cembench.core.names import file_name
+from cembench.drawing.preview import write_preview
+from cembench.mesh.files import check_writable_format
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.registry import Algorithm
+from cembench.results.records import Record
+
+
+def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
+    """Raise :class:`ParameterError` where no algorithm maps what a cut makes."""
+    if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
+        raise ParameterError(
+            f"--cut makes a disk, which {candidates[0].name} does not take; name an algorithm for "
+            "disks (see `cembench list algorithms`)."
+        )
+
+
+def picture_files(
+    sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
+) -> list[Path]:
+    """Return where the picture of each surface goes: beside its output, or here.
+
+    Raises
+    ------
+    ParameterError
+        Two would have one name.
+
+    """
+    pictures = [
+        Path(f"{file_name(f'{source.stem}_{algorithm.name}')}.png")
+        if target is None
+        else target.with_suffix(".png")
+        for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
+    ]
+    twice = [picture for picture in pictures if pictures.count(picture) > 1]
+    if twice:
+        raise ParameterError(f"two pictures would be {twice[0]}; draw them one after another.")
+    return pictures
+
+
+def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | None]:
+    """Return where the map of each surface goes: a file, or files of a folder for several.
+
+    A file for several surfaces comes as often as there are surfaces.
+
+    Raises
+    ------
+    MeshError
+        A format that cannot hold the UVs, or a folder that is not there.
+    ParameterError
+        Two surfaces of one name.
+
+    """
+    if output is None:
+        return [None] * len(meshes)
+    if not output.is_dir() and (len(meshes) == 1 or output.suffix):
+        check_writable_format(output, with_uv=True)
+        return [output] * len(meshes)
+    if output.is_file():
+        raise ParameterError(
+            f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with -o."
+        )
+    if not output.parent.is_dir():
+        raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")
+    files = [
+        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' else '.obj'}"
+        for path in meshes
+    ]
+    twice = [file for file in files if files.count(file) > 1]
+    if twice:
+        raise ParameterError(
+            f"two surfaces would be written to {twice[0]}; map them into different folders."
+        )
+    return list(files)
+
+
+def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, record: Record) -> None:
+    """Draw a surface and its map into a PNG, with the figures that were recorded."""
+    title = f"{record.cell.mesh}: {record.title}"
+    write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))

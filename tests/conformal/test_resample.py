@@ -1,0 +1,112 @@
+import numpy as np
+import pytest
+from cembench.surfaces.holed_disk import holed_disk
+from cembench.surfaces.spherical_cap import spherical_cap
+from scipy import special
+
+from cembench import ParameterError
+from cembench.conformal.resample import geometry_image, locate, regular_remesh, square_to_disk
+from cembench.mesh.unit_square import to_unit_square
+
+
+@pytest.fixture(scope="module")
+def cap():
+    """A cap and its exact conformal map, the stereographic projection."""
+    mesh = spherical_cap(4000)
+    z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / (1 + mesh.V[:, 2])
+    z /= np.abs(z[mesh.boundary]).max()
+    z[mesh.boundary] /= np.abs(z[mesh.boundary])
+    return mesh, z
+
+
+def test_the_square_goes_to_the_disk_conformally():
+    t = np.linspace(-1, 1, 41)
+    for side in (t - 1j, t + 1j, -1 + 1j * t, 1 + 1j * t):
+        np.testing.assert_allclose(np.abs(square_to_disk(side)), 1, atol=1e-7)
+    corners = square_to_disk(np.array([1 + 1j, -1 + 1j]))
+    np.testing.assert_allclose(corners, np.exp(1j * np.pi / 4 * np.array([1, 3])), atol=1e-7)
+    assert square_to_disk(np.zeros(1))[0] == pytest.approx(0, abs=1e-12)
+    w = 0.9 * (t[None, :] + 1j * t[:, None])
+    step = 1e-5
+    along = (square_to_disk(w + step) - square_to_disk(w - step)) / (2 * step)
+    upwards = (square_to_disk(w + 1j * step) - square_to_disk(w - 1j * step)) / (2j * step)
+    np.testing.assert_allclose(along, upwards, atol=1e-8)
+    # The derivative of cn at K has modulus sqrt(1 - m), here of K (1 + i) w / 2.
+    assert abs(along[20, 20]) == pytest.approx(special.ellipk(0.5) / 2, rel=1e-6)
+
+
+def test_points_are_found_where_they_lie(cap):
+    mesh, z = cap
+    face, weights = locate(z, mesh.F, z[mesh.F].mean(axis=1))
+    np.testing.assert_array_equal(face, np.arange(mesh.m))
+    np.testing.assert_allclose(weights, 1 / 3, atol=1e-9)
+    assert locate(z, mesh.F, np.array([2 + 0j]))[0][0] == -1
+    _, weights = locate(z, mesh.F, np.array([2 + 0j]), nearest=True)
+    assert weights.min() >= 0
+    assert weights.sum() == pytest.approx(1)
+
+
+def test_a_geometry_image_lies_on_the_surface_and_is_full(cap):
+    mesh, z = cap
+    image = geometry_image(mesh, z, 33)
+    assert image.shape == (33, 33, 3)
+    radius = np.linalg.norm(image, axis=2)
+    np.testing.assert_allclose(radius, np.linalg.norm(mesh.V[0]), atol=5e-3)
+    rim = image[[0, -1], :, 2], image[:, [0, -1], 2]
+    for heights in rim:
+        np.testing.assert_allclose(heights, mesh.V[mesh.boundary, 2].mean(), atol=5e-3)
+    # Its squares are squares of the surface, away from the corners.
+    inner = image[8:-8, 8:-8]
+    across, down = np.diff(inner, axis=1)[:-1], np.diff(inner, axis=0)[:, :-1]
+    cosine = (across * down).sum(axis=2) / (
+        np.linalg.norm(across, axis=2) * np.linalg.norm(down, axis=2)
+    )
+    assert np.abs(cosine).max() < 0.1
+
+
+def test_the_first_row_is_the_top(cap):
+    mesh, z = cap
+    image = geometry_image(mesh, z, 9, "disk")
+    up = mesh.V[np.argmax(z.imag)]
+    assert np.linalg.norm(image[0, 4] - up) < 0.35 * np.linalg.norm(image[-1, 4] - up)
+    assert np.isnan(image[0, 0]).all()
+
+
+def test_holes_stay_holes_in_a_geometry_image():
+    mesh = holed_disk(400)
+    z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    image = geometry_image(mesh, z, 65, "disk")
+    known = np.isfinite(image[..., 0])
+    np.testing.assert_allclose(image[known][:, 2], 0, atol=1e-12)
+    x = (np.arange(65) + 0.5) / 65
+    expected = locate(to_unit_square(z), mesh.F, (x[None] + 1j * x[::-1, None]).ravel())[0] >= 0
+    assert (known.ravel() == expected).mean() > 0.999
+    assert known[32, 32] == expected.reshape(65, 65)[32, 32]
+    with pytest.raises(ParameterError, match=r"not onto the disk: the surface has \d+ boundaries"):
+        geometry_image(mesh, z, 65)
+
+
+def test_a_regular_mesh_lies_on_the_surface_with_nearly_equal_angles(cap):
+    mesh, z = cap
+    new, new_z = regular_remesh(mesh, z, 41)
+    assert len(new.loops) == 1
+    np.testing.assert_allclose(np.abs(new_z[new.boundary]), 1, atol=1e-12)
+    radius = np.linalg.norm(new.V, axis=1)
+    np.testing.assert_allclose(radius, np.linalg.norm(mesh.V[0]), atol=5e-3)
+    P = new.V[new.F]
+    u, v = P[:, [1, 2, 0]] - P, P[:, [2, 0, 1]] - P
+    cosine = (u * v).sum(axis=2) / (np.linalg.norm(u, axis=2) * np.linalg.norm(v, axis=2))
+    angles = np.rad2deg(np.arccos(cosine))
+    assert np.quantile(np.abs(angles - 60), 0.8) < 6
+
+
+@pytest.mark.parametrize("side", [3, 8193])
+def test_a_side_out_of_range_is_refused(cap, side):
+    with pytest.raises(ParameterError, match="allowed: 4 to 8192"):
+        geometry_image(*cap, side)
+
+
+def test_a_map_that_is_not_onto_the_disk_is_refused(cap):
+    mesh, z = cap
+    with pytest.raises(ParameterError, match="off the unit circle by up to 1"):
+        regular_remesh(mesh, 2 * z, 9)

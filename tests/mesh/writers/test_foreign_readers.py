@@ -1,0 +1,187 @@
+"""Every format that holds texture coordinates, opened by programs that are not ours."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pygltflib
+import pymeshlab
+import pytest
+import pyvista
+import trimesh
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+from cembench import MeshError
+from cembench.mesh.files import write_mesh, write_textured
+from cembench.mesh.writers.glb import glb_bytes
+from cembench.mesh.writers.textured import Textured
+
+
+@pytest.fixture(scope="module")
+def surface():
+    """A surface whose map is its shadow; far from the origin, so that middles matter."""
+    mesh = hemi_ellipsoid(300)
+    uv = (mesh.V[:, :2] - mesh.V[:, :2].min(axis=0)) / np.ptp(mesh.V[:, :2])
+    return Textured(mesh.V + np.array([1000, 0, 0]), mesh.F, uv, name="shadow")
+
+
+@pytest.fixture(scope="module")
+def seamed(surface):
+    """The same where the first triangle has texture coordinates of its own."""
+    corners = surface.F.copy()
+    corners[0] = len(surface.uv) + np.arange(3)
+    return Textured(surface.V, surface.F, np.vstack([surface.uv, np.eye(3, 2)]), corners)
+
+
+def by_trimesh(path):
+    found = trimesh.load_mesh(path, process=False)
+    return found.vertices[found.faces], found.visual.uv[found.faces]
+
+
+def by_vtk(path):
+    found = pyvista.read(path)
+    F = found.regular_faces
+    return found.points[F], found.active_texture_coordinates[F]
+
+
+def by_meshlab(path):
+    meshes = pymeshlab.MeshSet()
+    meshes.load_new_mesh(str(path))
+    found = meshes.current_mesh()
+    F = found.face_matrix()
+    if found.has_wedge_tex_coord():
+        uv = found.wedge_tex_coord_matrix().reshape(-1, 3, 2)
+    else:
+        uv = found.vertex_tex_coord_matrix()[F]
+    return found.vertex_matrix()[F], uv
+
+
+def by_pygltflib(path):
+    found = pygltflib.GLTF2.load(path)
+    (primitive,) = found.meshes[0].primitives
+
+    def array(index, columns):
+        accessor = found.accessors[index]
+        view = found.bufferViews[accessor.bufferView]
+        kind = {5126: "<f4", 5125: "<u4"}[accessor.componentType]
+        content = found.binary_blob()[view.byteOffset :][: view.byteLength]
+        return np.frombuffer(content, kind).reshape(accessor.count, columns)
+
+    F = array(primitive.indices, 1).reshape(-1, 3)
+    V = array(primitive.attributes.POSITION, 3) + np.array(found.nodes[0].translation)
+    uv = array(primitive.attributes.TEXCOORD_0, 2)
+    return V[F], (uv * [1, -1] + [0, 1])[F]
+
+
+def by_numpy(path):
+    found = np.load(path)
+    return found["V"][found["F"]], found["uv"][found["F_uv" if "F_uv" in found else "F"]]
+
+
+READERS = [
+    ("a.obj", by_trimesh),
+    ("a.obj", by_meshlab),
+    ("a.ply", by_trimesh),
+    ("a.ply", by_vtk),
+    ("a.ply", by_meshlab),
+    ("a.glb", by_trimesh),
+    ("a.glb", by_pygltflib),
+    ("a.vtp", by_vtk),
+    ("a.npz", by_numpy),
+]
+
+
+@pytest.mark.parametrize(("name", "read"), READERS)
+@pytest.mark.parametrize("which", ["surface", "seamed"])
+def test_a_foreign_reader_finds_corners_and_texture_coordinates(
+    name, read, which, request, tmp_path
+):
+    given = request.getfixturevalue(which)
+    write_textured(tmp_path / name, given)
+    points, uv = read(tmp_path / name)
+    np.testing.assert_allclose(points, given.V[given.F], rtol=1e-6, atol=1e-6)
+    corners = given.F if given.corners is None else given.corners
+    np.testing.assert_allclose(uv, given.uv[corners], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["a.vtp", "a.npz"])
+def test_full_precision_is_kept_to_the_last_bit(name, surface, tmp_path):
+    write_textured(tmp_path / name, surface)
+    points, uv = {".vtp": by_vtk, ".npz": by_numpy}[name[1:]](tmp_path / name)
+    np.testing.assert_array_equal(points, surface.V[surface.F])
+    np.testing.assert_array_equal(uv, surface.uv[surface.F])
+
+
+def test_glb_shows_the_texture_that_is_inside(surface, tmp_path):
+    from PIL import Image
+
+    from cembench.drawing.texture import checker_png
+
+    textured = Textured(surface.V, surface.F, surface.uv, texture=checker_png())
+    write_textured(tmp_path / "a.glb", textured)
+    found = trimesh.load_mesh(tmp_path / "a.glb")
+    picture = found.visual.material.baseColorTexture.convert("RGB")
+    assert isinstance(picture, Image.Image)
+    assert len(picture.getcolors()) == 2
+
+
+def test_glb_holds_several_surfaces_and_one_texture(surface, tmp_path):
+    parts = [
+        Textured(
+            surface.V + np.array([k, 0, 0]),
+            surface.F,
+            surface.uv,
+            texture=b"\x89PNG",
+            name=f"part {k}",
+        )
+        for k in range(2)
+    ]
+    (tmp_path / "a.glb").write_bytes(glb_bytes(*parts))
+    found = pygltflib.GLTF2.load(tmp_path / "a.glb")
+    assert [node.name for node in found.nodes] == ["part 0", "part 1"]
+    assert len(found.images) == len(found.textures) == len(found.materials) == 1
+
+
+@pytest.mark.parametrize("name", ["a.glb", "a.stl"])
+def test_what_single_precision_cannot_hold_is_refused(name, surface, tmp_path):
+    with pytest.raises(MeshError, match=r"do not fit into .* up to 3\.4e\+38"):
+        write_textured(tmp_path / name, Textured(surface.V * 1e40, surface.F))
+    assert not list(tmp_path.iterdir())
+
+
+def test_unknown_formats_are_told_what_is_known(surface, tmp_path):
+    mesh = hemi_ellipsoid(300)
+    with pytest.raises(MeshError, match=r"'\.fbx' is unknown; allowed here: \.obj, \.ply, \.glb"):
+        write_mesh(tmp_path / "a.fbx", mesh, np.zeros(mesh.n, complex))
+
+
+@pytest.mark.slow
+def test_the_validator_of_khronos_finds_nothing(surface, seamed, tmp_path):
+    npm, node = shutil.which("npm"), shutil.which("node")
+    if npm is None or node is None:
+        pytest.skip("NOT CHECKED: glTF by Khronos' validator; install node and npm")
+    got = subprocess.run(
+        [npm, "install", "--no-audit", "--no-fund", "gltf-validator@2.0.0-dev.3.10"],
+        cwd=tmp_path,
+        capture_output=True,
+        check=False,
+        timeout=300,
+    )
+    if got.returncode:
+        pytest.skip("NOT CHECKED: glTF by Khronos' validator; npm cannot get gltf-validator")
+    from cembench.drawing.texture import checker_png
+
+    for k, given in enumerate((surface, seamed)):
+        textured = Textured(given.V, given.F, given.uv, given.corners, checker_png())
+        (tmp_path / f"{k}.glb").write_bytes(glb_bytes(textured, textured))
+        script = (
+            "const v = require('gltf-validator'), fs = require('fs');"
+            f"v.validateBytes(new Uint8Array(fs.readFileSync('{k}.glb')))"
+            ".then(r => console.log(JSON.stringify(r)))"
+        )
+        told = subprocess.run(
+            [node, "-e", script], cwd=tmp_path, capture_output=True, check=True, timeout=120
+        )
+        issues = json.loads(told.stdout)["issues"]
+        assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]
