@@ -114,7 +114,9 @@ def tables(kept: dict[str, Any], known: list[Algorithm]) -> Iterator[str]:
 
 
 def cell(one: dict[str, Any], figure: str) -> str:
-    """A figure, the number of folds of an invalid map, or a dash."""
+    """A figure, the number of folds of an invalid map, a dash; nothing where it was not tried."""
+    if not one:
+        return ""
     if one.get("status") == "ok":
         return f"{one[figure]:.4g}"
     return f"{one['folds']} folds" if one.get("folds") else "-"
