@@ -261,6 +261,9 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
     """
     given = dict(declared)
     command, name, target = (given.pop(key, "") for key in ("command", "name", "target"))
+    for key in ("input", "output"):  # a format may be called "obj" as well as ".obj"
+        if key in given and "." not in given[key]:
+            given[key] = f".{given[key]}"
     name = name or _program_name(command)
     place = ("cembench.registry", None)
     about = {"target": target or "disk", "source": command, "notes": ""}

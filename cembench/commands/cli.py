@@ -38,6 +38,7 @@ from cembench.commands.console import (
     split,
 )
 from cembench.commands.ending import Verbs, ending
+from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
     Faces,
     Memory,
@@ -229,6 +230,8 @@ def map_(
         typer.Option("--cut", help="Cut the surface into a disk first, as `cembench cut` does."),
     ] = False,
     plugin: Plugins = [],  # noqa: B006
+    command: Command = None,
+    program: Settings = [],  # noqa: B006
     solves: SolvesOption = Solves.reuse,
     backend: BackendOption = Backend.cvxopt,
     threads: Threads = 1,
@@ -248,11 +251,16 @@ def map_(
     from cembench.results.record_rows import row
     from cembench.running.local import Options, map_once
     from cembench.running.plan import MeasurementSettings, paper_role_of_file, plan_cells
-    from cembench.running.surface_file import read_surface_file, write_map
+    from cembench.running.surface_file import read_surface_file, write_atlas, write_map
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
+    declared, named = declared_command(command, program)
+    if named and algorithm:
+        raise ParameterError("-a and --command name two algorithms; map with one after the other.")
+    plugin = [*plugin, *declared]
     registry = registry_with(plugin)
-    candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
+    asked_for = named or ([algorithm] if algorithm else USUAL)
+    candidates = [registry.algorithm(name) for name in asked_for]
     if cut:
         _check_takes_disks(candidates)
     outputs = _outputs(meshes, output, cut=cut)
@@ -291,9 +299,14 @@ def map_(
         if uv is not None and (ok or keep_invalid):
             where_to = outputs[k]
             if where_to is not None:
-                write_map(where_to, file, uv)
+                if task.algorithm.target == "atlas":
+                    write_atlas(where_to, file, uv.reshape(-1, 3))
+                else:
+                    write_map(where_to, file, uv)
                 written["output"] = str(where_to)
-            if preview:
+            if preview and task.algorithm.target == "atlas":
+                note("an atlas has no picture: islands lie anywhere in the plane")
+            elif preview:
                 with err.status("drawing", spinner="line"):
                     written["preview"] = str(pictures[k])
                     _draw(file.mesh, uv, pictures[k], record)
@@ -352,6 +365,8 @@ def run(
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006
     plugin: Plugins = [],  # noqa: B006
+    command: Command = None,
+    program: Settings = [],  # noqa: B006
     repeats: Repeats = DEFAULT_ROUNDS,
     seed: Seed = 0,
     timeout: Timeout = 600.0,
@@ -393,9 +408,12 @@ def run(
     run_folder.check(output)
     policies = _policies(solves)
     options = Options(timeout, memory_bytes(memory), fresh, rerun_failed, seed)
+    declared, named = declared_command(command, program)
+    plugin = [*plugin, *declared]
     registry = registry_with(plugin)
     usual = algorithms_of(profile, registry) if profile else list(registry.algorithms)
-    chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
+    wanted = dict.fromkeys([*(split(algorithms) or usual), *named])
+    chosen = [registry.algorithm(name) for name in wanted]
     _check_reference(reference, chosen)
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
     files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]

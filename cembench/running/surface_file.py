@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.atlas import cut_map
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError
 from cembench.mesh.cut import Cut, cut_open
@@ -66,6 +67,21 @@ def check_map_format(output: Path, *, cut: bool) -> None:
             f"{output}: the UVs of a cut surface belong to corners, not to vertices; allowed here: "
             ".obj. Write OBJ, or cut the surface with `cembench cut` and map the disk."
         )
+
+
+def write_atlas(output: Path, surface: SurfaceFile, corners: NDArray[np.complex128]) -> None:
+    """Write a surface with a UV for each corner (m, 3), as OBJ.
+
+    Raises
+    ------
+    MeshError
+        Another format, or the file cannot be written.
+
+    """
+    check_map_format(output, cut=True)
+    found = cut_map(surface.mesh, corners)
+    text = obj_text(surface.mesh.V, surface.mesh.F, found.uv, found.surface.F)
+    write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
 
 
 def write_map(output: Path, surface: SurfaceFile, uv: NDArray[np.complex128]) -> None:

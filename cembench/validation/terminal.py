@@ -57,15 +57,24 @@ def _pairs_table(against: BaselineComparison, title: str) -> Table:
         title_justify="left",
         title_style="bold",
     )
-    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=18)
-    for heading in ("faces", "E_C", "ratio", "mean °", "ratio", "seconds", "ratio"):
+    program = bool(against.solve_time)
+    table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=12 if program else 18)
+    times = ("wall", "start", "solve") if program else ("seconds",)
+    for heading in ("faces", "E_C", "ratio", "mean °", "ratio", *times, "ratio"):
         table.add_column(heading, justify="right", no_wrap=True)
     for pair in against.pairs:
-        table.add_row(*_pair_cells(pair))
+        table.add_row(*_pair_cells(pair, program=program))
+    if program:
+        table.caption = (
+            "external program: wall is its process, start the same on a small mesh, solve "
+            f"{against.solve_time}; the last ratio is of solve"
+        )
+        table.caption_justify = "left"
     return table
 
 
-def _pair_cells(pair: Pair) -> tuple[str, ...]:
+def _pair_cells(pair: Pair, *, program: bool) -> tuple[str, ...]:
+    more = (pair.start_seconds, pair.solve_seconds) if program else ()
     return (
         pair.surface,
         f"{pair.faces:,}",
@@ -73,7 +82,7 @@ def _pair_cells(pair: Pair) -> tuple[str, ...]:
         ratio_text(pair.energy, pair.baseline_energy),
         _number(pair.angle, ".3f"),
         ratio_text(pair.angle, pair.baseline_angle),
-        _number(pair.seconds, ".4f"),
+        *(_number(seconds, ".3f" if program else ".4f") for seconds in (pair.seconds, *more)),
         _number(pair.seconds_ratio, ".2f"),
     )
 

@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cembench.conformal.atlas import ATLAS_METRICS
 from cembench.conformal.metrics import METRICS, Metric, metrics_shown
 from cembench.mesh.datasets import Dataset
 from cembench.registry import Algorithm, Surface
@@ -26,6 +27,7 @@ from cembench.results.comparison import (
     references,
     seconds_interval,
 )
+from cembench.results.external_words import mark_of, marks_explained, seconds_words
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.running.estimate import Estimate
 
@@ -57,7 +59,7 @@ def results_table(records: Iterable[Record]) -> RenderableType:
 
 def _cells_table(records: Sequence[Record]) -> Table:
     table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    longest = max((len(record.cell.algorithm) + 2 for record in records), default=9)
+    longest = max((len(_name(record)) for record in records), default=9)
     room = max(8, min(16, 80 - 53 - longest))
     table.add_column("surface", overflow="ellipsis", no_wrap=True, max_width=room)
     table.add_column("algorithm", no_wrap=True)
@@ -70,7 +72,7 @@ def _cells_table(records: Sequence[Record]) -> Table:
             outcome = record.outcome
             table.add_row(
                 mesh if k == 0 else "",
-                record.cell.algorithm + ("" if record.target == "disk" else " *"),
+                _name(record),
                 *(_figure(record, metric) for metric in metrics_shown("overview")),
                 "-" if outcome.iterations is None else str(outcome.iterations),
                 "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
@@ -79,6 +81,12 @@ def _cells_table(records: Sequence[Record]) -> Table:
             )
         table.add_section()
     return table
+
+
+def _name(record: Record) -> str:
+    """Return an algorithm's name with its marks: another target, and whose code it is."""
+    marks = ("" if record.target == "disk" else "*") + mark_of(record)
+    return f"{record.cell.algorithm} {marks}".rstrip()
 
 
 def _spread(record: Record) -> Text:
@@ -94,11 +102,14 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
     if any(record.target != "disk" for record in records):
         kinds = sorted({f"{r.cell.algorithm}: {r.target}" for r in records if r.target != "disk"})
         remarks.append(Text(f"* not a map to the disk ({'; '.join(kinds)})", style="dim"))
+    remarks += [Text(line, style="dim") for line in marks_explained(list(records))]
     if any(is_unstable(record) for record in records):
         words = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
         remarks.append(Text(words, style="yellow"))
     for record in records:
         name = f"{record.cell.mesh} / {record.cell.algorithm}"
+        told = seconds_words(record)
+        remarks += [Text(f"{name}: {told}")] if told else []
         remarks += [Text(f"{name}: {note}") for note in record.outcome.notes]
         if record.outcome.cause:
             remarks.append(Text(f"{name}: {record.outcome.cause}"))
@@ -145,7 +156,7 @@ def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str
     for record, found in compared:
         i = found.speedup_interval
         sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
-        name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
+        name = _name(record) + (f" ({record.cell.solves})" if several else "")
         table.add_row(record.cell.mesh, name, f"{found.speedup:.2f}", sure, found.verdict)
     return table
 
@@ -153,14 +164,14 @@ def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str
 def _bare_speedups(compared: Sequence[tuple[Record, Comparison]]) -> Table:
     """A line a surface, a column an algorithm."""
     several = _several_policies(compared)
-    names = list(dict.fromkeys(record.cell.algorithm for record, _ in compared))
+    names = list(dict.fromkeys(_name(record) for record, _ in compared))
     table = _surfaces_column(28)
     for name in names:
         table.add_column(name, justify="right", overflow="fold")
     lines: dict[tuple[str, str], dict[str, str]] = {}
     for record, found in compared:
         line = lines.setdefault((record.cell.mesh, record.cell.solves), {})
-        line[record.cell.algorithm] = f"{found.speedup:.2f}"
+        line[_name(record)] = f"{found.speedup:.2f}"
     for (mesh, solves), line in lines.items():
         label = f"{mesh} ({solves})" if several else mesh
         table.add_row(label, *(line.get(name, "-") for name in names))
@@ -238,7 +249,9 @@ def figures_table(record: Record) -> Table:
     if facts.paper_row:
         table.add_row("in the paper", _printed(record))
     table.add_row("algorithm", f"{record.title} ({record.target})" + _given(record))
-    for metric in METRICS:
+    if record.external is not None:
+        table.add_row(f"external {record.external.kind}", record.external.name)
+    for metric in (*METRICS, *ATLAS_METRICS):
         if metric.name in outcome.metrics:
             text = metric.text(outcome.metrics[metric.name], precise=True)
             table.add_row(metric.title, f"{text} {metric.unit}".rstrip())
@@ -246,7 +259,8 @@ def figures_table(record: Record) -> Table:
         table.add_row("iterations", str(outcome.iterations))
     if outcome.seconds:
         phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
-        table.add_row("seconds", f"{outcome.median_seconds:.3f} ({phases})")
+        told = seconds_words(record) or f"{outcome.median_seconds:.3f} ({phases})"
+        table.add_row("seconds", told)
     interval = seconds_interval(record)
     if interval is not None:
         sure = f"{interval.low:.4f} to {interval.high:.4f} s over {len(outcome.rounds)} rounds"
@@ -255,8 +269,9 @@ def figures_table(record: Record) -> Table:
     if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
         table.add_row(
             "memory",
-            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, "
-            f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
+            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, of the program's processes"
+            if record.is_program
+            else f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
         )
     for note in outcome.notes:
         table.add_row("note", str(note))
