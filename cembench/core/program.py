@@ -68,7 +68,17 @@ class Program:
     @property
     def output_format(self) -> str:
         """The suffix of the file that it writes."""
-        return self.output if self.output.startswith(".") else Path(self.output).suffix.lower()
+        return Path(self.output_name).suffix.lower()
+
+    @property
+    def output_name(self) -> str:
+        """What the file that it writes is called."""
+        return self.output if self.names_its_file else f"uv{self.output}"
+
+    @property
+    def names_its_file(self) -> bool:
+        """Whether the program itself chooses what its file is called."""
+        return re.fullmatch(r"\.\w+", self.output) is None
 
     def words(self, values: Mapping[str, object]) -> list[str]:
         """Fill in the command."""
@@ -99,7 +109,7 @@ def checked_program(name: str, program: Program, parameters: Iterable[str]) -> P
         wrong = f"its command names {{{unknown[0]}}}; allowed: {named}"
     elif not {"input", "folder"} & set(used):
         wrong = "its command does not say where the mesh file goes; write {input} there"
-    elif program.output.startswith(".") and not {"output", "folder"} & set(used):
+    elif not program.names_its_file and not {"output", "folder"} & set(used):
         wrong = (
             "its command does not say where the UVs go; write {output} there, or name the file "
             "that it writes as its output"

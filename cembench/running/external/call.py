@@ -148,7 +148,7 @@ class ProgramCalls:
             raise NotThere(lacking)
         with _own_folder() as folder:
             given = folder / f"mesh{program.input}"
-            left = folder / (f"uv{program.output}" if program.output[0] == "." else program.output)
+            left = folder / program.output_name
             write_input(given, mesh)
             places = {"input": given, "output": left, "folder": folder, "threads": self.threads}
             words = program.words({**self.arguments, **places})
