@@ -38,7 +38,7 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     as with a boundary that crosses itself, folds stay.
     """
     L = laplacian(mesh, delaunay=delaunay)
-    n, pins = mesh.n, _far_apart(mesh)
+    n, pins = mesh.n, far_apart(mesh)
     with phase("assembly"):
         Q = sparse.csr_array(_conformal_energy_form(L, mesh.boundary))
         fixed = np.concatenate([pins, pins + n])
@@ -60,7 +60,8 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     return Parameterization(uv, extras={"pins": pins.tolist(), **repair})
 
 
-def _far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
+def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
+    """Return two boundary vertices: the farthest from the mean vertex, the farthest from that."""
     loop = mesh.V[mesh.boundary]
     first = int(np.argmax(np.linalg.norm(loop - mesh.V.mean(axis=0), axis=1)))
     second = int(np.argmax(np.linalg.norm(loop - loop[first], axis=1)))

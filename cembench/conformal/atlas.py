@@ -43,6 +43,9 @@ class CutMap:
         The edges of the uncut surface that are seams, by its vertices.
     seam_length : float
         Their length, in the units of the surface.
+    mirrored : int
+        How many islands came mirrored; in `uv` they are turned over, so that folds are told from
+        them and angles keep their sign.
 
     """
 
@@ -51,6 +54,7 @@ class CutMap:
     island: Indices
     seams: Indices
     seam_length: float
+    mirrored: int
 
     @property
     def islands(self) -> int:
@@ -67,7 +71,12 @@ def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
     surface = TriangleMesh.trusted(mesh.V[found[0].astype(np.int64)], G, mesh.name)
     island, seams = _islands_and_seams(F, G)
     length = float(np.linalg.norm(mesh.V[seams[:, 0]] - mesh.V[seams[:, 1]], axis=1).sum())
-    return CutMap(surface, found[1] + 1j * found[2], island, seams, length)
+    uv = found[1] + 1j * found[2]
+    areas = np.bincount(island, np.nan_to_num(signed_areas(uv, G)))
+    turned = areas < 0
+    of_turned = np.unique(G[turned[island]])
+    uv[of_turned] = uv[of_turned].conj()
+    return CutMap(surface, uv, island, seams, length, int(turned.sum()))
 
 
 def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
@@ -98,7 +107,7 @@ class AtlasFigures(MapFigures):
 
     @cached_property
     def area(self) -> float:
-        """A: the signed areas of all triangles, added up."""
+        """A: the signed areas of all triangles, added up, mirrored islands turned over."""
         return float(signed_areas(self.uv, self.mesh.F).sum())
 
     @cached_property
@@ -127,6 +136,11 @@ ATLAS_METRICS: tuple[Metric, ...] = (
         "islands", "islands", "islands", "", "d", "d",
         "parts of the surface that hang together in the image",
         lambda f: _atlas(f).cut.islands, better=None,
+    ),
+    Metric(
+        "mirrored_islands", "mirrored islands", "mirrored", "", "d", "d",
+        "islands whose triangles run the other way round than on the surface",
+        lambda f: _atlas(f).cut.mirrored,
     ),
     Metric(
         "seam_length", "seams", "seams", "in units of the surface", ".3g", ".6g",

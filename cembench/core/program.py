@@ -28,6 +28,8 @@ class Library:
     module: str
     #: Under which name its version is known.
     package: str
+    #: As :attr:`Program.circle`, for one that computes in single precision.
+    circle: float = 1e-9
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,10 @@ class Program:
     fit : bool
         Whether the image is first moved and scaled until its outer boundary lies on the unit
         circle: for programs that put the disk into the unit square.
+    flat : bool
+        Whether the file holds the flattened surface, the UVs being x and y of its vertices.
+    remedy : str
+        What brings the program to a machine that lacks it.
 
     """
 
@@ -64,6 +70,8 @@ class Program:
     version: tuple[str, ...] = ()
     circle: float = 1e-9
     fit: bool = False
+    flat: bool = False
+    remedy: str = ""
 
     @property
     def output_format(self) -> str:

@@ -18,6 +18,7 @@ from cembench.core.errors import MeshError, RecordError, said_by
 from cembench.core.loading import read_arrays
 from cembench.mesh.obj_reader import statement_words
 from cembench.mesh.ply_reader import read_ply_texture
+from cembench.mesh.reading import read_soup
 from cembench.mesh.soup import damaged, shown
 
 Points = NDArray[np.float64]
@@ -47,7 +48,7 @@ class UVFile:
     uv : complex128 (k,)
         Texture coordinates.
     V, F : float64 (n', 3) and int64 (m', 3), or None
-        The surface in the file, if there is one.
+        The surface in the file, if there is one; triangles alone have its vertices' numbers.
     index : int64 (m', 3) or None
         Which texture coordinate each corner has; None: the one of its vertex.
 
@@ -74,6 +75,22 @@ def read_uv(path: Path) -> UVFile:
         raise MeshError(str(error)) from error
     except (OSError, ValueError, OverflowError, IndexError, KeyError) as error:
         raise MeshError(f"{path.name} cannot be read: {said_by(error)}") from error
+
+
+def read_flat(path: Path) -> UVFile:
+    """Read a mesh file that holds a flattened surface, as UVs: x and y of its vertices.
+
+    Raises
+    ------
+    MeshError
+        The file is damaged, or its vertices do not lie in the plane z = 0.
+
+    """
+    soup = read_soup(path)
+    V, F = soup.V, soup.triangles
+    if np.abs(V[:, 2]).max() > SAME_PLACE * np.ptp(V[:, :2], axis=0).max():
+        raise MeshError("its vertices do not lie in the plane z = 0: it is not flattened")
+    return UVFile(V[:, 0] + 1j * V[:, 1], F=F, index=F)
 
 
 def uv_of_corners(file: UVFile, V: Points, F: Indices) -> Complex:
@@ -107,9 +124,9 @@ def uv_of_corners(file: UVFile, V: Points, F: Indices) -> Complex:
             f"a corner has UV number {int(corners.max())}, but there are {len(file.uv)} UVs"
         )
     uv = file.uv[corners]
-    if file.F is None or file.V is None:
+    if file.F is None:
         return uv
-    at, turn = _places(_vertex_numbers(file.V, V)[file.F], F)
+    at, turn = _places(file.F if file.V is None else _vertex_numbers(file.V, V)[file.F], F)
     return np.take_along_axis(uv[at], (np.arange(3) + turn[:, None]) % 3, axis=1)
 
 

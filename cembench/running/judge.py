@@ -46,7 +46,8 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]
     placed: list[Fault] = []
     order: list[Fault] = []
     if algorithm.target in ("disk", "circular holes"):
-        tolerance = algorithm.program.circle if algorithm.program else CIRCLE_TOLERANCE
+        others = algorithm.program or algorithm.library
+        tolerance = CIRCLE_TOLERANCE if others is None else others.circle
         placed, order = _of_the_circle(mesh, uv, tolerance)
     if algorithm.target == "circular holes":
         placed += _crossings(mesh, uv)
@@ -64,13 +65,16 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]
 
 
 def judged_atlas(mesh: TriangleMesh, corners: Complex) -> list[Fault]:
-    """Return the promises that an atlas breaks: that no triangle is folded, of any island."""
+    """Return the promises that an atlas breaks: that no triangle is folded, of any island.
+
+    Islands may be mirrored, as packing does to them, but not all.
+    """
     figures = AtlasFigures(cut_map(mesh, corners))
     folded = int(figures.folds.sum())
+    if figures.cut.mirrored == figures.cut.islands:
+        return [_fault(FaultKind.REVERSED, "the map reverses the surface's orientation")]
     if not folded:
         return []
-    if folded == mesh.m or figures.area <= 0:
-        return [_fault(FaultKind.REVERSED, "the map reverses the surface's orientation")]
     told = (
         f"{folded} of {mesh.m} triangles are folded ({folded / mesh.m:.2%}), in "
         f"{int((figures.folds > 0).sum())} of {figures.cut.islands} islands"

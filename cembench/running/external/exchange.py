@@ -13,7 +13,7 @@ from cembench.core.errors import MeshError
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.mesh.uv_reader import OtherSurfaceError, read_uv, uv_of_corners
+from cembench.mesh.uv_reader import OtherSurfaceError, read_flat, read_uv, uv_of_corners
 from cembench.registry import Algorithm
 from cembench.results.records import FaultKind
 from cembench.running.external.faults import ProgramFault
@@ -53,7 +53,9 @@ def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Paramet
     """
     _check_output(path, mesh)
     try:
-        corners = uv_of_corners(read_uv(path), mesh.V, mesh.F)
+        program = algorithm.program
+        read = read_flat if program is not None and program.flat else read_uv
+        corners = uv_of_corners(read(path), mesh.V, mesh.F)
     except OtherSurfaceError as error:
         told = f"{path.name} is not a map of the surface that it was given: {error}"
         raise ProgramFault(FaultKind.OTHER_SURFACE, told, status="invalid") from None
@@ -63,7 +65,6 @@ def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Paramet
     if algorithm.target == "atlas":
         return Atlas(corners)
     uv = _of_vertices(corners, mesh)
-    program = algorithm.program
     if program is not None and program.fit:
         uv = _in_unit_circle(uv, mesh)
     return Parameterization(uv)

@@ -29,10 +29,8 @@ def missing(algorithm: Algorithm) -> str | None:
     """Return what an algorithm needs that is not there, and what brings it; None if all is."""
     program, library = algorithm.program, algorithm.library
     if program is not None and executable(program) is None:
-        return (
-            f"there is no program {program.command[0]!r} on this machine. Install it, put its "
-            "folder into PATH, or name it with its path"
-        )
+        remedy = program.remedy or "Install it, put its folder into PATH, or name it with its path"
+        return f"there is no program {program.command[0]!r} on this machine. {remedy}"
     if library is not None and importlib.util.find_spec(library.module) is None:
         return (
             f"the library {library.package} is not installed; `pip install {library.package}` "
