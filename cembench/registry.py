@@ -31,7 +31,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from cembench.core.errors import ParameterError, RegistryError, said_by
 from cembench.core.parameterization import MapStep
-from cembench.core.program import Library, Program, checked_program, found_words
+from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
@@ -265,8 +265,13 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
         if key in given and "." not in given[key]:
             given[key] = f".{given[key]}"
     name = name or _program_name(command)
+    source = command
+    if command.endswith(".m") and (folder / command).is_file():
+        function_file = of_matlab_function(folder / command)
+        command = function_file.pop("command")
+        given = function_file | given
     place = ("cembench.registry", None)
-    about = {"target": target or "disk", "source": command, "notes": ""}
+    about = {"target": target or "disk", "source": source, "notes": ""}
     function = _of_holes if target == "circular holes" else _of_disks
     return _program_of(function, place, name, name, about, command, folder, given)
 

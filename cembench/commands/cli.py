@@ -20,6 +20,7 @@ from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
 from cembench.commands import morph as morph_verbs
+from cembench.commands import peers as peers_verbs
 from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
@@ -523,6 +524,7 @@ _MORE = (
     fetch_verbs,
     repair_verbs,
     cut_verbs,
+    peers_verbs,
 )
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)

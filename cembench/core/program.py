@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -93,7 +94,9 @@ class Program:
         return [_PLACEHOLDER.sub(lambda m: str(values[m[1]]), word) for word in self.command]
 
     def __str__(self) -> str:
-        return shlex.join(self.command)
+        """The command with the names of files, not where they lie on this machine."""
+        shown = (Path(w).name if Path(w).is_absolute() else w for w in self.command)
+        return " ".join(w if _PLACEHOLDER.fullmatch(w) else shlex.quote(w) for w in shown)
 
 
 def checked_program(name: str, program: Program, parameters: Iterable[str]) -> Program:
@@ -148,6 +151,31 @@ def _wrong_pattern(pattern: str) -> str:
             f"{', '.join(UNITS)}"
         )
     return ""
+
+
+def of_matlab_function(file: Path) -> dict[str, str]:
+    """Return the declaration of a MATLAB function ``uv = f(V, F)`` in a file, F counted from 1.
+
+    Octave runs it, or MATLAB where there is no Octave. The solve time is that of the function
+    alone.
+    """
+    octave = next((name for name in ("octave-cli", "octave") if shutil.which(name)), "")
+    code = (
+        f'addpath("{file.parent.absolute()}"); mesh = load("{{input}}"); started = tic; '
+        f"uv = {file.stem}(double(mesh.v), double(mesh.f)); "
+        'fprintf("solve: %.9f s\\n", toc(started)); save("-v7", "{output}", "uv");'
+    )
+    words = [octave, "--norc", "--quiet", "--eval", code]
+    if not octave:
+        words = ["matlab" if shutil.which("matlab") else "octave-cli", "-batch", code]
+    return {
+        "command": shlex.join(words),
+        "input": ".mat",
+        "output": ".mat",
+        "seconds": r"^solve: (\S+) s$",
+        "version": f"{words[0]} --version" if octave else "",
+        "remedy": "Install Octave (in Debian: apt-get install octave-cli), or MATLAB",
+    }
 
 
 def found_words(command: str, folder: Path) -> tuple[str, ...]:

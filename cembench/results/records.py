@@ -265,6 +265,12 @@ class Outcome(BaseModel):
     program: ProgramRun | None = None
 
     @property
+    def relative_energy(self) -> float | None:
+        """E_C over the image's area; None where one of them is not known."""
+        energy, area = (self.metrics.get(name) for name in ("conformal_energy", "image_area"))
+        return None if energy is None or not area else energy / area
+
+    @property
     def solve_seconds(self) -> float | None:
         """The median over the rounds of :attr:`Round.solve_seconds`; None where one has none."""
         found = [r.solve_seconds for r in self.rounds]

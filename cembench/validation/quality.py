@@ -92,7 +92,7 @@ class BaselineComparison(BaseModel):
 
     baseline: str
     title: str
-    #: Targets differ, so energies were divided by the area of the image.
+    #: Targets differ, or the image's size is free, so energies were divided by its area.
     relative: bool
     pairs: tuple[Pair, ...]
     energy: PairedComparison
@@ -117,7 +117,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     names = [name for name in mine if name in theirs]
     if not names:
         raise ValueError(f"no surface has records of both {ours!r} and {baseline!r}")
-    relative = next(iter(mine.values())).target != next(iter(theirs.values())).target
+    one, other = next(iter(mine.values())), next(iter(theirs.values()))
+    # The size of a free image is another's choice where the code is another's.
+    free = one.target == "free boundary" and (one.external, other.external) != (None, None)
+    relative = one.target != other.target or free
     pairs = tuple(_pair(mine[name], theirs[name], relative=relative) for name in names)
     return BaselineComparison(
         baseline=baseline,
