@@ -6,6 +6,7 @@ program was given is for the caller to see: :func:`uv_of_corners`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +32,8 @@ SAME_PLACE = 1e-5
 #: What arrays of UVs, and of their numbers at corners, may be called.
 _UV_NAMES = ("uv", "UV")
 _INDEX_NAMES = ("fuv", "FUV", "ftc", "FTC")
+#: How OFF begins that ends each vertex in two texture coordinates.
+_STOFF = re.compile("STC?N?OFF")
 #: Stands for a corner that names no UV.
 NO_UV = -(2**62)
 
@@ -187,6 +190,8 @@ def _read_obj(path: Path) -> UVFile:
                     uv.append(complex(float(words[1]), float(words[2])))
                 elif kind == "f":
                     face = [_reference(word, len(V), len(uv)) for word in words[1:]]
+                    if len(face) < 3:
+                        raise ValueError(f"a face needs 3 corners, but this one has {len(face)}")
                     faces += [[face[0], face[k], face[k + 1]] for k in range(1, len(face) - 1)]
             except (ValueError, IndexError) as error:
                 raise damaged(f"line {number}, {shown(line)}: {error}") from None
@@ -220,9 +225,7 @@ def _read_off(path: Path) -> UVFile:
     """Read OFF whose vertices end in two texture coordinates, as STOFF declares."""
     text = "\n".join(line.split("#", 1)[0] for line in path.read_text("latin-1").splitlines())
     lines = [line.split() for line in text.splitlines() if line.strip()]
-    if not lines or not lines[0][0].endswith("OFF"):
-        raise damaged("it cannot be read as OFF: the first word is not OFF or STOFF")
-    if not lines[0][0].startswith("ST"):
+    if not lines or not _STOFF.fullmatch(lines[0][0]):
         raise damaged("it holds no UVs: the first word is not STOFF")
     head = lines[0][1:]
     if not head:
@@ -233,6 +236,9 @@ def _read_off(path: Path) -> UVFile:
         raise damaged(f"{n} vertices and {m} faces are declared, but {len(rows)} lines follow")
     vertices = np.array([row[:3] + row[-2:] for row in rows[:n]], dtype=np.float64)
     faces = [[int(word) for word in row[1 : 1 + int(row[0])]] for row in rows[n:]]
+    short = next((row for row, p in zip(rows[n:], faces, strict=True) if len(p) < 3), None)
+    if short is not None:
+        raise damaged(f"a face needs 3 corners; {shown(' '.join(short))} has fewer")
     F = np.array([[p[0], p[k], p[k + 1]] for p in faces for k in range(1, len(p) - 1)])
     if F.min() < 0 or F.max() >= n:
         raise damaged(f"a face has vertex {int(F.max())}, but there are {n}")
