@@ -148,7 +148,7 @@ ATLAS_METRICS: tuple[Metric, ...] = (
         lambda f: _atlas(f).cut.seam_length,
     ),
     Metric(
-        "folds_of_worst_island", "folds of the worst island", "worst", "", "d", "d",
+        "folds_of_worst_island", "folds, worst island", "worst", "", "d", "d",
         "folded triangles of the island that has most",
         lambda f: int(_atlas(f).folds.max()),
     ),

@@ -13,8 +13,10 @@ from cembench import write_mesh
 from cembench.commands.external import KEYS
 from cembench.core.program import INPUTS, OUTPUTS
 from cembench.registry import load_registry
+from cembench.report.content.beside_others import beside_others
+from cembench.report.content.evidence import Evidence
 from cembench.results.records import FaultKind
-from tests.validation.in_this_process import call_here
+from tests.validation.in_this_process import LauncherHere, call_here
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples/external"
@@ -75,7 +77,10 @@ def test_the_octave_example_maps_to_the_disk(typed):
     assert "GNU Octave" in printed
 
 
-def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli):
+def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli, monkeypatch):
+    """The report is another test's matter: drawing it takes longer than measuring."""
+    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
+    monkeypatch.setattr("cembench.commands.report.make_report", lambda run, *_: (None, run))
     (line,) = (one for one in commands() if " peers " in one)
     printed = " ".join(typed(line).split())
     assert "igl-lscm ‡" in printed
@@ -83,8 +88,10 @@ def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli):
     energies = re.findall(r"(?:igl-)?lscm(?: ‡)? (\d\.\d{4}) ", printed)
     assert len(energies) == 2
     assert energies[0] == energies[1]
-    page = (cli.folder / "results/peers/report/report.md").read_text()
-    assert "Beside libraries and programs of others" in page
+    table = beside_others(Evidence.of(cli.folder / "results/peers"))
+    told = {(row[1].text, row[2].text): row[4].text for row in table.rows}
+    assert told["free boundary", "LSCM of libigl ‡"] == told["free boundary", "LSCM"]
+    assert ("disk", "CEM") in told
 
 
 def test_the_guide_names_every_key_format_fault_and_peer():
