@@ -29,7 +29,7 @@ def beside_others(evidence: Evidence) -> Table | None:
             rows.append(_row(evidence, surface, series, record))
             shown.append(record)
             if record.outcome.status != "ok":
-                notes[f"{series.label}: {evidence.why_not(record)}"] = None
+                notes[f"{surface.title}, {series.label}: {evidence.why_not(record)}"] = None
     return Table(
         "beside-others",
         "Beside libraries and programs of others",

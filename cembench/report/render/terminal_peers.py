@@ -13,6 +13,9 @@ from cembench.report.render.terminal import status_style
 from cembench.results.external_words import mark_of, marks_explained
 from cembench.results.records import Record
 
+#: The longest name of an algorithm that is shown whole; eighty columns have no more.
+_ROOM = 25
+
 
 def peers_table(records: Sequence[Record]) -> RenderableType:
     """One table a surface: targets apart, within one in the order of E_C / A."""
@@ -38,9 +41,9 @@ def peers_table(records: Sequence[Record]) -> RenderableType:
 
 def _of_surface(records: Sequence[Record]) -> Table:
     table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("algorithm", no_wrap=True)
-    for heading in ("E_C / A", "mean°", "folds", "isl.", "call", "wall", "start", "solve"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("algorithm", no_wrap=True, max_width=_ROOM)
+    for heading in ("E_C / A", "mean°", "isl.", "call", "wall", "start", "solve"):
+        table.add_column(heading, justify="right", no_wrap=True, min_width=len(heading))
     table.add_column("", no_wrap=True)
     for target, group in groupby(records, key=lambda record: record.target):
         table.add_row(Text(f"to {target}", style="dim"))
@@ -49,18 +52,23 @@ def _of_surface(records: Sequence[Record]) -> Table:
             wall, metrics = outcome.median_seconds, outcome.metrics
             solve = outcome.solve_seconds if program else None
             table.add_row(
-                f"  {record.cell.algorithm} {mark_of(record)}".rstrip(),
+                f"{record.cell.algorithm} {mark_of(record)}".rstrip(),
                 _number(record.outcome.relative_energy, ".4f"),
                 _number(metrics.get("angle_error_mean_deg"), ".2f"),
-                _number(metrics.get("flipped_triangles"), ".0f"),
                 _number(metrics.get("islands"), ".0f"),
                 _number(None if program else wall, ".3f"),
                 _number(wall if program else None, ".2f"),
                 _number(outcome.start_seconds, ".2f"),
                 _number(solve, ".3f"),
-                Text(outcome.status, style=status_style(outcome.status)),
+                Text(_end(record), style=status_style(outcome.status)),
             )
     return table
+
+
+def _end(record: Record) -> str:
+    """Return the status, or how many folds there are."""
+    folds = record.outcome.metrics.get("flipped_triangles")
+    return f"{folds:,} folds" if folds else record.outcome.status
 
 
 def _place(record: Record) -> tuple[str, bool, float]:
