@@ -243,7 +243,9 @@ def external_program(
 
 
 def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
-    """Return the algorithm that a command line declares: of disks, without parameters.
+    """Return the algorithm that a command line declares, without parameters.
+
+    It takes disks; for circular holes surfaces with holes, for an atlas any surface.
 
     Parameters
     ----------
@@ -272,7 +274,7 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
         given = function_file | given
     place = ("cembench.registry", None)
     about = {"target": target or "disk", "source": source, "notes": ""}
-    function = _of_holes if target == "circular holes" else _of_disks
+    function = _TAKES.get(target, _of_disks)
     return _program_of(function, place, name, name, about, command, folder, given)
 
 
@@ -282,6 +284,14 @@ def _of_disks(mesh: DiskMesh) -> None:
 
 def _of_holes(mesh: HoledMesh) -> None:
     """Stand for a program that takes surfaces with holes."""
+
+
+def _of_any(mesh: TriangleMesh) -> None:
+    """Stand for a program that cuts any surface."""
+
+
+#: By target, where it is not disks.
+_TAKES = {"circular holes": _of_holes, "atlas": _of_any}
 
 
 def _program_name(command: str) -> str:

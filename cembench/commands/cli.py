@@ -162,6 +162,9 @@ def list_(
         return
     if kind in (None, Kind.algorithms):
         out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
+        if registry.peers:
+            words = f"\nOf others, see `cembench peers`: {', '.join(registry.peers)}"
+            out.print(words, style="dim")
     if kind is None:
         out.print()
     if kind in (None, Kind.surfaces):
@@ -264,7 +267,7 @@ def map_(
     candidates = [registry.algorithm(name) for name in asked_for]
     if cut:
         _check_takes_disks(candidates)
-    outputs = _outputs(meshes, output, cut=cut)
+    outputs = _outputs(meshes, output, cut=cut or candidates[0].target == "atlas")
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
     sources = [fetched.get(path, path) for path in meshes]

@@ -357,7 +357,8 @@ class Launcher:
         limits = Limits(seconds, self.options.memory_bytes)
         ending = self._forked(job, limits, log) if what == "time" else None
         ending = ending or self._started(job, limits, log)
-        _remove(self.scratch / PROGRAMS)  # of a program that was ended
+        with suppress(OSError):  # there may be no folder any more
+            _remove(self.scratch / PROGRAMS)  # of a program that was ended
         if ending.limit is None and ending.code == 0 and answer_file.exists():
             return _with_note(_read_answer(answer_file), ending.left)
         with suppress(OSError):  # there may be none, or no folder any more

@@ -65,6 +65,13 @@ def test_the_map_of_an_atlas_is_written_with_a_uv_for_each_corner(cli, face):
     assert len(np.unique(written.index)) == len(written.uv) > flat_disk(200).n
 
 
+def test_an_atlas_goes_into_a_file_that_can_hold_it_and_that_is_said_first(cli, face):
+    words = ("map", face, "--command", command("hangs"), "--program", "target=atlas")
+    code, _, err = cli(*words, "-o", "uv.ply")
+    assert code == 2
+    assert "allowed here: .obj" in err
+
+
 def test_a_program_that_is_not_there_is_skipped_with_what_brings_it(cli, face):
     code, _, err = cli("map", face, "--command", "no-such-solver {input} {output}")
     assert code == 1

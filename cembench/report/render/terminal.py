@@ -269,9 +269,12 @@ def figures_table(record: Record) -> Table:
     if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
         table.add_row(
             "memory",
-            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, of the program's processes"
-            if record.is_program
-            else f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call",
+            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, "
+            + (
+                "of the program's processes"
+                if record.is_program
+                else f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
+            ),
         )
     for note in outcome.notes:
         table.add_row("note", str(note))

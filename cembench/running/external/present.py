@@ -7,6 +7,7 @@ import importlib.util
 import json
 import shutil
 from dataclasses import asdict
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -53,6 +54,13 @@ def library_version(library: Library) -> str | None:
         return None
 
 
+@lru_cache(maxsize=64)
+def _digest(path: Path, size: int, changed: int) -> str:
+    """Return a file's SHA-256; a program of hundreds of megabytes is read once."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def program_sources(program: Program) -> dict[str, str]:
     """Return the SHA-256 of a program's declaration and of the files that its command names.
 
@@ -65,8 +73,8 @@ def program_sources(program: Program) -> dict[str, str]:
     for path in named:
         try:
             if path is not None and path.is_absolute() and path.is_file():
-                with path.open("rb") as file:
-                    found[path.name] = hashlib.file_digest(file, "sha256").hexdigest()
+                about = path.stat()
+                found[path.name] = _digest(path, about.st_size, about.st_mtime_ns)
         except OSError:  # it may be executable and not readable
             continue
     return found
