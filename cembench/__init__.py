@@ -29,10 +29,10 @@ if TYPE_CHECKING:
         RenderError,
     )
     from cembench.core.extras import MissingExtra
-    from cembench.core.parameterization import MapStep, Parameterization
+    from cembench.core.parameterization import Atlas, MapStep, Parameterization
     from cembench.mesh.files import read_mesh, write_mesh
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-    from cembench.registry import algorithm, surface_family
+    from cembench.registry import algorithm, external_program, surface_family
     from cembench.workflows.benchmark import Run, benchmark
     from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
     from cembench.workflows.cut import cut
@@ -57,10 +57,10 @@ _PLACES = {
         "RenderError",
     ),
     "cembench.core.extras": ("MissingExtra",),
-    "cembench.core.parameterization": ("MapStep", "Parameterization"),
+    "cembench.core.parameterization": ("Atlas", "MapStep", "Parameterization"),
     "cembench.mesh.files": ("read_mesh", "write_mesh"),
     "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
-    "cembench.registry": ("algorithm", "surface_family"),
+    "cembench.registry": ("algorithm", "external_program", "surface_family"),
     "cembench.workflows.benchmark": ("Run", "benchmark"),
     "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
     "cembench.workflows.cut": ("cut",),
@@ -75,6 +75,7 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __all__ = [
     "AlgorithmFailed",
+    "Atlas",
     "CembenchError",
     "DatasetError",
     "DiskMesh",
@@ -96,6 +97,7 @@ __all__ = [
     "algorithm",
     "benchmark",
     "cut",
+    "external_program",
     "holes",
     "list_algorithms",
     "list_surfaces",

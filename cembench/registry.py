@@ -13,12 +13,13 @@ import functools
 import importlib
 import importlib.util
 import inspect
+import json
 import os
 import sys
 import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import FrameType, ModuleType
@@ -30,11 +31,13 @@ from pydantic import TypeAdapter, ValidationError
 
 from cembench.core.errors import ParameterError, RegistryError, said_by
 from cembench.core.parameterization import MapStep
+from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 #: What an algorithm maps to; tables never mix these without saying so.
-Target = Literal["disk", "free boundary", "circular holes"]
+#: An atlas has UVs for corners, not for vertices: the surface is cut into islands.
+Target = Literal["disk", "free boundary", "circular holes", "atlas"]
 
 #: Finds named places on a mesh of a surface family: name -> vertex, counted from 0.
 Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
@@ -126,6 +129,10 @@ class Algorithm(_Registered):
     source: str = ""
     steps: Steps | None = None
     usual: bool = True
+    #: The external program that it is, if any; its function is never called then.
+    program: Program | None = None
+    #: The library of others that its function calls, if any.
+    library: Library | None = None
 
 
 @dataclass(frozen=True)
@@ -148,6 +155,7 @@ def algorithm(
     notes: str = "",
     steps: Steps | None = None,
     usual: bool = True,
+    library: Library | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
 
@@ -157,8 +165,8 @@ def algorithm(
         What the command line calls it.
     title : str
         What a table's heading calls it.
-    target : "disk", "free boundary" or "circular holes"
-        The class of its image.
+    target : "disk", "free boundary", "circular holes" or "atlas"
+        The class of its image; an atlas is returned as an `Atlas`.
     source : str
         Where it was published.
     notes : str
@@ -167,6 +175,8 @@ def algorithm(
         Takes a mesh, `sweeps` and `outer`, and yields every :class:`MapStep` on the way to the map.
     usual : bool
         Whether a run in which no algorithms are named measures it.
+    library : Library, optional
+        The library of others whose map it is: tables name it, and its version is recorded.
 
     The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
     Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
@@ -178,40 +188,182 @@ def algorithm(
         A declaration that cannot be right: unknown target, missing types or defaults.
 
     """
-    if target not in get_args(Target):
-        raise RegistryError(
-            f"algorithm {name!r}: target {target!r} is unknown; "
-            f"allowed: {', '.join(map(repr, get_args(Target)))}."
-        )
-
     place = _place(sys._getframe(1))
+    about = {
+        "target": target,
+        "source": source,
+        "notes": notes,
+        "steps": steps,
+        "library": library,
+        "usual": usual,
+    }
 
     def mark(function: C) -> C:
-        hints, parameters = _signature(name, function)
-        first = next(iter(inspect.signature(function).parameters), None)
-        mesh_type = hints.get(first or "", None)
-        if mesh_type not in (TriangleMesh, DiskMesh, HoledMesh):
-            raise RegistryError(
-                f"algorithm {name!r}: its first argument must be annotated as DiskMesh, HoledMesh "
-                f"or TriangleMesh, the surfaces it takes; got {mesh_type!r}."
-            )
-        spec = Algorithm(
-            name=name,
-            title=title,
-            function=function,
-            parameters=parameters,
-            notes=notes or _notes(function),
-            target=target,
-            mesh_type=mesh_type,
-            source=source,
-            steps=steps,
-            usual=usual,
-            **_origin(place, function),
-        )
-        _set_mark(function, spec)
+        _set_mark(function, _algorithm_of(function, place, name, title, about))
         return function
 
     return mark
+
+
+def external_program(
+    name: str,
+    *,
+    title: str,
+    target: Target,
+    command: str,
+    source: str = "",
+    notes: str = "",
+    **how: Any,
+) -> Callable[[C], C]:
+    """Declare a program of any language as an algorithm.
+
+    The decorated function is never called: its signature says which surfaces the program takes and
+    which parameters its command has, and its docstring what it is.
+
+    Parameters
+    ----------
+    name, title, target, source, notes
+        As for :func:`algorithm`; tables add to the title that it is an external program.
+    command : str
+        As a shell would read it, with ``{input}``, ``{output}`` and ``{PARAMETER}``; no shell does.
+        Files of the declaring file's folder may be named without it.
+    **how
+        The other fields of :class:`cembench.core.program.Program`, `version` as one text.
+
+    Raises
+    ------
+    RegistryError
+        A declaration that cannot be right.
+
+    Examples
+    --------
+    >>> @external_program("mine", title="Mine", target="disk", command="mine {input} {output}")
+    ... def mine(mesh: DiskMesh) -> None:
+    ...     "Does what mine does."
+
+    """
+    place = _place(sys._getframe(1))
+    folder = place[1].parent if place[1] else Path.cwd()
+    about = {"target": target, "source": source, "notes": notes}
+
+    def mark(function: C) -> C:
+        _set_mark(function, _program_of(function, place, name, title, about, command, folder, how))
+        return function
+
+    return mark
+
+
+def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
+    """Return the algorithm that a command line declares, without parameters.
+
+    It takes disks; for circular holes surfaces with holes, for an atlas any surface.
+
+    Parameters
+    ----------
+    declared : mapping
+        `command` and, as far as they are given, `name`, `target` and the fields of
+        :class:`cembench.core.program.Program`.
+    folder : Path
+        Where the files lie that it names without a path.
+
+    Raises
+    ------
+    RegistryError
+        It cannot be right.
+
+    """
+    given = dict(declared)
+    command, name, target = (given.pop(key, "") for key in ("command", "name", "target"))
+    for key in ("input", "output"):  # a format may be called "obj" as well as ".obj"
+        if key in given and "." not in given[key]:
+            given[key] = f".{given[key]}"
+    name = name or _program_name(command)
+    source = command
+    if command.endswith(".m") and (folder / command).is_file():
+        function_file = of_matlab_function(folder / command)
+        command = function_file.pop("command")
+        given = function_file | given
+    place = ("cembench.registry", None)
+    about = {"target": target or "disk", "source": source, "notes": ""}
+    function = _TAKES.get(target, _of_disks)
+    return _program_of(function, place, name, name, about, command, folder, given)
+
+
+def _of_disks(mesh: DiskMesh) -> None:
+    """Stand for a program that takes disks."""
+
+
+def _of_holes(mesh: HoledMesh) -> None:
+    """Stand for a program that takes surfaces with holes."""
+
+
+def _of_any(mesh: TriangleMesh) -> None:
+    """Stand for a program that cuts any surface."""
+
+
+#: By target, where it is not disks.
+_TAKES = {"circular holes": _of_holes, "atlas": _of_any}
+
+
+def _program_name(command: str) -> str:
+    """Return what a command is called by: its program, or the script that an interpreter runs."""
+    words = [Path(word) for word in command.split()]
+    script = next((word for word in words[1:] if word.suffix in (".py", ".m", ".sh", ".js")), None)
+    return (script or next(iter(words), Path("program"))).stem or "program"
+
+
+def _program_of(
+    function: Callable[..., Any],
+    place: tuple[str, Path | None],
+    name: str,
+    title: str,
+    about: Mapping[str, Any],
+    command: str,
+    folder: Path,
+    how: Mapping[str, Any],
+) -> Algorithm:
+    known = [one.name for one in fields(Program) if one.name != "command"]
+    unknown = [key for key in how if key not in known]
+    if unknown:
+        raise RegistryError(
+            f"program {name!r}: {unknown[0]!r} is unknown; allowed: {', '.join(known)}."
+        )
+    given = dict(how) | {"version": found_words(how.get("version", ""), folder)}
+    program = Program(command=found_words(command, folder), **given)
+    spec = _algorithm_of(function, place, name, f"{title} (external program)", about)
+    program = checked_program(name, program, [p.name for p in spec.parameters])
+    return replace(spec, program=program)
+
+
+def _algorithm_of(
+    function: Callable[..., Any],
+    place: tuple[str, Path | None],
+    name: str,
+    title: str,
+    about: Mapping[str, Any],
+) -> Algorithm:
+    if about["target"] not in get_args(Target):
+        raise RegistryError(
+            f"algorithm {name!r}: target {about['target']!r} is unknown; "
+            f"allowed: {', '.join(map(repr, get_args(Target)))}."
+        )
+    hints, parameters = _signature(name, function)
+    first = next(iter(inspect.signature(function).parameters), None)
+    mesh_type = hints.get(first or "", None)
+    if mesh_type not in (TriangleMesh, DiskMesh, HoledMesh):
+        raise RegistryError(
+            f"algorithm {name!r}: its first argument must be annotated as DiskMesh, HoledMesh "
+            f"or TriangleMesh, the surfaces it takes; got {mesh_type!r}."
+        )
+    return Algorithm(
+        name=name,
+        title=title,
+        function=function,
+        parameters=parameters,
+        mesh_type=mesh_type,
+        **{**about, "notes": about["notes"] or _notes(function)},
+        **_origin(place, function),
+    )
 
 
 def surface_family(
@@ -334,6 +486,9 @@ class Registry:
     algorithms: Mapping[str, Algorithm] = field(default_factory=dict)
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     datasets: Mapping[str, Dataset] = field(default_factory=dict)
+    #: Algorithms of others, libraries and programs, that need not be on this machine: they are run
+    #: only where they are named.
+    peers: Mapping[str, Algorithm] = field(default_factory=dict)
 
     @property
     def usual_algorithms(self) -> list[str]:
@@ -342,7 +497,7 @@ class Registry:
 
     def algorithm(self, name: str) -> Algorithm:
         """The algorithm of this name; :class:`RegistryError` lists the known ones."""
-        return _look_up("algorithm", self.algorithms, name)
+        return _look_up("algorithm", {**self.peers, **self.algorithms}, name)
 
     def surface(self, name: str) -> Surface:
         """The surface of this name; :class:`RegistryError` lists the known ones."""
@@ -361,6 +516,10 @@ _GROUPS: Mapping[type, str] = {
     Surface: "cembench.surfaces",
     Dataset: "cembench.datasets",
 }
+#: Entry points of algorithms that `cembench run` leaves out unless they are named.
+PEERS = "cembench.peers"
+#: How a plug-in begins that is a command line: the rest is its declaration as JSON.
+COMMAND = "command:"
 
 
 def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
@@ -391,17 +550,20 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     for plugin in plugins:
         for spec in declared_by(plugin):
             _add(algorithms if isinstance(spec, Algorithm) else surfaces, spec)
-    return Registry(algorithms, surfaces, installed.datasets)
+    peers = {name: peer for name, peer in installed.peers.items() if name not in algorithms}
+    return Registry(algorithms, surfaces, installed.datasets, peers)
 
 
 @functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
-    return Registry(_all_declared(Algorithm), _all_declared(Surface), _all_declared(Dataset))
+    kinds = _all_declared(Algorithm), _all_declared(Surface), _all_declared(Dataset)
+    return Registry(*kinds, _all_declared(Algorithm, PEERS))
 
 
-def _all_declared(kind: type[R]) -> dict[str, R]:
+def _all_declared(kind: type[R], group: str = "") -> dict[str, R]:
     known: dict[str, R] = {}
-    for entry in sorted(entry_points(group=_GROUPS[kind]), key=lambda entry: entry.name):
+    found = entry_points(group=group or _GROUPS[kind])
+    for entry in sorted(found, key=lambda entry: entry.name):
         _add(known, _declared_at(entry, kind))
     return known
 
@@ -417,6 +579,8 @@ def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
         for spec in declared_by(plugin):
             if isinstance(spec, Algorithm) and spec.name == name:
                 return spec
+    for entry in entry_points(group=PEERS, name=name):
+        return _declared_at(entry, Algorithm)
     return load_registry(plugins).algorithm(name)
 
 
@@ -457,7 +621,10 @@ def _add(known: dict[str, Any], spec: _Registered | Dataset) -> None:
 
 
 def declared_by(plugin: str) -> list[_Registered]:
-    """Return what a file declares, or a single ``module:name``."""
+    """Return what a file declares, or a single ``module:name``, or a command line."""
+    if plugin.startswith(COMMAND):
+        declared = json.loads(plugin.removeprefix(COMMAND))
+        return [program_from(declared, Path(declared.pop("folder", "")))]
     location, _, name = plugin.partition(":")
     path = Path(plugin)
     if path.suffix == ".py":

@@ -20,6 +20,7 @@ from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
 from cembench.commands import morph as morph_verbs
+from cembench.commands import peers as peers_verbs
 from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
@@ -38,6 +39,7 @@ from cembench.commands.console import (
     split,
 )
 from cembench.commands.ending import Verbs, ending
+from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
     Faces,
     Memory,
@@ -165,6 +167,9 @@ def list_(
         return
     if kind in (None, Kind.algorithms):
         out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
+        if registry.peers:
+            words = f"\nOf others, see `cembench peers`: {', '.join(registry.peers)}"
+            out.print(words, style="dim")
     if kind is None:
         out.print()
     if kind in (None, Kind.surfaces):
@@ -262,6 +267,8 @@ def map_(
         typer.Option("--cut", help="Cut the surface into a disk first, as `cembench cut` does."),
     ] = False,
     plugin: Plugins = [],  # noqa: B006
+    command: Command = None,
+    program: Settings = [],  # noqa: B006
     solves: SolvesOption = Solves.reuse,
     backend: BackendOption = Backend(default_backend()),  # noqa: B008
     threads: Threads = 1,
@@ -292,14 +299,24 @@ def map_(
     )
 
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
+    declared, named = declared_command(command, program)
+    if named and algorithm:
+        raise ParameterError("-a and --command name two algorithms; map with one after the other.")
+    plugin = [*plugin, *declared]
     registry = registry_with(plugin)
-    candidates = [registry.algorithm(name) for name in ([algorithm] if algorithm else USUAL)]
+    asked_for = named or ([algorithm] if algorithm else USUAL)
+    candidates = [registry.algorithm(name) for name in asked_for]
     if cut:
         check_takes_disks(candidates)
     outputs = output_files(meshes, output)
     wishes = map_files.Wishes(place, checker, bake)
     extra = _Extra(samples, remeshed, side, place, page)
     _check_extras(meshes, outputs, wishes, extra)
+    if any(a.target == "atlas" for a in candidates) and (extra.files or bake or len(meshes) > 1):
+        raise ParameterError(
+            f"{candidates[0].name} makes an atlas: map one surface, without --geometry-image, "
+            "--remesh, --html and --bake, which need one image for each vertex."
+        )
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
     sources = [fetched.get(path, path) for path in meshes]
@@ -338,11 +355,15 @@ def map_(
             where_to = outputs[k]
             maps.append(uv)
             if where_to is not None and not together:
-                _tell(where_to, map_files.write_map(where_to, file, uv, wishes))
+                is_atlas = task.algorithm.target == "atlas"
+                write = map_files.write_corner_map if is_atlas else map_files.write_map
+                _tell(where_to, write(where_to, file, uv, wishes))
             if where_to is not None:
                 written["output"] = str(where_to)
             written |= extra.write(file.mesh, uv, record)
-            if preview:
+            if preview and task.algorithm.target == "atlas":
+                note("an atlas has no picture: islands lie anywhere in the plane")
+            elif preview:
                 with err.status("drawing", spinner="line"):
                     written["preview"] = str(pictures[k])
                     draw_map(file.mesh, uv, pictures[k], record)
@@ -406,6 +427,8 @@ def run(
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006
     plugin: Plugins = [],  # noqa: B006
+    command: Command = None,
+    program: Settings = [],  # noqa: B006
     repeats: Repeats = DEFAULT_ROUNDS,
     seed: Seed = 0,
     timeout: Timeout = 600.0,
@@ -447,9 +470,12 @@ def run(
     run_folder.check(output)
     policies = _policies(solves)
     options = Options(timeout, memory_bytes(memory), fresh, rerun_failed, seed)
+    declared, named = declared_command(command, program)
+    plugin = [*plugin, *declared]
     registry = registry_with(plugin)
     usual = algorithms_of(profile, registry) if profile else registry.usual_algorithms
-    chosen = [registry.algorithm(name) for name in split(algorithms) or usual]
+    wanted = dict.fromkeys([*(split(algorithms) or usual), *named])
+    chosen = [registry.algorithm(name) for name in wanted]
     _check_reference(reference, chosen)
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
     files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
@@ -560,6 +586,7 @@ _MORE = (
     fetch_verbs,
     repair_verbs,
     cut_verbs,
+    peers_verbs,
 )
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)

@@ -14,7 +14,9 @@ import typer
 from rich.markup import escape
 
 from cembench.commands.console import Json, assignments, err, out, print_json, split
+from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import MOST_FACES, Parameters, Repeats, Timeout
+from cembench.core.errors import ParameterError
 from cembench.results.paper.profiles import Profile
 from cembench.results.records import DEFAULT_ROUNDS
 from cembench.validation.verdict import Requirement
@@ -31,12 +33,14 @@ Names = list[str]
 
 def validate(
     plugin: Annotated[
-        str,
+        str | None,
         typer.Argument(
             metavar="PLUGIN", help="FILE.py, FILE.py:NAME, module:name, or a registered name."
         ),
-    ],
+    ] = None,
     *,
+    command: Command = None,
+    program: Settings = [],  # noqa: B006 - typer copies defaults
     against: Annotated[
         Names, typer.Option(help="Baselines; default: cem, or the usual one of the target.")
     ] = [],  # noqa: B006 - typer copies defaults
@@ -91,10 +95,17 @@ def validate(
     from cembench.validation.terminal import validation_text
     from cembench.workflows.validate import write_validation
 
+    declared, _ = declared_command(command, program)
+    if (plugin is None) == (not declared):
+        raise ParameterError(
+            "name one solver: a PLUGIN (FILE.py, module:name or a registered name), or a program "
+            "with --command COMMAND."
+        )
+    plugin = plugin or declared[0]
     if output is not None:
         extras.require(extras.Extra.REPORT, f"the page in {output}")
         folders.check(output, "validation")
-    with err.status(f"importing {escape(plugin)}", spinner="line"):
+    with err.status(f"importing {escape(command or plugin)}", spinner="line"):
         algorithm, registry, plugins = load_solver(plugin)
     arguments = distribute_parameters([algorithm], assignments(parameter))[algorithm.name]
     options = Options(timeout=timeout)

@@ -32,6 +32,10 @@ class AlgorithmFailed(CembenchError):  # noqa: N818 - it is a result's status, n
     """An algorithm gave up; the message is the cause."""
 
 
+class NotThere(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
+    """What an algorithm needs is not on this machine; the message says what, and what brings it."""
+
+
 class NotPositiveDefinite(AlgorithmFailed):
     """A Cholesky factorisation met a pivot that is not positive."""
 

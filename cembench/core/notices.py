@@ -41,6 +41,8 @@ class NoticeKind(StrEnum):
     #: Timed calls returned other bits than the checked one.
     NOT_DETERMINISTIC = "not_deterministic"
     PROCESSES_LEFT = "processes_left"
+    #: What is to be known of the seconds of an external program.
+    PROGRAM_SECONDS = "program_seconds"
 
     #: Anything else, as in records that hold no kinds.
     OTHER = "other"

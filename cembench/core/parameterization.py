@@ -37,6 +37,24 @@ class Parameterization:
 
 
 @dataclass(frozen=True)
+class Atlas:
+    """A map of a surface that was cut into islands: a point for each corner of a triangle.
+
+    Parameters
+    ----------
+    corners : complex128 (m, 3)
+        Image of each triangle's corners. Two triangles hang together at an edge where the images
+        of its ends are the same numbers in both.
+    extras : dict
+        As in :class:`Parameterization`.
+
+    """
+
+    corners: NDArray[np.complex128]
+    extras: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class MapStep:
     """One step of a method that opens one boundary at a time, as pictures and tables show it.
 

@@ -13,7 +13,7 @@ import struct
 import warnings
 from array import array
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,10 @@ _STRUCT = {
     "f4": "f", "f8": "d",
 }  # fmt: skip
 _CORNERS = ("vertex_indices", "vertex_index")
+_AXES = (("x",), ("y",), ("z",))
+_GEOMETRY: dict[str, tuple[tuple[str, ...], ...]] = {"vertex": _AXES, "face": (_CORNERS,)}
+#: What texture coordinates of vertices are called.
+_TEXTURE = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 
 Bytes = NDArray[np.uint8]
 
@@ -87,15 +91,72 @@ def read_ply(path: Path) -> Soup:
 
     Coordinates have the precision that the header declares, in text too.
     """
+    elements, found = _columns(path, _GEOMETRY)
+    coordinates = _element(elements, "vertex")
+    types = [coordinates.properties[k].item for k in _indices(coordinates, _GEOMETRY)]
+    with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused as such
+        V = [
+            column.items.astype(t.newbyteorder("="))
+            for t, column in zip(types, found["vertex"], strict=True)
+        ]
+    (faces,) = found["face"]
+    return Soup.from_arrays(np.stack(V, axis=1), _whole(faces.items), faces.sizes)
+
+
+def read_ply_texture(
+    path: Path,
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64] | None]:
+    """Read the vertices and triangles of a PLY file with their texture coordinates.
+
+    Returns V (n, 3), F (m, 3), UV (k, 2) and which of these each corner has (m, 3), or None where
+    they belong to the vertices. They stand at the vertices as u and v, s and t or texture_u and
+    texture_v, or at the faces as the list texcoord.
+
+    Raises
+    ------
+    MeshError
+        The file is damaged, has no such property, or has other polygons than triangles.
+
+    """
+    elements = _header(np.fromfile(path, np.uint8, _LONGEST_HEADER).tobytes())[1]
+    vertex = {p.name for p in _element(elements, "vertex").properties}
+    face = {p.name for p in _element(elements, "face").properties}
+    at_vertices = next((pair for pair in _TEXTURE if set(pair) <= vertex), None)
+    at_corners = "texcoord" if "texcoord" in face else None
+    if not (at_vertices or at_corners):
+        raise damaged(
+            "it holds no UVs: no properties u and v, s and t or texture_u and texture_v of its "
+            "vertices, and no list texcoord of its faces"
+        )
+    more = tuple((name,) for name in at_vertices or ()) if not at_corners else ()
+    lists = (("texcoord",),) if at_corners else ()
+    _, found = _columns(path, {"vertex": (*_AXES, *more), "face": (_CORNERS, *lists)})
+    columns = [column.items.astype(np.float64) for column in found["vertex"]]
+    corners = found["face"][0]
+    if (corners.sizes != 3).any():
+        raise damaged("it has polygons that are no triangles")
+    F = _whole(corners.items).reshape(-1, 3)
+    V = np.stack(columns[:3], axis=1)
+    if len(F) and not 0 <= F.min() <= F.max() < len(V):
+        raise damaged(f"a triangle has vertex {int(F.max())}, but there are {len(V)}")
+    if not at_corners:
+        return V, F, np.stack(columns[3:], axis=1), None
+    texture = found["face"][1]
+    if (texture.sizes != 6).any():
+        raise damaged("a triangle's texcoord has not six numbers")
+    UV = texture.items.astype(np.float64).reshape(-1, 2)
+    return V, F, UV, np.arange(len(UV), dtype=np.int64).reshape(-1, 3)
+
+
+def _columns(
+    path: Path, wanted: Mapping[str, Sequence[tuple[str, ...]]]
+) -> tuple[list[_Element], dict[str, list[_Column]]]:
+    """Return the elements of a file, and of each the wanted properties, by their names."""
     content = np.fromfile(path, dtype=np.uint8)
     form, elements, begin, lines = _header(content[:_LONGEST_HEADER].tobytes())
     body = content[begin:]
     _check_elements(elements)
-    coordinates = _element(elements, "vertex")
-    wanted = {
-        "vertex": [coordinates.index((axis,), of_list=False) for axis in "xyz"],
-        "face": [_element(elements, "face").index(_CORNERS, of_list=True)],
-    }
+    chosen = {name: _indices(_element(elements, name), wanted) for name in wanted}
     stored = elements
     if form == "ascii":
         body = _numbers(body, lines).view(np.uint8)
@@ -104,16 +165,15 @@ def read_ply(path: Path) -> Soup:
     at = 0
     found: dict[str, list[_Column]] = {}
     for element in stored:
-        found[element.name], at = _read_rows(element, body, at, wanted.get(element.name, []))
+        found[element.name], at = _read_rows(element, body, at, chosen.get(element.name, []))
     _check_rest(elements, body[at:], form)
-    types = [coordinates.properties[k].item for k in wanted["vertex"]]
-    with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused as such
-        V = [
-            column.items.astype(t.newbyteorder("="))
-            for t, column in zip(types, found["vertex"], strict=True)
-        ]
-    (faces,) = found["face"]
-    return Soup.from_arrays(np.stack(V, axis=1), _whole(faces.items), faces.sizes)
+    return elements, found
+
+
+def _indices(element: _Element, wanted: Mapping[str, Sequence[tuple[str, ...]]]) -> list[int]:
+    """Return where the wanted properties of an element stand in it."""
+    of_list = element.name == "face"
+    return [element.index(names, of_list=of_list) for names in wanted[element.name]]
 
 
 def _header(text: bytes) -> tuple[str, list[_Element], int, int]:

@@ -63,17 +63,23 @@ def is_unstable(record: Record) -> bool:
 
 
 def paired_ratios(record: Record, reference: Record) -> list[float]:
-    """The ratio of both times in each round that measured both in one sitting."""
+    """The ratio of both times in each round that measured both in one sitting.
+
+    Of an external program that is its solve time: what its process costs besides stands beside it,
+    and is never compared with seconds of a call. None where a round has no such time.
+    """
     pairs = zip(record.outcome.rounds, reference.outcome.rounds, strict=False)
-    return [a.seconds / b.seconds for a, b in pairs if a.sitting == b.sitting]
+    times = [(a.solve_seconds, b.solve_seconds) for a, b in pairs if a.sitting == b.sitting]
+    ratios = [a / b for a, b in times if a is not None and b is not None]
+    return ratios if len(ratios) == len(times) else []
 
 
 def compare(record: Record, reference: Record) -> Comparison | None:
     """Is the record's algorithm faster than the reference's, on the same surface in the same run?
 
-    None where one of them has no times.
+    None where one of them has no times, or an external program no solve time.
     """
-    ours, theirs = record.outcome.median_seconds, reference.outcome.median_seconds
+    ours, theirs = record.outcome.solve_seconds, reference.outcome.solve_seconds
     if ours is None or theirs is None:
         return None
     ratios = paired_ratios(record, reference)

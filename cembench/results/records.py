@@ -122,6 +122,18 @@ class FaultKind(StrEnum):
     PROCESS_ENDED = "process_ended"
     #: The process left an answer that cannot be read.
     UNREADABLE_ANSWER = "unreadable_answer"
+    #: What it needs is not on this machine.
+    NOT_THERE = "not_there"
+    #: An external program ended with a code other than 0, or by a signal.
+    PROGRAM_ENDED = "program_ended"
+    #: It left no file of the name that was agreed upon.
+    NO_OUTPUT = "no_output"
+    OUTPUT_TOO_LARGE = "output_too_large"
+    UNREADABLE_OUTPUT = "unreadable_output"
+    #: The file holds other vertices or triangles than the surface that was given.
+    OTHER_SURFACE = "other_surface"
+    #: A vertex has several UVs where the target needs one.
+    CUT_SURFACE = "cut_surface"
 
 
 class Fault(BaseModel):
@@ -160,11 +172,28 @@ class Round(BaseModel):
     uv_hash: str | None = None
     #: Of each timed call, whether its map has the same bits as the checked one.
     same_bits: tuple[bool, ...] = ()
+    #: Of an external program, whose `calls` are the wall clock of its process: that of the same
+    #: program on a small mesh, None where it failed on that; and the solve time that it printed in
+    #: each call, empty where it prints none.
+    start_seconds: CallSeconds | None = None
+    own_seconds: tuple[Seconds, ...] = ()
 
     @property
     def seconds(self) -> float:
         """The round's figure: the median of its calls."""
         return lower_median(self.calls)
+
+    @property
+    def solve_seconds(self) -> float | None:
+        """The figure without what an external program's process costs besides; else the figure.
+
+        That is what the program printed; or else the wall clock less that of a small mesh, which
+        still holds the reading and writing of the large one. None where the difference is none.
+        """
+        if self.own_seconds:
+            return lower_median(self.own_seconds) or None
+        left = self.seconds - (self.start_seconds or 0.0)
+        return left if left > 0 else None
 
 
 class Boundary(BaseModel):
@@ -180,6 +209,27 @@ class Boundary(BaseModel):
     radius: float | None
     #: The largest distance from the circle, relative to its radius.
     circularity: float | None
+
+
+class External(BaseModel):
+    """Code that is not cembench's, as a record names it."""
+
+    model_config = ConfigDict(frozen=True)
+
+    #: A program's seconds are the wall clock of a process, a library's are those of a call.
+    kind: Literal["program", "library"]
+    #: The command with its places in braces, or the library's name.
+    name: Printable
+
+
+class ProgramRun(BaseModel):
+    """What a call of an external program, or of a library, was besides its map."""
+
+    #: None where it is not known.
+    version: Printable | None = None
+    #: Bytes of the mesh file and of the file with the UVs; 0 for a library.
+    input_bytes: Count = 0
+    output_bytes: Count = 0
 
 
 class Outcome(BaseModel):
@@ -211,6 +261,33 @@ class Outcome(BaseModel):
     memory_increase_bytes: Whole | None = None
     #: What the user should know of the measurement.
     notes: tuple[KeptNotice, ...] = ()
+    #: Of an external program or a library.
+    program: ProgramRun | None = None
+
+    @property
+    def relative_energy(self) -> float | None:
+        """E_C over the image's area; None where one of them is not known."""
+        energy, area = (self.metrics.get(name) for name in ("conformal_energy", "image_area"))
+        return None if energy is None or not area else energy / area
+
+    @property
+    def solve_seconds(self) -> float | None:
+        """The median over the rounds of :attr:`Round.solve_seconds`; None where one has none."""
+        found = [r.solve_seconds for r in self.rounds]
+        known = [seconds for seconds in found if seconds is not None]
+        return lower_median(known) if known and len(known) == len(found) else None
+
+    @property
+    def start_seconds(self) -> float | None:
+        """The median over the rounds of an external program's wall clock on a small mesh."""
+        known = [r.start_seconds for r in self.rounds if r.start_seconds is not None]
+        return lower_median(known) if known else None
+
+    @property
+    def own_seconds(self) -> float | None:
+        """The median over the rounds of the solve time that an external program printed."""
+        known = [lower_median(r.own_seconds) for r in self.rounds if r.own_seconds]
+        return lower_median(known) if known else None
 
     @property
     def seconds(self) -> tuple[float, ...]:
@@ -256,6 +333,13 @@ class Record(BaseModel):
     #: SHA-256 of the files that `cell.code_hash` is made of, by their paths relative to the folder
     #: or package of the file that declares the algorithm; empty in records older than this field.
     sources: dict[str, str] = Field(default_factory=dict)
+    #: Whose code it is, where it is not cembench's or a plug-in's; None in older records.
+    external: External | None = None
+
+    @property
+    def is_program(self) -> bool:
+        """Whether the seconds are the wall clock of an external program's process."""
+        return self.external is not None and self.external.kind == "program"
 
 
 class Environment(BaseModel):

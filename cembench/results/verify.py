@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cembench.conformal.atlas import atlas_metrics
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import RecordError
 from cembench.core.loading import read_bytes
@@ -177,11 +178,13 @@ def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
             f"tells of {written} vertices, triangles and boundary vertices; {surface.name} has "
             f"{counts}",
         )
-    if len(uv) != mesh.n or not np.isfinite(uv).all():
+    atlas = record.target == "atlas"
+    if len(uv) != (3 * mesh.m if atlas else mesh.n) or not np.isfinite(uv).all():
         detail = f"{kept.name} is not a finite map of the {mesh.n} vertices of {surface.name}"
         yield Finding(file, Kind.map, detail)
         return
-    differing = different_metrics(outcome.metrics, all_metrics(mesh, uv))
+    figures = atlas_metrics(mesh, uv.reshape(-1, 3)) if atlas else all_metrics(mesh, uv)
+    differing = different_metrics(outcome.metrics, figures)
     if differing:
         yield Finding(file, Kind.metrics, f"the map gives other figures: {'; '.join(differing)}")
 
@@ -209,7 +212,9 @@ def different_metrics(
         if name not in recorded:
             continue
         held = inf if (value := recorded[name]) is None else value
-        if held != found and not abs(held - found) <= max(bounds[name], ROUNDING * abs(found)):
+        if held != found and not abs(held - found) <= max(
+            bounds.get(name, 0.0), ROUNDING * abs(found)
+        ):
             differing.append(f"{name} {found:.10g}, recorded {held:.10g}")
     return differing
 

@@ -19,6 +19,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.atlas import AtlasFigures, cut_map
 from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns
 from cembench.core.notices import Notice, NoticeKind
@@ -40,12 +41,16 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]
     A boundary that is in the wrong place comes before folds, one that is only out of order after
     them: it is what folded the triangles beside it.
     """
+    if algorithm.target == "atlas":
+        return judged_atlas(mesh, uv.reshape(-1, 3))
     flipped = flipped_triangles(mesh, uv)
     is_reversed = image_area(mesh, uv) <= 0 or flipped == mesh.m
     placed: list[Fault] = []
     order: list[Fault] = []
     if algorithm.target in ("disk", "circular holes"):
-        placed, order = _of_the_circle(mesh, uv)
+        others = algorithm.program or algorithm.library
+        tolerance = CIRCLE_TOLERANCE if others is None else others.circle
+        placed, order = _of_the_circle(mesh, uv, tolerance)
     if algorithm.target == "circular holes":
         placed += _crossings(mesh, uv)
         placed += _turned_holes(mesh, uv) if not (placed or is_reversed) else []
@@ -59,6 +64,24 @@ def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]
         told = "; ".join([told, *broken_premises(mesh)])
         placed.append(_fault(FaultKind.FOLDED, told))
     return placed + order
+
+
+def judged_atlas(mesh: TriangleMesh, corners: Complex) -> list[Fault]:
+    """Return the promises that an atlas breaks: that no triangle is folded, of any island.
+
+    Islands may be mirrored, as packing does to them, but not all.
+    """
+    figures = AtlasFigures(cut_map(mesh, corners))
+    folded = int(figures.folds.sum())
+    if figures.cut.mirrored == figures.cut.islands:
+        return [_fault(FaultKind.REVERSED, "the map reverses the surface's orientation")]
+    if not folded:
+        return []
+    told = (
+        f"{folded} of {mesh.m} triangles are folded ({folded / mesh.m:.2%}), in "
+        f"{int((figures.folds > 0).sum())} of {figures.cut.islands} islands"
+    )
+    return [_fault(FaultKind.FOLDED, told)]
 
 
 def broken_premises(mesh: TriangleMesh) -> list[str]:
@@ -92,13 +115,15 @@ def _outer(mesh: TriangleMesh, uv: Complex) -> NDArray[np.int64]:
     return max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
 
 
-def _of_the_circle(mesh: TriangleMesh, uv: Complex) -> tuple[list[Fault], list[Fault]]:
+def _of_the_circle(
+    mesh: TriangleMesh, uv: Complex, tolerance: float
+) -> tuple[list[Fault], list[Fault]]:
     """Whether the outer boundary lies on the unit circle and goes round it once; and in order."""
     z = uv[_outer(mesh, uv)]
     name = "boundary" if len(mesh.loops) == 1 else "outer boundary"
     found, order = [], []
     off = np.abs(np.abs(z) - 1).max()
-    if off > CIRCLE_TOLERANCE:
+    if off > tolerance:
         told = f"the {name} lies off the unit circle by up to {off:.2g}"
         found.append(_fault(FaultKind.OFF_CIRCLE, told))
     around, winding, backward = turns(z)

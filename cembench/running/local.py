@@ -35,11 +35,12 @@ from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, n
 from cembench.results.samples import Samples
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
+from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.measure import Checked
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
-from cembench.running.worker import Answer, Job
+from cembench.running.worker import PROGRAMS, Answer, Job
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
@@ -287,6 +288,7 @@ def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Rec
         environment=environment,
         started_at=started,
         sources=dict(task.sources),
+        external=external_of(task.algorithm),
     )
 
 
@@ -337,7 +339,7 @@ class Launcher:
         answer_file, uv_file, log = (
             self.scratch / name for name in ("answer.json", "uv.npy", "log.txt")
         )
-        for stale in (answer_file, uv_file, log):
+        for stale in (answer_file, uv_file, log, self.scratch / PROGRAMS):
             _remove(stale)
         job = Job(
             task=what,
@@ -355,6 +357,8 @@ class Launcher:
         limits = Limits(seconds, self.options.memory_bytes)
         ending = self._forked(job, limits, log) if what == "time" else None
         ending = ending or self._started(job, limits, log)
+        with suppress(OSError):  # there may be no folder any more
+            _remove(self.scratch / PROGRAMS)  # of a program that was ended
         if ending.limit is None and ending.code == 0 and answer_file.exists():
             return _with_note(_read_answer(answer_file), ending.left)
         with suppress(OSError):  # there may be none, or no folder any more
@@ -446,8 +450,9 @@ def _read_uv(file: Path, task: Task) -> NDArray[np.complex128] | None:
     if not file.exists():
         return None
     uv = np.lib.format.open_memmap(file, mode="r")
-    if uv.shape != (task.mesh.n,) or uv.dtype != np.complex128:
-        raise ValueError(f"uv is {uv.dtype} {uv.shape}; required is complex128 ({task.mesh.n},)")
+    entries = 3 * task.mesh.m if task.algorithm.target == "atlas" else task.mesh.n
+    if uv.shape != (entries,) or uv.dtype != np.complex128:
+        raise ValueError(f"uv is {uv.dtype} {uv.shape}; required is complex128 ({entries},)")
     return np.array(uv)
 
 

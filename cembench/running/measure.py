@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from cembench.conformal.atlas import atlas_metrics
 from cembench.conformal.metrics import (
     all_metrics,
     boundary_circles,
@@ -26,11 +27,22 @@ from cembench.conformal.metrics import (
     lost_in_rounding,
 )
 from cembench.core.clock import Timing, measure
-from cembench.core.errors import said_by
+from cembench.core.errors import NotThere, said_by
 from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm
-from cembench.results.records import Boundary, Cell, Fault, FaultKind, Outcome, Round, not_ok
+from cembench.results.records import (
+    Boundary,
+    Cell,
+    Fault,
+    FaultKind,
+    Outcome,
+    ProgramRun,
+    Round,
+    not_ok,
+)
+from cembench.running.external.call import ProgramCalls
+from cembench.running.external.present import library_version, missing
 from cembench.running.judge import faults, remarks
 from cembench.running.memory import Memory, memory_of_call
 from cembench.running.quality import quality_notes
@@ -80,14 +92,22 @@ def check_cell(
     value is the map, also that of an invalid one if it has the right shape and is finite.
     """
     call = _call(algorithm, mesh, cell)
+    program: dict[str, Any] = {}
     try:
-        with linear_algebra(cell.solves, cell.backend):
-            (found, timing), memory = memory_of_call(lambda: _without_collector(call))
+        if isinstance(call, ProgramCalls):
+            found, timing = call(watched=True)
+            memory = Memory(call.peak, call.peak)
+            program = _about_program(call)
+        else:
+            with linear_algebra(cell.solves, cell.backend):
+                (found, timing), memory = memory_of_call(lambda: _without_collector(call))
     except BaseException as error:
         return outcome_of_error(error, mesh), None
-    uv = map_of(found, mesh)
+    if algorithm.library is not None:
+        program = {"program": ProgramRun(version=library_version(algorithm.library))}
+    uv = map_of(found, mesh, algorithm.target)
     if isinstance(uv, Fault):
-        return _with_memory(not_ok("invalid", uv), memory), None
+        return _with_memory(not_ok("invalid", uv).model_copy(update=program), memory), None
     report, problems = report_of(found)
     seconds = phases_fault(timing)
     problems += [seconds] if seconds else []
@@ -99,9 +119,11 @@ def check_cell(
         about, more = {}, [_no_metrics(error)]
     problems = [*more, *_changes(mesh, cell), *problems]
     outcome = not_ok("invalid", *problems) if problems else Outcome(status="ok")
-    described = about | report | {"uv_hash": hash_of(uv)}
+    about["notes"] = (*about.get("notes", ()), *program.pop("notes", ()))
+    start = program.pop("start", None)
+    described = about | report | program | {"uv_hash": hash_of(uv)}
     if seconds is None:
-        described["rounds"] = (_round([timing]),)
+        described["rounds"] = (_program_round(_round([timing]), call, 1, start),)
     return _with_memory(outcome.model_copy(update=described), memory), uv
 
 
@@ -117,7 +139,8 @@ def time_cell(
     call = _call(algorithm, mesh, cell)
     try:
         with linear_algebra(cell.solves, cell.backend):
-            timings, maps = _timed(call, mesh)
+            timings, maps = _timed(call, mesh, algorithm.target)
+        start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
     except BaseException as error:
         return outcome_of_error(error, mesh)
     problems = [fault for t in timings if (fault := phases_fault(t))][:1]
@@ -132,14 +155,32 @@ def time_cell(
         return not_ok("invalid", *problems)
     hashes = [hash_of(uv) for uv in maps if not isinstance(uv, Fault)]
     same = tuple(found == checked.uv_hash for found in hashes)
-    return _round(timings).model_copy(update={"uv_hash": hashes[-1], "same_bits": same})
+    found = _program_round(_round(timings), call, len(timings), start)
+    return found.model_copy(update={"uv_hash": hashes[-1], "same_bits": same})
 
 
-def _timed(call: Call, mesh: TriangleMesh) -> tuple[list[Timing], list[Complex | Fault]]:
+def _about_program(call: ProgramCalls) -> dict[str, Any]:
+    """Return what an outcome says of a program besides its map; nobody knows its iterations."""
+    start = call.start_seconds(1)
+    about = {"program": call.facts(), "notes": call.notices(start), "start": start}
+    return about | {"iterations": None}
+
+
+def _program_round(measured: Round, call: Call, calls: int, start: float | None) -> Round:
+    """Add to a round what an external program's process costs besides."""
+    if not isinstance(call, ProgramCalls):
+        return measured
+    own = call.own_seconds(calls)
+    return measured.model_copy(update={"start_seconds": start, "own_seconds": own})
+
+
+def _timed(
+    call: Call, mesh: TriangleMesh, target: str
+) -> tuple[list[Timing], list[Complex | Fault]]:
     """Return the timed calls, and the map of each as it was right after the call."""
     found, timing = _without_collector(call)
     if timing.total > LONG_CALL:
-        return [timing], [map_of(found, mesh)]
+        return [timing], [map_of(found, mesh, target)]
     timings: list[Timing] = []
     maps: list[Complex | Fault] = []
     gc.collect()
@@ -147,7 +188,7 @@ def _timed(call: Call, mesh: TriangleMesh) -> tuple[list[Timing], list[Complex |
     while len(timings) < ENOUGH_CALLS and sum(t.total for t in timings) < ENOUGH_SECONDS:
         found, timing = _without_collector(call)
         timings.append(timing)
-        maps.append(map_of(found, mesh))
+        maps.append(map_of(found, mesh, target))
     gc.unfreeze()
     return timings, maps
 
@@ -165,18 +206,25 @@ def _other_maps(
         else:
             judged.add(hash_of(uv))
             with _unruffled():
-                wrong = faults(algorithm, mesh, uv) or _other_energy(mesh, uv, checked)
+                wrong = faults(algorithm, mesh, uv)
+                wrong = wrong or _other_energy(algorithm, mesh, uv, checked)
         if wrong:
             told = f"call {number} of {len(maps)} returned another map than the check"
             return [Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong]
     return []
 
 
-def _other_energy(mesh: TriangleMesh, uv: Complex, checked: Checked) -> list[Fault]:
+def _other_energy(
+    algorithm: Algorithm, mesh: TriangleMesh, uv: Complex, checked: Checked
+) -> list[Fault]:
     if checked.relative_energy is None:
         return []
-    area = image_area(mesh, uv)
-    energy = (dirichlet_energy(mesh, uv) - area) / area
+    if algorithm.target == "atlas":
+        figures = atlas_metrics(mesh, uv.reshape(-1, 3))
+        energy = figures["conformal_energy"] / figures["image_area"]
+    else:
+        area = image_area(mesh, uv)
+        energy = (dirichlet_energy(mesh, uv) - area) / area
     if abs(energy - checked.relative_energy) <= SAME_ENERGY:
         return []
     told = f"E_C over the area is {energy:.9g}, not {checked.relative_energy:.9g}"
@@ -189,6 +237,11 @@ def _judged(
     """Return what an outcome says of a map, and the faults."""
     with _unruffled():
         problems = faults(algorithm, mesh, uv)
+        if algorithm.target == "atlas":
+            metrics = atlas_metrics(mesh, uv.reshape(-1, 3))
+            told = [] if problems else lost_in_rounding(metrics)
+            finite = {name: _finite(v) for name, v in metrics.items()}
+            return {"metrics": finite, "notes": tuple(told)}, problems
         metrics = all_metrics(mesh, uv)
         told = [] if problems else [*remarks(algorithm, mesh, uv), *lost_in_rounding(metrics)]
         if not problems:
@@ -223,8 +276,13 @@ def _changes(mesh: TriangleMesh, cell: Cell) -> list[Fault]:
 
 def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
     arguments = algorithm.arguments(cell.parameters)
+    if algorithm.program is not None:
+        return ProgramCalls(algorithm, mesh, arguments, cell.threads)
+    lacking = missing(algorithm)
 
     def call() -> tuple[Any, Timing]:
+        if lacking:
+            raise NotThere(lacking)
         fresh = mesh.fresh()
         return measure(lambda: algorithm.function(fresh, **arguments))
 

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cembench.core.errors import RegistryError, said_by
-from cembench.registry import Registry, declared_by, load_registry
+from cembench.registry import COMMAND, Registry, declared_by, load_registry
 from cembench.running.process import Limits, ProcessEnd, die_with_parent, run_limited, spawning
 
 #: Wall-clock seconds that importing a plug-in may take.
@@ -34,7 +34,8 @@ def load_with_plugins(plugins: Sequence[str], seconds: float = IMPORT_SECONDS) -
 
     """
     for plugin in plugins:
-        _try(plugin, seconds)
+        if not plugin.startswith(COMMAND):  # that is data, and imports nothing
+            _try(plugin, seconds)
     return load_registry(plugins)
 
 

@@ -21,10 +21,18 @@ from numpy.typing import NDArray
 from pydantic_core import to_json
 
 from cembench.core.clock import Timing
-from cembench.core.errors import AlgorithmFailed, CembenchError, message_of, said_by, shortened
-from cembench.core.parameterization import Parameterization
+from cembench.core.errors import (
+    AlgorithmFailed,
+    CembenchError,
+    NotThere,
+    message_of,
+    said_by,
+    shortened,
+)
+from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
+from cembench.running.external.faults import ProgramFault
 from cembench.running.judge import broken_premises
 
 #: The longest traceback that is kept, in characters.
@@ -36,25 +44,31 @@ MOST_PHASES = 100
 MOST_EXTRAS_BYTES = 1_000_000
 
 
-def map_of(found: Any, mesh: TriangleMesh) -> NDArray[np.complex128] | Fault:
-    """Return a copy of the map, or why it is none: of another type or shape, or not finite."""
-    if not isinstance(found, Parameterization):
-        told = f"it returned a {_type_of(found)}, not a Parameterization"
+def map_of(found: Any, mesh: TriangleMesh, target: str = "disk") -> NDArray[np.complex128] | Fault:
+    """Return a copy of the map, or why it is none: of another type or shape, or not finite.
+
+    That of an atlas has an entry for each corner, (3 m,).
+    """
+    required, shape = (Atlas, (mesh.m, 3)) if target == "atlas" else (Parameterization, (mesh.n,))
+    if not isinstance(found, required):
+        article = "an" if required is Atlas else "a"
+        told = f"it returned a {_type_of(found)}, not {article} {required.__name__}"
         return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=told)
     try:
-        uv = found.uv
+        uv = found.corners if isinstance(found, Atlas) else found.uv
     except BaseException as error:
         return Fault(kind=FaultKind.RAISED, detail=f"its uv cannot be read: {said_by(error)}")
     plain = np.asarray(uv) if isinstance(uv, np.ndarray) else None  # without a subclass's methods
-    if plain is None or plain.shape != (mesh.n,) or plain.dtype != np.complex128:
+    if plain is None or plain.shape != shape or plain.dtype != np.complex128:
         got = _type_of(uv) if plain is None else f"{plain.dtype} {plain.shape}"
-        told = f"uv is {got}; required is complex128 ({mesh.n},)"
+        told = f"uv is {got}; required is complex128 {shape}"
         return Fault(kind=FaultKind.WRONG_SHAPE, detail=shortened(told))
     bad = np.flatnonzero(~np.isfinite(plain))
     if len(bad):
-        told = f"uv is NaN or infinite at {len(bad)} vertices, the first being {bad[0]}"
+        places = "corners" if isinstance(found, Atlas) else "vertices"
+        told = f"uv is NaN or infinite at {len(bad)} {places}, the first being {bad[0]}"
         return Fault(kind=FaultKind.NOT_FINITE, detail=told)
-    return np.array(plain, dtype=np.complex128)
+    return np.array(plain, dtype=np.complex128).ravel()
 
 
 def hash_of(uv: NDArray[np.complex128]) -> str:
@@ -62,18 +76,15 @@ def hash_of(uv: NDArray[np.complex128]) -> str:
     return hashlib.sha256(uv.tobytes()).hexdigest()
 
 
-def report_of(found: Parameterization) -> tuple[dict[str, Any], list[Fault]]:
+def report_of(found: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fault]]:
     """Return iterations, energies and extras by the names of :class:`Outcome`, and the faults.
 
     What is faulty is left out.
     """
     report: dict[str, Any] = {}
     wrong = []
-    for name, read in (
-        ("iterations", _iterations),
-        ("energy_history", _energies),
-        ("extras", _extras),
-    ):
+    of_map = (("iterations", _iterations), ("energy_history", _energies))
+    for name, read in (*(() if isinstance(found, Atlas) else of_map), ("extras", _extras)):
         try:
             report[name] = read(getattr(found, name))
         except BaseException as error:
@@ -99,6 +110,12 @@ def phases_fault(timing: Timing) -> Fault | None:
 
 def outcome_of_error(error: BaseException, mesh: TriangleMesh) -> Outcome:
     """Return how a call on this mesh is recorded that raised this."""
+    if isinstance(error, NotThere):
+        return not_ok("skipped", Fault(kind=FaultKind.NOT_THERE, detail=message_of(error)))
+    if isinstance(error, ProgramFault):
+        fault = Fault(kind=error.kind, detail=shortened(message_of(error)))
+        more = {"gave_up": error.gave_up, "traceback": error.said or None}
+        return not_ok(error.status, fault, **more)
     if isinstance(error, AlgorithmFailed):
         said = shortened("; ".join([message_of(error), *broken_premises(mesh)]))
         return not_ok("failed", Fault(kind=FaultKind.GAVE_UP, detail=said), gave_up=True)

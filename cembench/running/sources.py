@@ -5,6 +5,7 @@ folder or, for a module of a package, from its package. They are found by readin
 statements, also those inside functions, and ``import_module("name")`` with a literal name; what is
 imported under a computed name, or read as data, is not seen. Of an algorithm that cembench brings
 it is the declaring file alone: the commit and the version in the environment stand for the rest.
+Of an external program these are its declaration, the started file and its script as well.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from pathlib import Path
 
 from cembench.core.errors import RegistryError
 from cembench.registry import Algorithm
+from cembench.running.external.present import program_sources
 
 #: Functions that import a module by a name in a string.
 _IMPORTERS = ("import_module", "__import__")
@@ -35,7 +37,10 @@ def sources_of(algorithm: Algorithm) -> dict[str, str]:
         The declaring file is not there or cannot be read.
 
     """
+    more = {} if algorithm.program is None else program_sources(algorithm.program)
     file = algorithm.file
+    if file is None and more:  # a command line declares it
+        return dict(sorted(more.items()))
     if file is None or not file.is_file():
         raise RegistryError(
             f"algorithm {algorithm.name!r}: its source {file or algorithm.module} is not a file; "
@@ -51,7 +56,7 @@ def sources_of(algorithm: Algorithm) -> dict[str, str]:
         }
     except OSError as error:
         raise RegistryError(f"algorithm {algorithm.name!r}: {error}.") from error
-    return dict(sorted(found.items()))
+    return dict(sorted((more | found).items()))
 
 
 def hash_of(sources: Mapping[str, str]) -> str:

@@ -21,11 +21,14 @@ from cembench.core.notices import Notice
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, load_algorithm
 from cembench.results.records import Cell, Outcome, Round
+from cembench.running.external.call import use_folder
 from cembench.running.measure import Checked, check_cell, time_cell
 from cembench.running.process import die_with_parent, limit_memory
 
 #: What the geometry loads where it needs it, because it takes a tenth of a second.
 _LOADED_LATE = ("igl", "scipy.optimize")
+#: The folder beside the answer in which external programs have theirs.
+PROGRAMS = "programs"
 _MESH_TYPES = {kind.__name__: kind for kind in (TriangleMesh, DiskMesh, HoledMesh)}
 
 
@@ -65,6 +68,7 @@ def main(path: Path) -> None:
     load_libraries()
     if job.memory_bytes is not None:
         limit_memory(job.memory_bytes)
+    use_folder(job.answer_file.with_name(PROGRAMS))
     answer = _time(job) if job.task == "time" else _check(job)
     job.answer_file.write_text(answer.model_dump_json())
 

@@ -168,7 +168,24 @@ def _pairs_table(against: BaselineComparison, title: str, records: dict[str, Rec
         title=f"{title} and {against.title}, surface by surface",
         columns=tuple(columns),
         rows=tuple(_pair_row(pair, records) for pair in against.pairs),
-        notes=("a dash stands where there is no valid map, or no positive figure to divide by",),
+        notes=(
+            "a dash stands where there is no valid map, or no positive figure to divide by",
+            *_about_solve_time(against),
+        ),
+    )
+
+
+def _about_solve_time(against: BaselineComparison) -> tuple[str, ...]:
+    if not against.solve_time:
+        return ()
+    of = (
+        f"{p.surface} {p.solve_seconds:.4f} of {p.seconds:.4f}"
+        for p in against.pairs
+        if p.solve_seconds is not None and p.seconds is not None
+    )
+    return (
+        "an external program: its seconds are the wall clock of a process, with its start and its "
+        f"files; the ratio is of its solve time ({against.solve_time}): {', '.join(of)}",
     )
 
 

@@ -83,6 +83,11 @@ def examine(
     """
     started = monotonic()
     algorithm = solver.algorithm
+    if algorithm.target == "atlas":
+        raise ParameterError(
+            f"{algorithm.name} makes an atlas, and validate examines maps with one UV a vertex. "
+            "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
+        )
     if asked.up_to:
         sizes(asked.up_to)  # complains now of what could not be fitted later
     work = _Work(
@@ -111,7 +116,7 @@ def examine(
         algorithm=algorithm.name,
         title=algorithm.title,
         target=algorithm.target,
-        source=solver.plugins[0] if solver.plugins else algorithm.origin,
+        source=_source(solver),
         parameters=algorithm.arguments(solver.parameters),
         command=asked.command,
         environment=describe_environment()["id"],
@@ -124,6 +129,13 @@ def examine(
     if not validation.valid:
         return validation
     return validation.model_copy(update={"unmet": unmet(asked.require, validation)})
+
+
+def _source(solver: Solver) -> str:
+    """Return where the algorithm is from: a command, a plug-in, or a module."""
+    if solver.algorithm.program is not None:
+        return str(solver.algorithm.program)
+    return solver.plugins[0] if solver.plugins else solver.algorithm.origin
 
 
 @dataclass(frozen=True)

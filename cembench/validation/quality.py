@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict
 from cembench.core.notices import NoticeKind, of_kind
 from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.comparison import compare, compare_ratios, paired_ratios
+from cembench.results.external_words import solve_words
 from cembench.results.intervals import median_interval
 from cembench.results.records import FaultKind, Record
 from cembench.validation.finding import ValidationFinding
@@ -76,6 +77,10 @@ class Pair(BaseModel):
     baseline_seconds: float | None
     seconds_ratio: float | None
     speed: SpeedVerdict | None
+    #: Of an external program: its wall clock on a small mesh, and its solve time, which the ratio
+    #: is of.
+    start_seconds: float | None = None
+    solve_seconds: float | None = None
     #: Keys of our record and of the baseline's.
     records: tuple[str, str]
 
@@ -87,13 +92,15 @@ class BaselineComparison(BaseModel):
 
     baseline: str
     title: str
-    #: Targets differ, so energies were divided by the area of the image.
+    #: Targets differ, or the image's size is free, so energies were divided by its area.
     relative: bool
     pairs: tuple[Pair, ...]
     energy: PairedComparison
     angle: PairedComparison
     #: None where no round timed both.
     speed: Speed | None
+    #: Where the solver's time is from that the ratios are of, for an external program.
+    solve_time: str = ""
 
 
 def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> BaselineComparison:
@@ -110,7 +117,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     names = [name for name in mine if name in theirs]
     if not names:
         raise ValueError(f"no surface has records of both {ours!r} and {baseline!r}")
-    relative = next(iter(mine.values())).target != next(iter(theirs.values())).target
+    one, other = next(iter(mine.values())), next(iter(theirs.values()))
+    # The size of a free image is another's choice where the code is another's.
+    free = one.target == "free boundary" and (one.external, other.external) != (None, None)
+    relative = one.target != other.target or free
     pairs = tuple(_pair(mine[name], theirs[name], relative=relative) for name in names)
     return BaselineComparison(
         baseline=baseline,
@@ -126,6 +136,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
         ),
         angle=sides([p.angle / p.baseline_angle for p in pairs if p.angle and p.baseline_angle]),
         speed=speed_of([(mine[name], theirs[name]) for name in names]),
+        solve_time=next((solve_words(r) for r in mine.values() if r.is_program), ""),
     )
 
 
@@ -214,6 +225,8 @@ def _pair(ours: Record, theirs: Record, *, relative: bool) -> Pair:
         baseline_seconds=theirs.outcome.median_seconds if theirs.outcome.status == "ok" else None,
         seconds_ratio=found.ratio if found else None,
         speed=found.verdict if found else None,
+        start_seconds=ours.outcome.start_seconds,
+        solve_seconds=ours.outcome.solve_seconds if ours.is_program else None,
         records=(ours.cell.key, theirs.cell.key),
     )
 

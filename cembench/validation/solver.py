@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import RegistryError
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Algorithm, Registry, load_registry
+from cembench.registry import COMMAND, Algorithm, Registry, declared_by, load_registry
 from cembench.results.records import Outcome
 from cembench.running.local import Options, map_once
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
@@ -74,11 +74,15 @@ def load_solver(text: str) -> tuple[Algorithm, Registry, tuple[str, ...]]:
         several and none is named.
 
     """
+    if text.startswith(COMMAND):
+        registry = load_registry([text])
+        (spec,) = declared_by(text)
+        return registry.algorithm(spec.name), registry, (text,)
     file, _, name = text.rpartition(":") if ".py:" in text else (text, "", "")
     if not file.endswith(".py") and ":" not in file:
         registry = load_registry()
-        if file not in registry.algorithms:
-            known = ", ".join(sorted(registry.algorithms))
+        if file not in {**registry.algorithms, **registry.peers}:
+            known = ", ".join(sorted({**registry.algorithms, **registry.peers}))
             raise RegistryError(
                 f"{file!r} is neither a Python file (FILE.py, FILE.py:name, module:name) nor a "
                 f"registered algorithm; those are: {known}."

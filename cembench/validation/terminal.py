@@ -46,15 +46,25 @@ def _finding_lines(finding: ValidationFinding) -> Iterator[RenderableType]:
 
 
 def _pairs_table(against: BaselineComparison, title: str) -> Table:
-    heads = figures("faces", "E_C", "ratio", "mean °", "ratio", "seconds", "ratio")
-    return grid(
-        [names("surface", 18), *heads],
-        [_pair_cells(pair) for pair in against.pairs],
+    program = bool(against.solve_time)
+    times = ("wall", "start", "solve") if program else ("seconds",)
+    heads = figures("faces", "E_C", "ratio", "mean °", "ratio", *times, "ratio")
+    table = grid(
+        [names("surface", 12 if program else 18), *heads],
+        [_pair_cells(pair, program=program) for pair in against.pairs],
         title=f"{title} / {against.title}",
     )
+    if program:
+        table.caption = (
+            "external program: wall is its process, start the same on a small mesh, solve "
+            f"{against.solve_time}; the last ratio is of solve"
+        )
+        table.caption_justify = "left"
+    return table
 
 
-def _pair_cells(pair: Pair) -> tuple[str, ...]:
+def _pair_cells(pair: Pair, *, program: bool) -> tuple[str, ...]:
+    more = (pair.start_seconds, pair.solve_seconds) if program else ()
     return (
         pair.surface,
         f"{pair.faces:,}",
@@ -62,7 +72,7 @@ def _pair_cells(pair: Pair) -> tuple[str, ...]:
         ratio_text(pair.energy, pair.baseline_energy),
         _number(pair.angle, ".3f"),
         ratio_text(pair.angle, pair.baseline_angle),
-        _number(pair.seconds, ".4f"),
+        *(_number(seconds, ".3f" if program else ".4f") for seconds in (pair.seconds, *more)),
         _number(pair.seconds_ratio, ".2f"),
     )
 

@@ -86,7 +86,10 @@ def sentence(validation: Validation) -> str:
     for against in validation.against:
         parts.append(_energy_words(against))
         if against.speed is not None:
-            parts.append(_speed_words(against.speed, against.title, named=several))
+            told = _speed_words(against.speed, against.title, named=several)
+            if against.solve_time:
+                told += f", in the solve time of the external program ({against.solve_time})"
+            parts.append(told)
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
     if validation.no_map_on:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.atlas import cut_map
 from cembench.conformal.laplacian import corner_products
 from cembench.conformal.planar import orientations
 from cembench.core.atomic import write_bytes
@@ -140,6 +141,27 @@ def write_map(
         original = with_uv(text, moved, *corners)
     _write(output, textured, texture, wishes, original)
     return _folded_by_rounding(output, z, moved, surface.mesh.F)
+
+
+def write_corner_map(
+    output: Path, surface: SurfaceFile, corners: Complex, wishes: Wishes
+) -> tuple[Notice, ...]:
+    """Write a surface with an image of its own for each corner (3 m,), as islands have them.
+
+    Raises
+    ------
+    MeshError, ParameterError, RenderError
+        As for :func:`write_map`; a texture cannot be baked for islands.
+
+    """
+    if wishes.bake is not None:
+        raise ParameterError("--bake needs a map with one image for each vertex; this is an atlas.")
+    mesh = surface.mesh
+    found = cut_map(mesh, corners.reshape(-1, 3))
+    moved = placed(found.uv, wishes.place)
+    textured = Textured(mesh.V, mesh.F, _columns(moved), found.surface.F, name=mesh.name)
+    _write(output, textured, _checker(wishes, output), wishes, None)
+    return _folded_by_rounding(output, found.uv, moved, found.surface.F)
 
 
 def save_map(

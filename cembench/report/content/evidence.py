@@ -266,8 +266,8 @@ class Evidence:
         return mesh
 
     def uv(self, record: Record | None) -> NDArray[np.complex128] | None:
-        """The map of a record that ended ok, or None."""
-        if record is None or record.outcome.status != "ok":
+        """The map of a record that ended ok, or None; no picture shows an atlas."""
+        if record is None or record.outcome.status != "ok" or record.target == "atlas":
             return None
         uv = self.store.uv(record.cell)
         if uv is not None and len(uv) != record.mesh.vertices:

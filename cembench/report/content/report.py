@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cembench import __version__
 from cembench.report.content import policies
+from cembench.report.content.beside_others import beside_others
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
@@ -233,6 +234,9 @@ def _beyond(evidence: Evidence, folder: Path) -> Section:
     others = other_targets(evidence)
     if others:
         items.append(others)
+    beside = beside_others(evidence)
+    if beside:
+        items.append(beside)
     return Section("beyond", "Beyond the paper", tuple(items))
 
 

@@ -24,6 +24,7 @@ from cembench.report.document import (
     words,
 )
 from cembench.report.plots import Axis, Plot, PlotPanel
+from cembench.results.external_words import seconds_words
 from cembench.results.records import Record
 
 #: Degrees up to which the histograms of a page go.
@@ -101,6 +102,8 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
             rows.append(_line(evidence, surface, record, series.label + star))
             if record.outcome.cause:
                 causes.append(f"{series.label} ({policy}): {evidence.why_not(record)}")
+            told = seconds_words(record)
+            causes += [f"{series.label}: {told}"] if told else []
             causes += [f"{series.label} ({policy}): {note}" for note in record.outcome.notes]
     starred = sorted({s.target for s in evidence.series if s.target != DISK})
     if starred and any(row[0].text.endswith("*") for row in rows):

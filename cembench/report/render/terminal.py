@@ -27,6 +27,7 @@ from cembench.results.comparison import (
     references,
     seconds_interval,
 )
+from cembench.results.external_words import mark_of, marks_explained, seconds_words
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.running.estimate import Estimate
 
@@ -57,7 +58,7 @@ def results_table(records: Iterable[Record]) -> RenderableType:
 
 
 def _cells_table(records: Sequence[Record]) -> Table:
-    longest = max((len(record.cell.algorithm) + 2 for record in records), default=9)
+    longest = max((len(_name(record)) for record in records), default=9)
     shown = metrics_shown("overview")
     columns = [
         names("surface", max(8, min(16, 80 - 53 - longest))),
@@ -72,7 +73,7 @@ def _cells_table(records: Sequence[Record]) -> Table:
             rows.append(
                 [
                     mesh if k == 0 else "",
-                    record.cell.algorithm + ("" if record.target == "disk" else " *"),
+                    _name(record),
                     *(_figure(record, metric) for metric in shown),
                     "-" if outcome.iterations is None else str(outcome.iterations),
                     "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
@@ -81,6 +82,12 @@ def _cells_table(records: Sequence[Record]) -> Table:
                 ]
             )
     return grid(columns, rows)
+
+
+def _name(record: Record) -> str:
+    """Return an algorithm's name with its marks: another target, and whose code it is."""
+    marks = ("" if record.target == "disk" else "*") + mark_of(record)
+    return f"{record.cell.algorithm} {marks}".rstrip()
 
 
 def _spread(record: Record) -> Text:
@@ -96,11 +103,14 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
     if any(record.target != "disk" for record in records):
         kinds = sorted({f"{r.cell.algorithm}: {r.target}" for r in records if r.target != "disk"})
         remarks.append(Text(f"* not a map to the disk ({'; '.join(kinds)})", style="dim"))
+    remarks += [Text(line, style="dim") for line in marks_explained(list(records))]
     if any(is_unstable(record) for record in records):
         told = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
         remarks.append(Text(told, style="yellow"))
     for record in records:
         name = f"{record.cell.mesh} / {record.cell.algorithm}"
+        told = seconds_words(record)
+        remarks += [Text(f"{name}: {told}")] if told else []
         remarks += [Text(f"{name}: {note}") for note in record.outcome.notes]
         if record.outcome.cause:
             remarks.append(Text(f"{name}: {record.outcome.cause}"))

@@ -1,0 +1,1 @@
+"""Algorithms of others: libraries and programs that are run where they are on the machine."""

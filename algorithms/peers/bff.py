@@ -1,0 +1,45 @@
+"""Boundary first flattening, by the command line of its authors' program."""
+
+from __future__ import annotations
+
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import external_program
+
+_SOURCE = "Sawhney & Crane 2017, https://github.com/GeometryCollective/boundary-first-flattening"
+_REMEDY = (
+    "Build `bff-command-line` of https://github.com/GeometryCollective/boundary-first-flattening "
+    "and put its folder into PATH"
+)
+
+
+@external_program(
+    "bff-program",
+    title="BFF",
+    target="free boundary",
+    command="bff-command-line {input} {output}",
+    source=_SOURCE,
+    remedy=_REMEDY,
+)
+def bff(mesh: DiskMesh) -> None:
+    """What does boundary first flattening come to with a free boundary?
+
+    Not run here: written after the program's own usage. It writes six digits.
+    """
+
+
+@external_program(
+    "bff-program-disk",
+    title="BFF to the disk",
+    target="disk",
+    command="bff-command-line {input} {output} --flattenToDisk",
+    source=_SOURCE,
+    remedy=_REMEDY,
+    circle=1e-5,
+    fit=True,
+)
+def bff_disk(mesh: DiskMesh) -> None:
+    """What does boundary first flattening come to with the disk as its target?
+
+    Not run here: written after the program's own usage. It writes six digits, so its boundary may
+    lie 1e-5 off the circle.
+    """

@@ -1,0 +1,92 @@
+"""MeshLab's parametrisations, called through pymeshlab; it computes UVs in single precision."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Atlas, Parameterization
+from cembench.core.program import Library
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.mesh.uv_reader import UVFile, uv_of_corners
+from cembench.registry import algorithm
+
+MESHLAB = Library("pymeshlab", "pymeshlab", circle=1e-6)
+
+
+@algorithm(
+    "meshlab-harmonic",
+    title="Harmonic map of MeshLab",
+    target="disk",
+    source="compute_texcoord_parametrization_harmonic",
+    library=MESHLAB,
+)
+def meshlab_harmonic(mesh: DiskMesh) -> Parameterization:
+    """What does MeshLab's harmonic map to the disk come to?"""
+    return Parameterization(_of_vertices(mesh, "compute_texcoord_parametrization_harmonic"))
+
+
+@algorithm(
+    "meshlab-lscm",
+    title="LSCM of MeshLab",
+    target="free boundary",
+    source="compute_texcoord_parametrization_least_squares_conformal_maps",
+    library=MESHLAB,
+)
+def meshlab_lscm(mesh: DiskMesh) -> Parameterization:
+    """What does MeshLab's least squares conformal map come to, with its own pins?"""
+    name = "compute_texcoord_parametrization_least_squares_conformal_maps"
+    return Parameterization(_of_vertices(mesh, name))
+
+
+@algorithm(
+    "meshlab-voronoi",
+    title="Voronoi atlas of MeshLab",
+    target="atlas",
+    source="generate_voronoi_atlas_parametrization",
+    library=MESHLAB,
+)
+def meshlab_voronoi(
+    mesh: TriangleMesh, *, regions: Annotated[int, Field(ge=1, le=1000)] = 10
+) -> Atlas:
+    """What does MeshLab's atlas of Voronoi regions come to?"""
+    meshes = _loaded(mesh)
+    _apply(meshes, "generate_voronoi_atlas_parametrization", regionnum=regions)
+    found = meshes.mesh(meshes.mesh_number() - 1)  # it is another one than was given
+    V, F = found.vertex_matrix(), found.face_matrix().astype(np.int64)
+    if found.has_wedge_tex_coord():
+        uv, index = found.wedge_tex_coord_matrix(), np.arange(F.size).reshape(-1, 3)
+    else:
+        uv, index = found.vertex_tex_coord_matrix(), F
+    return Atlas(uv_of_corners(UVFile(_complex(uv), V, F, index), mesh.V, mesh.F))
+
+
+def _of_vertices(mesh: DiskMesh, name: str) -> NDArray[np.complex128]:
+    meshes = _loaded(mesh)
+    _apply(meshes, name)
+    return _complex(meshes.current_mesh().vertex_tex_coord_matrix())
+
+
+def _loaded(mesh: TriangleMesh) -> Any:
+    import pymeshlab
+
+    meshes = pymeshlab.MeshSet()
+    meshes.add_mesh(pymeshlab.Mesh(mesh.V, mesh.F))
+    return meshes
+
+
+def _apply(meshes: Any, name: str, **parameters: Any) -> None:
+    from pymeshlab.pmeshlab import PyMeshLabException
+
+    try:
+        getattr(meshes, name)(**parameters)
+    except PyMeshLabException as error:
+        raise AlgorithmFailed(f"MeshLab: {error}") from None
+
+
+def _complex(uv: NDArray[np.float64]) -> NDArray[np.complex128]:
+    return np.ascontiguousarray(uv[:, 0] + 1j * uv[:, 1])

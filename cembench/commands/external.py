@@ -1,0 +1,77 @@
+"""The options by which a command line names a program to be measured."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cembench.core.errors import ParameterError
+
+Command = Annotated[
+    str | None,
+    typer.Option(
+        "--command",
+        metavar="COMMAND",
+        help="A program to run as an algorithm: 'mysolver {input} -o {output}'. It may be of any "
+        "language; see docs/external_solvers.md.",
+    ),
+]
+Settings = Annotated[
+    list[str],
+    typer.Option(
+        "--program",
+        metavar="KEY=VALUE",
+        help="Of --command: name, target, input, output, seconds, version, circle, fit. "
+        "Repeatable.",
+    ),
+]
+#: What `--program` may set, beside the fields of a declaration.
+KEYS = ("name", "target", "input", "output", "seconds", "version", "circle", "fit")
+_TRUTH = {"yes": True, "no": False}
+
+
+def declared_command(command: str | None, settings: list[str]) -> tuple[list[str], list[str]]:
+    """Return the plug-in that a command makes, and the name of its algorithm; nothing without one.
+
+    Raises
+    ------
+    ParameterError
+        A setting without a command, an unknown one, or one of the wrong type.
+    RegistryError
+        A declaration that cannot be right.
+
+    """
+    from cembench.registry import COMMAND, declared_by, load_registry
+
+    if command is None:
+        if settings:
+            raise ParameterError(f"--program {settings[0]} goes with --command COMMAND.")
+        return [], []
+    given = {"command": command, "folder": str(Path.cwd())}
+    plugin = COMMAND + json.dumps(given | dict(_setting(one) for one in settings))
+    (spec,) = declared_by(plugin)
+    if spec.name in load_registry().algorithms:
+        raise ParameterError(
+            f"the command would be called {spec.name!r}, as an algorithm is; give it another name "
+            "with --program name=NAME."
+        )
+    return [plugin], [spec.name]
+
+
+def _setting(text: str) -> tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    if key not in KEYS or not equals:
+        raise ParameterError(
+            f"--program {text!r} is not understood; write KEY=VALUE with one of: {', '.join(KEYS)}."
+        )
+    if key == "fit" and value not in _TRUTH:
+        raise ParameterError(f"--program fit={value!r} is not allowed; write yes or no.")
+    if key == "circle":
+        try:
+            return key, float(value)
+        except ValueError:
+            raise ParameterError(f"--program circle={value!r} is not a number.") from None
+    return key, _TRUTH[value] if key == "fit" else value

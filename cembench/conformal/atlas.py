@@ -1,0 +1,172 @@
+"""Maps whose surface is cut into islands: UVs belong to corners. What are islands, seams, figures?
+
+Two triangles hang together at an edge of the surface where the images of both its ends are the same
+numbers in both; else the edge is a seam. An island is what hangs together. Moving, turning and
+scaling an island leaves its angles as they are, so energies are divided by the area of the image
+before they are compared.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
+
+from cembench.conformal.metrics import METRICS, MapFigures, Metric
+from cembench.conformal.planar import folded_triangles, signed_areas
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+Complex = NDArray[np.complex128]
+Indices = NDArray[np.int64]
+
+#: Figures that an atlas has none of: its outline is not meant to be round.
+_NOT_OF_AN_ATLAS = ("boundary_circularity",)
+
+
+@dataclass(frozen=True, eq=False)
+class CutMap:
+    """A surface cut along the seams of an atlas.
+
+    Parameters
+    ----------
+    surface : TriangleMesh
+        The same triangles; a vertex for each image of a vertex.
+    uv : complex128 (k,)
+        The image of each of its vertices.
+    island : int64 (m,)
+        Number of each triangle's island, from 0.
+    seams : int64 (s, 2)
+        The edges of the uncut surface that are seams, by its vertices.
+    seam_length : float
+        Their length, in the units of the surface.
+    mirrored : int
+        How many islands came mirrored; in `uv` they are turned over, so that folds are told from
+        them and angles keep their sign.
+
+    """
+
+    surface: TriangleMesh
+    uv: Complex
+    island: Indices
+    seams: Indices
+    seam_length: float
+    mirrored: int
+
+    @property
+    def islands(self) -> int:
+        """How many islands there are."""
+        return int(self.island.max()) + 1
+
+
+def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
+    """Cut a surface where the images of its corners (m, 3) part."""
+    F = mesh.F
+    keys = np.stack([F.ravel().astype(np.float64), corners.real.ravel(), corners.imag.ravel()])
+    found, index = np.unique(keys, axis=1, return_inverse=True)
+    G = index.reshape(F.shape).astype(np.int64)
+    surface = TriangleMesh.trusted(mesh.V[found[0].astype(np.int64)], G, mesh.name)
+    island, seams = _islands_and_seams(F, G)
+    length = float(np.linalg.norm(mesh.V[seams[:, 0]] - mesh.V[seams[:, 1]], axis=1).sum())
+    uv = found[1] + 1j * found[2]
+    areas = np.bincount(island, np.nan_to_num(signed_areas(uv, G)))
+    turned = areas < 0
+    of_turned = np.unique(G[turned[island]])
+    uv[of_turned] = uv[of_turned].conj()
+    return CutMap(surface, uv, island, seams, length, int(turned.sum()))
+
+
+def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
+    """Return each triangle's island, and the edges between triangles that do not hang together."""
+    m = len(F)
+    ends = [np.concatenate([A, np.roll(A, -1, axis=1)]) for A in (F, G)]
+    on_surface, in_plane = (
+        np.sort(np.stack([e[:m].ravel(), e[m:].ravel()], axis=1), axis=1) for e in ends
+    )
+    triangle = np.repeat(np.arange(m), 3)
+    order = np.lexsort((on_surface[:, 1], on_surface[:, 0]))
+    edges = on_surface[order]
+    twins = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
+    one, other = order[twins], order[twins + 1]
+    together = (in_plane[one] == in_plane[other]).all(axis=1)
+    pairs = triangle[one[together]], triangle[other[together]]
+    graph = sparse.coo_array((np.ones(len(pairs[0])), pairs), shape=(m, m))
+    _, island = connected_components(graph, directed=False)
+    return island.astype(np.int64), edges[twins[~together]]
+
+
+class AtlasFigures(MapFigures):
+    """What the metrics of an atlas are computed from, each part once."""
+
+    def __init__(self, cut: CutMap) -> None:
+        super().__init__(cut.surface, cut.uv)
+        self.cut = cut
+
+    @cached_property
+    def area(self) -> float:
+        """A: the signed areas of all triangles, added up, mirrored islands turned over."""
+        return float(signed_areas(self.uv, self.mesh.F).sum())
+
+    @cached_property
+    def folds(self) -> Indices:
+        """Of each island, how many triangles are folded over or collapsed."""
+        folded = folded_triangles(self.uv, self.mesh.F)
+        return np.bincount(self.cut.island[folded], minlength=self.cut.islands).astype(np.int64)
+
+    @cached_property
+    def beltrami(self) -> NDArray[np.float64]:
+        """|mu| of every triangle, (m,): 0 for a conformal one, 1 for one that collapsed."""
+        K = self.dilatations
+        with np.errstate(invalid="ignore"):
+            mu = (K - 1) / (K + 1)
+        return np.where(np.isfinite(K), mu, 1.0)
+
+
+def _atlas(figures: MapFigures) -> AtlasFigures:
+    assert isinstance(figures, AtlasFigures)
+    return figures
+
+
+#: The figures that only an atlas has.
+ATLAS_METRICS: tuple[Metric, ...] = (
+    Metric(
+        "islands", "islands", "islands", "", "d", "d",
+        "parts of the surface that hang together in the image",
+        lambda f: _atlas(f).cut.islands, better=None,
+    ),
+    Metric(
+        "mirrored_islands", "mirrored islands", "mirrored", "", "d", "d",
+        "islands whose triangles run the other way round than on the surface",
+        lambda f: _atlas(f).cut.mirrored,
+    ),
+    Metric(
+        "seam_length", "seams", "seams", "in units of the surface", ".3g", ".6g",
+        "length of the surface's edges along which it is cut",
+        lambda f: _atlas(f).cut.seam_length,
+    ),
+    Metric(
+        "folds_of_worst_island", "folds, worst island", "worst", "", "d", "d",
+        "folded triangles of the island that has most",
+        lambda f: int(_atlas(f).folds.max()),
+    ),
+    Metric(
+        "beltrami_mean", "|mu|, mean", "|mu|", "", ".4f", ".6f",
+        "modulus of the Beltrami coefficient: the mean",
+        lambda f: float(_atlas(f).beltrami.mean()),
+    ),
+    Metric(
+        "beltrami_max", "|mu|, largest", "|mu| max", "", ".4f", ".6f",
+        "the same: the largest",
+        lambda f: float(_atlas(f).beltrami.max()),
+    ),
+)  # fmt: skip
+
+
+def atlas_metrics(mesh: TriangleMesh, corners: Complex) -> dict[str, float | int]:
+    """Return every figure that a record of an atlas holds, under the record's keys."""
+    figures = AtlasFigures(cut_map(mesh, corners))
+    chosen = [metric for metric in METRICS if metric.name not in _NOT_OF_AN_ATLAS]
+    return {metric.name: metric.compute(figures) for metric in (*chosen, *ATLAS_METRICS)}

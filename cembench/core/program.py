@@ -1,0 +1,204 @@
+"""What an external program or a foreign library promises, by which it is an algorithm here."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import shutil
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from cembench.core.errors import RegistryError
+
+#: Formats that a program can read its mesh from, and those that it can leave UVs in.
+INPUTS = (".obj", ".off", ".ply", ".mat", ".npz")
+OUTPUTS = (".obj", ".off", ".ply", ".mat", ".npz", ".txt")
+#: Names that a command may use besides its parameters.
+PLACES = ("input", "output", "folder", "threads")
+_PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
+#: What a pattern's group may be called, and how many seconds one of it is.
+UNITS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
+@dataclass(frozen=True)
+class Library:
+    """A library of others that an algorithm calls in its own process."""
+
+    #: What is imported.
+    module: str
+    #: Under which name its version is known.
+    package: str
+    #: As :attr:`Program.circle`, for one that computes in single precision.
+    circle: float = 1e-9
+
+
+@dataclass(frozen=True)
+class Program:
+    """A program that maps a mesh file to a file with UVs.
+
+    Parameters
+    ----------
+    command : tuple of str
+        Its words; ``{input}``, ``{output}``, ``{folder}``, ``{threads}`` and the parameters' names
+        in braces are filled in. No shell reads them.
+    input : str
+        Format of the mesh file, as ".obj".
+    output : str
+        Format of the file with UVs, as ".obj"; or its name, for a program that chooses it itself.
+    seconds : str
+        A regular expression that finds the program's own solve time in what it prints; the last hit
+        counts. Its group holds seconds, or is called ``ms`` or ``us``. Empty: it prints none.
+    version : tuple of str
+        A command whose first line of output is the program's version. Empty: not known.
+    circle : float
+        How far off the unit circle the boundary of a disk may lie: a program that writes few digits
+        cannot do better. Wider than the 1e-9 of our own only where this says so.
+    fit : bool
+        Whether the image is first moved and scaled until its outer boundary lies on the unit
+        circle: for programs that put the disk into the unit square.
+    flat : bool
+        Whether the file holds the flattened surface, the UVs being x and y of its vertices.
+    remedy : str
+        What brings the program to a machine that lacks it.
+
+    """
+
+    command: tuple[str, ...]
+    input: str = ".obj"
+    output: str = ".obj"
+    seconds: str = ""
+    version: tuple[str, ...] = ()
+    circle: float = 1e-9
+    fit: bool = False
+    flat: bool = False
+    remedy: str = ""
+
+    @property
+    def output_format(self) -> str:
+        """The suffix of the file that it writes."""
+        return Path(self.output_name).suffix.lower()
+
+    @property
+    def output_name(self) -> str:
+        """What the file that it writes is called."""
+        return self.output if self.names_its_file else f"uv{self.output}"
+
+    @property
+    def names_its_file(self) -> bool:
+        """Whether the program itself chooses what its file is called."""
+        return re.fullmatch(r"\.\w+", self.output) is None
+
+    def words(self, values: Mapping[str, object]) -> list[str]:
+        """Fill in the command."""
+        return [_PLACEHOLDER.sub(lambda m: str(values[m[1]]), word) for word in self.command]
+
+    def __str__(self) -> str:
+        """The command with the names of files, not where they lie on this machine."""
+        shown = (Path(w).name if Path(w).is_absolute() else w for w in self.command)
+        return " ".join(w if _PLACEHOLDER.fullmatch(w) else shlex.quote(w) for w in shown)
+
+
+def checked_program(name: str, program: Program, parameters: Iterable[str]) -> Program:
+    """Return a declaration that can be right.
+
+    Raises
+    ------
+    RegistryError
+        An empty command, one that does not say where the mesh goes, an unknown name in braces, an
+        unknown format, or a pattern that is none.
+
+    """
+    allowed = (*PLACES, *parameters)
+    used = [m for word in program.command for m in _PLACEHOLDER.findall(word)]
+    unknown = [one for one in used if one not in allowed]
+    wrong = ""
+    if not program.command:
+        wrong = "its command is empty"
+    elif unknown:
+        named = ", ".join(f"{{{one}}}" for one in allowed)
+        wrong = f"its command names {{{unknown[0]}}}; allowed: {named}"
+    elif not {"input", "folder"} & set(used):
+        wrong = "its command does not say where the mesh file goes; write {input} there"
+    elif not program.names_its_file and not {"output", "folder"} & set(used):
+        wrong = (
+            "its command does not say where the UVs go; write {output} there, or name the file "
+            "that it writes as its output"
+        )
+    elif program.input not in INPUTS:
+        wrong = f"input {program.input!r} is unknown; allowed: {', '.join(INPUTS)}"
+    elif program.output_format not in OUTPUTS:
+        wrong = f"output {program.output!r} is unknown; allowed: {', '.join(OUTPUTS)}"
+    elif Path(program.output).name != program.output:
+        wrong = f"output {program.output!r} is a path; name a file of the program's folder"
+    elif not 0 < program.circle <= 1e-3:
+        wrong = f"circle={program.circle:g} is not allowed; it is above 0 and at most 0.001"
+    wrong = wrong or _wrong_pattern(program.seconds)
+    if wrong:
+        raise RegistryError(f"program {name!r}: {wrong}.")
+    return program
+
+
+def _wrong_pattern(pattern: str) -> str:
+    try:
+        groups = re.compile(pattern)
+    except re.error as error:
+        return f"seconds={pattern!r} is not a regular expression ({error})"
+    named = set(groups.groupindex)
+    if (pattern and groups.groups != 1) or not named <= set(UNITS):
+        return (
+            f"seconds={pattern!r} must have one group, for the number; it may be called "
+            f"{', '.join(UNITS)}"
+        )
+    return ""
+
+
+def of_matlab_function(file: Path) -> dict[str, str]:
+    """Return the declaration of a MATLAB function ``uv = f(V, F)`` in a file, F counted from 1.
+
+    Octave runs it, or MATLAB where there is no Octave. The solve time is that of the function
+    alone.
+    """
+    octave = next((name for name in ("octave-cli", "octave") if shutil.which(name)), "")
+    code = (
+        f'addpath("{file.parent.absolute()}"); mesh = load("{{input}}"); started = tic; '
+        f"uv = {file.stem}(double(mesh.v), double(mesh.f)); "
+        'fprintf("solve: %.9f s\\n", toc(started)); save("-v7", "{output}", "uv");'
+    )
+    words = [octave, "--norc", "--quiet", "--eval", code]
+    if not octave:
+        words = ["matlab" if shutil.which("matlab") else "octave-cli", "-batch", code]
+    return {
+        "command": shlex.join(words),
+        "input": ".mat",
+        "output": ".mat",
+        "seconds": r"^solve: (\S+) s$",
+        "version": f"{words[0]} --version" if octave else "",
+        "remedy": "Install Octave (in Debian: apt-get install octave-cli), or MATLAB",
+    }
+
+
+def found_words(command: str, folder: Path) -> tuple[str, ...]:
+    """Split a command into words; files of this folder become absolute paths.
+
+    A program runs in a folder of its own, where relative paths would lead nowhere.
+
+    Raises
+    ------
+    RegistryError
+        An open quotation mark.
+
+    """
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise RegistryError(f"the command {command!r} cannot be split: {error}.") from None
+    return tuple(_absolute(word, folder) for word in words)
+
+
+def _absolute(word: str, folder: Path) -> str:
+    try:
+        is_file = not _PLACEHOLDER.search(word) and (folder / word).is_file()
+    except (OSError, ValueError):
+        return word
+    return str((folder / word).absolute()) if is_file else word

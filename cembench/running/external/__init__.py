@@ -1,0 +1,1 @@
+"""External programs and foreign libraries, run and measured as algorithms."""

@@ -1,0 +1,113 @@
+"""The files between us and a program: its mesh, and the UVs that it leaves."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.planar import fitted_circle, polygon_area
+from cembench.core.errors import MeshError
+from cembench.core.parameterization import Atlas, Parameterization
+from cembench.mesh.files import write_mesh
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.uv_reader import OtherSurfaceError, read_flat, read_uv, uv_of_corners
+from cembench.registry import Algorithm
+from cembench.results.records import FaultKind
+from cembench.running.external.faults import ProgramFault
+
+#: The largest file with UVs that is read: so many bytes, and so many for each vertex and triangle.
+LARGEST_OUTPUT, LARGEST_SHARE = 2**24, 4096
+
+
+def write_input(path: Path, mesh: TriangleMesh) -> None:
+    """Write a mesh for a program, in the format that the suffix says.
+
+    MAT files hold ``v`` and ``f``, counted from 1, NPZ files ``V`` and ``F``, counted from 0.
+    """
+    if path.suffix == ".npz":
+        np.savez(path, V=mesh.V, F=mesh.F)
+    elif path.suffix == ".mat":
+        from scipy.io import savemat
+
+        savemat(path, {"v": mesh.V, "f": (mesh.F + 1).astype(np.float64)})
+    else:
+        write_mesh(path, mesh)
+
+
+def largest_output(mesh: TriangleMesh) -> int:
+    """Return how many bytes the file with the UVs of a mesh may have."""
+    return LARGEST_OUTPUT + LARGEST_SHARE * (mesh.n + mesh.m)
+
+
+def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Parameterization | Atlas:
+    """Read what a program left, as the map of its target.
+
+    Raises
+    ------
+    ProgramFault
+        There is no such file, it is too large or damaged, or it holds another surface.
+
+    """
+    _check_output(path, mesh)
+    try:
+        program = algorithm.program
+        read = read_flat if program is not None and program.flat else read_uv
+        corners = uv_of_corners(read(path), mesh.V, mesh.F)
+    except OtherSurfaceError as error:
+        told = f"{path.name} is not a map of the surface that it was given: {error}"
+        raise ProgramFault(FaultKind.OTHER_SURFACE, told, status="invalid") from None
+    except MeshError as error:
+        told = f"{path.name}: {error}"
+        raise ProgramFault(FaultKind.UNREADABLE_OUTPUT, told) from None
+    if algorithm.target == "atlas":
+        return Atlas(corners)
+    uv = _of_vertices(corners, mesh)
+    if program is not None and program.fit:
+        uv = _in_unit_circle(uv, mesh)
+    return Parameterization(uv)
+
+
+def _check_output(path: Path, mesh: TriangleMesh) -> None:
+    try:
+        about = path.stat()
+    except OSError:
+        beside = sorted(p.name for p in path.parent.iterdir())
+        told = f"it left no file {path.name}; its folder holds: {', '.join(beside[:8]) or 'none'}"
+        raise ProgramFault(FaultKind.NO_OUTPUT, told) from None
+    if not stat.S_ISREG(about.st_mode):
+        raise ProgramFault(FaultKind.NO_OUTPUT, f"{path.name} is not a regular file")
+    if not about.st_size:
+        raise ProgramFault(FaultKind.UNREADABLE_OUTPUT, f"{path.name} is empty (0 bytes)")
+    if about.st_size > largest_output(mesh):
+        told = (
+            f"{path.name} has {about.st_size:,} bytes; for {mesh.n:,} vertices and {mesh.m:,} "
+            f"triangles at most {largest_output(mesh):,} are read"
+        )
+        raise ProgramFault(FaultKind.OUTPUT_TOO_LARGE, told)
+
+
+def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
+    """Return the UV of each vertex (n,), where all its corners have the same one."""
+    uv = np.empty(mesh.n, dtype=np.complex128)
+    uv[mesh.F] = corners
+    finite = np.isfinite(corners)
+    apart = np.unique(mesh.F[finite & (uv[mesh.F] != corners)])
+    if len(apart):
+        told = (
+            f"{len(apart)} vertices have several UVs, the first being {apart[0]}: the surface was "
+            'cut. Declare the target "atlas" for such a program'
+        )
+        raise ProgramFault(FaultKind.CUT_SURFACE, told, status="invalid")
+    return uv
+
+
+def _in_unit_circle(uv: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
+    """Move and scale an image so that its outer boundary fits the unit circle best."""
+    if not (mesh.loops and np.isfinite(uv).all()):
+        return uv
+    outer = max(mesh.loops, key=lambda loop: abs(polygon_area(uv[loop])))
+    centre, radius = fitted_circle(uv[outer])
+    return (uv - centre) / radius if np.isfinite(radius) and radius > 0 else uv

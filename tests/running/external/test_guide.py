@@ -1,0 +1,107 @@
+"""The guide shows the shipped examples as they are, and what it tells to type does what it says."""
+
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+from cembench import write_mesh
+from cembench.commands.external import KEYS
+from cembench.core.program import INPUTS, OUTPUTS
+from cembench.registry import load_registry
+from cembench.report.content.beside_others import beside_others
+from cembench.report.content.evidence import Evidence
+from cembench.results.records import FaultKind
+from tests.validation.in_this_process import LauncherHere, call_here
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = ROOT / "examples/external"
+GUIDE = (ROOT / "docs/external_solvers.md").read_text()
+NEEDS = {"lscm_in_c": "cc", "tutte.m": "octave-cli"}
+
+
+def commands():
+    blocks = re.findall(r"```console\n(.*?)```", GUIDE, re.DOTALL)
+    return [line.removeprefix("$ ") for block in blocks for line in block.splitlines()]
+
+
+@pytest.fixture
+def typed(cli, monkeypatch):
+    """Types a command of the guide in a folder that holds a face and the examples."""
+    monkeypatch.setattr("cembench.validation.solver.in_a_process", lambda options: call_here)
+    write_mesh(cli.folder / "face.obj", hemi_ellipsoid(400))
+    for file in EXAMPLES.iterdir():
+        shutil.copy(file, cli.folder)
+
+    def type_(line):
+        for word, program in NEEDS.items():
+            if word in line and not shutil.which(program):
+                pytest.skip(f"there is no {program} on this machine")
+        words = shlex.split(line)
+        if words[0] == "cembench":
+            code, out, err = cli(*words[1:])
+            assert code == 0, out + err
+            return out
+        subprocess.run(words, cwd=cli.folder, check=True)
+        return ""
+
+    return type_
+
+
+def test_the_guide_shows_the_examples_as_they_are():
+    assert f"```c\n{(EXAMPLES / 'lscm_in_c.c').read_text()}```" in GUIDE
+    assert f"```octave\n{(EXAMPLES / 'tutte.m').read_text()}```" in GUIDE
+
+
+def test_the_c_example_is_valid_as_the_guide_says(typed):
+    compile_, map_, validate, *_ = commands()
+    typed(compile_)
+    printed = typed(map_)
+    assert "lscm_in_c (external program) (free boundary)" in printed
+    assert "(by its own word)" in printed
+    printed = typed(validate)
+    assert "BAD" not in printed
+    documented = GUIDE.split("exit code is 0:\n\n```\n")[1].split("\n```")[0]
+    assert documented in printed
+
+
+def test_the_octave_example_maps_to_the_disk(typed):
+    (line,) = (one for one in commands() if "tutte.m" in one)
+    printed = typed(line)
+    assert "tutte (external program) (disk)" in printed
+    assert re.search(r"folded triangles +0 *\n", printed)
+    assert "GNU Octave" in printed
+
+
+def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli, monkeypatch):
+    """The report is another test's matter: drawing it takes longer than measuring."""
+    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
+    monkeypatch.setattr("cembench.commands.report.make_report", lambda run, *_: (None, run))
+    (line,) = (one for one in commands() if " peers " in one)
+    printed = " ".join(typed(line).split())
+    assert "igl-lscm ‡" in printed
+    assert "‡ a library of others" in printed
+    energies = re.findall(r"(?:igl-)?lscm(?: ‡)? (\d\.\d{4}) ", printed)
+    assert len(energies) == 2
+    assert energies[0] == energies[1]
+    table = beside_others(Evidence.of(cli.folder / "results/peers"))
+    told = {(row[1].text, row[2].text): row[4].text for row in table.rows}
+    assert told["free boundary", "LSCM of libigl ‡"] == told["free boundary", "LSCM"]
+    assert ("disk", "CEM") in told
+
+
+def test_the_guide_names_every_key_format_fault_and_peer():
+    for name in KEYS:
+        assert f"| `{name}` |" in GUIDE
+    for suffix in (*INPUTS, *OUTPUTS):
+        assert f"`{suffix[1:]}`" in GUIDE
+    for name in load_registry().peers:
+        assert f"`{name}`" in GUIDE
+    kinds = [kind for kind in FaultKind if re.search("output|program|other_s|cut_s|not_t", kind)]
+    assert len(kinds) == 7
+    for kind in kinds:
+        assert f"`{kind}`" in GUIDE
