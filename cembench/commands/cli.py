@@ -52,7 +52,7 @@ from cembench.commands.options import (
     Timeout,
     memory_bytes,
 )
-from cembench.core.errors import ParameterError
+from cembench.core.errors import MeshError, ParameterError
 from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.paper.profiles import Profile
