@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -19,6 +20,7 @@ _SIZES = {
     **dict.fromkeys(("double", "float64"), "d"),
 }
 _LISTS = ("vertex_indices", "vertex_index")
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 Value = float | int
 #: Reads one value of a type.
 Take = Callable[[str], Value]
@@ -145,7 +147,10 @@ def _text(elements: list[_Element], body: bytes) -> dict[str, list[Row]]:
                 if not words:
                     raise Damaged("a line is too short")
                 word = words.pop()
-                return real(word) if _SIZES[kind] in "fd" else _within(kind, integer(word))
+                if _SIZES[kind] not in "fd":
+                    return _within(kind, integer(word))
+                # As in binary files, what is no coordinate may be NaN or infinite.
+                return float(word) if _NOT_FINITE.fullmatch(word) else real(word)
 
             def room(words: list[str] = words) -> int:
                 return len(words)
