@@ -18,23 +18,27 @@ class Extra(StrEnum):
     """What can be installed beside the default: ``pip install 'cembench[NAME]'``."""
 
     FETCH = "fetch"
+    FORMATS = "formats"
     PARDISO = "pardiso"
     PARQUET = "parquet"
     REPORT = "report"
     STANDINS = "standins"
     TABLES = "tables"
     VIDEO = "video"
+    XATLAS = "xatlas"
 
 
 #: The modules that each extra brings.
 MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.FETCH: ("pooch", "requests"),
+    Extra.FORMATS: ("OpenEXR",),
     Extra.PARDISO: ("pypardiso",),
     Extra.PARQUET: ("pyarrow",),
     Extra.REPORT: ("jinja2", "markupsafe", "plotly"),
     Extra.STANDINS: ("skimage", "pymeshlab"),
     Extra.TABLES: ("pandas",),
     Extra.VIDEO: ("imageio_ffmpeg",),
+    Extra.XATLAS: ("xatlas",),
 }
 
 

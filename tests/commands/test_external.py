@@ -46,7 +46,10 @@ def face(cli):
         (("validate",), "a program with --command COMMAND"),
         (("validate", "cem", "--command", "x {input} {output}"), "name one solver"),
         (("validate", "xatlas"), "xatlas makes an atlas"),
-        (("run", "--surfaces", "cone", "-a", "no-such"), "unknown algorithm 'no-such'; known: bff"),
+        (
+            ("run", "--surfaces", "cone", "-a", "no-such"),
+            "unknown algorithm 'no-such'; known: abf++",
+        ),
     ],
 )
 def test_what_cannot_be_meant_is_refused(cli, words, message):
@@ -65,11 +68,22 @@ def test_the_map_of_an_atlas_is_written_with_a_uv_for_each_corner(cli, face):
     assert len(np.unique(written.index)) == len(written.uv) > flat_disk(200).n
 
 
-def test_an_atlas_goes_into_a_file_that_can_hold_it_and_that_is_said_first(cli, face):
-    words = ("map", face, "--command", command("hangs"), "--program", "target=atlas")
-    code, _, err = cli(*words, "-o", "uv.ply")
-    assert code == 2
-    assert "allowed here: .obj" in err
+@pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".vtp", ".npz"])
+def test_an_atlas_goes_into_every_format_that_holds_uvs(cli, face, suffix):
+    words = ("map", face, "--command", command("cut"), "--program", "target=atlas")
+    code, _, err = cli(*words, "-o", f"uv{suffix}")
+    assert code == 0, err
+    assert (cli.folder / f"uv{suffix}").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    "more", [("-o", "uv.off"), ("--html", "a.html"), ("--remesh", "a.obj"), ("--bake", "a.png")]
+)
+def test_what_an_atlas_cannot_give_is_refused_before_it_is_made(cli, face, more):
+    words = ("map", face, "--command", command("hangs"), "--program", "target=atlas", *more)
+    code, _, err = cli(*words)
+    assert code == 2, err
+    assert not any(path.suffix in (".off", ".html", ".png") for path in cli.folder.iterdir())
 
 
 def test_a_program_that_is_not_there_is_skipped_with_what_brings_it(cli, face):

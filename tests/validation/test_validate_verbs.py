@@ -90,7 +90,11 @@ def test_what_remembers_its_calls_is_caught_in_the_rounds(here):
         ("none", (), "'none' is neither a Python file"),
         ("", (), "declares not exactly one algorithm; it declares: backslash,"),
         (":none", (), "declares no algorithm 'none'; it declares: backslash,"),
-        (":right", ("--against", "none"), "unknown algorithm 'none'; known: backslash,"),
+        (
+            ":right",
+            ("--against", "none"),
+            "unknown algorithm 'none'; known: abf++, abf-linear, angenent-haker, backslash,",
+        ),
         (":right", ("--against", "koebe-cem"), "--against koebe-cem: right cannot be compared"),
         (":right", ("--surfaces", "catenoid-ring"), "which none of the chosen algorithms takes"),
         (":right", ("-p", "steps=2"), "no chosen algorithm has a parameter 'steps'"),

@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from cembench.conformal.atlas import ATLAS_METRICS
 from cembench.conformal.metrics import METRICS, Metric, metrics_shown
 from cembench.mesh.datasets import Dataset
 from cembench.registry import Algorithm, Surface
@@ -153,7 +154,7 @@ def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str
     for record, found in compared:
         i = found.speedup_interval
         sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
-        name = record.cell.algorithm + (f" ({record.cell.solves})" if several else "")
+        name = _name(record) + (f" ({record.cell.solves})" if several else "")
         rows.append([record.cell.mesh, name, f"{found.speedup:.2f}", sure, found.verdict])
     return grid(
         [
@@ -169,11 +170,11 @@ def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str
 def _bare_speedups(compared: Sequence[tuple[Record, Comparison]]) -> Table:
     """A line a surface, a column an algorithm."""
     several = _several_policies(compared)
-    algorithms = list(dict.fromkeys(record.cell.algorithm for record, _ in compared))
+    algorithms = list(dict.fromkeys(_name(record) for record, _ in compared))
     lines: dict[tuple[str, str], dict[str, str]] = {}
     for record, found in compared:
         line = lines.setdefault((record.cell.mesh, record.cell.solves), {})
-        line[record.cell.algorithm] = f"{found.speedup:.2f}"
+        line[_name(record)] = f"{found.speedup:.2f}"
     rows = [
         [f"{mesh} ({solves})" if several else mesh, *(line.get(name, "-") for name in algorithms)]
         for (mesh, solves), line in lines.items()
@@ -251,7 +252,9 @@ def figures_table(record: Record) -> Table:
     if facts.paper_row:
         rows.append(("in the paper", _printed(record)))
     rows.append(("algorithm", f"{record.title} ({record.target})" + _given(record)))
-    for metric in METRICS:
+    if record.external is not None:
+        rows.append((f"external {record.external.kind}", record.external.name))
+    for metric in (*METRICS, *ATLAS_METRICS):
         if metric.name in outcome.metrics:
             text = metric.text(outcome.metrics[metric.name], precise=True)
             rows.append((metric.title, f"{text} {metric.unit}".rstrip()))
@@ -259,18 +262,18 @@ def figures_table(record: Record) -> Table:
         rows.append(("iterations", str(outcome.iterations)))
     if outcome.seconds:
         phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
-        rows.append(("seconds", f"{outcome.median_seconds:.3f} ({phases})"))
+        told = seconds_words(record) or f"{outcome.median_seconds:.3f} ({phases})"
+        rows.append(("seconds", told))
     interval = seconds_interval(record)
     if interval is not None:
         sure = f"{interval.low:.4f} to {interval.high:.4f} s over {len(outcome.rounds)} rounds"
         rows.append(("95 % interval", sure + (", unstable" if is_unstable(record) else "")))
         rows.append(("fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s"))
     if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
-        memory = (
-            f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, "
-            f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
-        )
-        rows.append(("memory", memory))
+        more = f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
+        whose = "of the program's processes" if record.is_program else more
+        peak = f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most"
+        rows.append(("memory", f"{peak}, {whose}"))
     rows += [("note", str(note)) for note in outcome.notes]
     return grid([GridColumn(style="bold"), GridColumn(wraps=True)], rows, gap=2)
 

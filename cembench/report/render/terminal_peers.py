@@ -9,6 +9,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from cembench.report.render.grid import GridColumn, grid, names
 from cembench.report.render.terminal import status_style
 from cembench.results.external_words import mark_of, marks_explained
 from cembench.results.records import Record
@@ -40,29 +41,29 @@ def peers_table(records: Sequence[Record]) -> RenderableType:
 
 
 def _of_surface(records: Sequence[Record]) -> Table:
-    table = Table(box=None, pad_edge=False, collapse_padding=True, header_style="bold")
-    table.add_column("algorithm", no_wrap=True, max_width=_ROOM)
-    for heading in ("E_C / A", "mean°", "isl.", "call", "wall", "start", "solve"):
-        table.add_column(heading, justify="right", no_wrap=True, min_width=len(heading))
-    table.add_column("", no_wrap=True)
+    headings = ("E_C / A", "mean°", "isl.", "call", "wall", "start", "solve")
+    rows: list[list[str | Text]] = []
     for target, group in groupby(records, key=lambda record: record.target):
-        table.add_row(Text(f"to {target}", style="dim"))
+        rows.append([Text(f"to {target}", style="dim"), *("" for _ in headings), ""])
         for record in group:
             outcome, program = record.outcome, record.is_program
             wall, metrics = outcome.median_seconds, outcome.metrics
             solve = outcome.solve_seconds if program else None
-            table.add_row(
-                f"{record.cell.algorithm} {mark_of(record)}".rstrip(),
-                _number(record.outcome.relative_energy, ".4f"),
-                _number(metrics.get("angle_error_mean_deg"), ".2f"),
-                _number(metrics.get("islands"), ".0f"),
-                _number(None if program else wall, ".3f"),
-                _number(wall if program else None, ".2f"),
-                _number(outcome.start_seconds, ".2f"),
-                _number(solve, ".3f"),
-                Text(_end(record), style=status_style(outcome.status)),
+            rows.append(
+                [
+                    f"{record.cell.algorithm} {mark_of(record)}".rstrip(),
+                    _number(record.outcome.relative_energy, ".4f"),
+                    _number(metrics.get("angle_error_mean_deg"), ".2f"),
+                    _number(metrics.get("islands"), ".0f"),
+                    _number(None if program else wall, ".3f"),
+                    _number(wall if program else None, ".2f"),
+                    _number(outcome.start_seconds, ".2f"),
+                    _number(solve, ".3f"),
+                    Text(_end(record), style=status_style(outcome.status)),
+                ]
             )
-    return table
+    columns = [GridColumn(heading, figures=True, width=len(heading)) for heading in headings]
+    return grid([names("algorithm", _ROOM), *columns, names("")], rows)
 
 
 def _end(record: Record) -> str:
