@@ -486,8 +486,12 @@ def _orientation(bad: Indices, F: Indices) -> Problem | None:
 def _vertices(F: Indices) -> Problem | None:
     import igl
 
-    manifold = igl.is_vertex_manifold(F)  # false also for numbers that no triangle has
-    bad = np.flatnonzero(~manifold & _used(F, len(manifold)))
+    # Triangles of one or two vertices are a defect of their own; libigl takes long over many.
+    proper = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
+    if not len(proper):
+        return None
+    manifold = igl.is_vertex_manifold(proper)  # false also for numbers that no triangle has
+    bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
     if not len(bad):
         return None
     return Problem(

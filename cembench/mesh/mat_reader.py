@@ -85,6 +85,8 @@ def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
         begin = at + 8
         if kind >> 16:  # so short that it is stored in its own head
             kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
+            if size > 4:
+                raise damaged(f"it cannot be read as MAT: a short element of {size} bytes")
         at = begin + size + (0 if kind == _COMPRESSED else -(begin + size) % 8)
         if begin + size > len(content):
             raise damaged(

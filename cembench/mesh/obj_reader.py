@@ -65,8 +65,9 @@ def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
     """
     words: list[str] = []
     while True:
-        words += words_of(line.removeprefix(BYTE_ORDER_MARK).split("#", 1)[0])
-        if not words or not words[-1].endswith("\\"):
+        text, comment, _ = line.removeprefix(BYTE_ORDER_MARK).partition("#")
+        words += words_of(text)
+        if comment or not words or not words[-1].endswith("\\"):
             return words or [""]
         words[-1:] = words[-1].removesuffix("\\").split()
         line = next(lines, (0, ""))[1]

@@ -27,12 +27,14 @@ _REQUIRED = {
 #: What each extra is for.
 _FOR = {
     Extra.FETCH: "fetches public surfaces",
+    Extra.FORMATS: "writes geometry images as EXR",
     Extra.PARDISO: "another back end",
     Extra.PARQUET: "exports runs as Parquet",
     Extra.REPORT: "writes reports",
     Extra.STANDINS: "makes stand-ins for the paper's models",
     Extra.TABLES: "gives a run's figures as pandas DataFrames",
     Extra.VIDEO: "writes films as MP4",
+    Extra.XATLAS: "unwraps surfaces into islands",
 }
 
 

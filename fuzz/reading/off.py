@@ -18,7 +18,7 @@ def read_off(data: bytes) -> Content:
     text = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
     lines = []
     for line in re.split(r"\r\n|\r|\n", text):
-        words = re.split(r"[ \t]+", line.partition("#")[0].strip(" \t"))
+        words = re.split(r"[ \t\v\f]+", line.partition("#")[0].strip(" \t\v\f"))
         if words != [""]:
             lines.append(words)
     keyword = ""

@@ -147,10 +147,9 @@ def _text(elements: list[_Element], body: bytes) -> dict[str, list[Row]]:
                 if not words:
                     raise Damaged("a line is too short")
                 word = words.pop()
-                if _SIZES[kind] not in "fd":
-                    return _within(kind, integer(word))
-                # As in binary files, what is no coordinate may be NaN or infinite.
-                return float(word) if _NOT_FINITE.fullmatch(word) else real(word)
+                if _NOT_FINITE.fullmatch(word):  # no fault where nobody reads it, as in binary
+                    return float(word)
+                return real(word) if _SIZES[kind] in "fd" else _within(kind, integer(word))
 
             def room(words: list[str] = words) -> int:
                 return len(words)

@@ -247,6 +247,7 @@ DAMAGED = {
     "merged-faces.obj": (OBJ + "f 1 2 3 f 1 3 4\n", r"line 5, .* 'f'"),
     "underscore.obj": (OBJ + "f 1 2 0_3\n", r"line 5, .* underscore"),
     "huge-index.obj": (OBJ + "f 1 2 99999999999999999999\n", r"line 5"),
+    "continued-comment.obj": (OBJ + "f 1 2 \\ # more\n3\n", r"line 5"),
     "fraction.obj": (OBJ + "f 1 2 3.5\n", r"line 5, .* '3\.5'"),
     "few-faces.off": ("OFF\n4 3 0\n" + OFF + TWO, "3 faces are declared, but 2 were found"),
     "cut-polygon.off": ("OFF\n4 2 0\n" + OFF + "4 0 1 2 3\n", "2 faces .* but 1 were found"),
