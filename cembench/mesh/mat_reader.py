@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,8 @@ def read_mat(path: Path) -> Soup:
             found[name] = _matrix(whole, order)
         elif begin is not element:
             _check_compressed(element, size + 8)
+        else:  # as there: damage in what is not wanted may not be the only one
+            deque(_elements(element, order), maxlen=0)
     missing = [name for name in ("v", "f") if name not in found]
     if missing:
         raise MeshError(
