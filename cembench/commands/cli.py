@@ -645,6 +645,8 @@ def _check_extras(
         raise ParameterError(
             "--geometry-image, --remesh and --html take one surface; map them one by one."
         )
+    if extra.page is not None:
+        require(Extra.REPORT, "map --html", "jinja2", "markupsafe")
     if extra.page is not None and extra.page.suffix.lower() not in (".html", ".htm"):
         raise ParameterError(f"{extra.page}: --html writes a page; name it with .html.")
     if extra.page is not None and not extra.page.parent.is_dir():

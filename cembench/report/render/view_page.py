@@ -6,11 +6,9 @@ import base64
 from collections.abc import Sequence
 from pathlib import Path
 
-from markupsafe import Markup
-
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import RenderError
-from cembench.report.render.html import environment, policy, template_text
+from cembench.core.extras import Extra, require
 
 
 def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[str, str]]) -> str:
@@ -27,7 +25,17 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
     facts : sequence of pairs of str
         What stands below: names and words.
 
+    Raises
+    ------
+    MissingExtra
+        What lays pages down is not installed.
+
     """
+    check_pages_can_be_made()
+    from markupsafe import Markup
+
+    from cembench.report.render.html import environment, policy, template_text
+
     script = template_text("view.js")
     page: str = (
         environment()
@@ -43,6 +51,11 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
         )
     )
     return page
+
+
+def check_pages_can_be_made() -> None:
+    """Raise :class:`MissingExtra` where the libraries of a page are not installed."""
+    require(Extra.REPORT, "a surface to turn in a page", "jinja2", "markupsafe")
 
 
 def write_view_page(path: Path, page: str) -> None:
