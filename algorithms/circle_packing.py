@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.conformal.discrete_metric import BlockPattern, angle_sums, angles, side_lengths
+from cembench.conformal.discrete_metric import BlockPattern, angle_sums, angles
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
@@ -17,6 +17,7 @@ from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 

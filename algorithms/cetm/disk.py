@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.conformal.discrete_metric import angle_sums, side_lengths
+from cembench.conformal.discrete_metric import angle_sums
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure, middle_triangle, moved_to_gauge
@@ -16,6 +16,7 @@ from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.topology import boundary_loops, undirected_edges
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.boundary_curve import closed_curve
-from cembench.conformal.discrete_metric import angle_sums, length_cross_ratios, side_lengths
+from cembench.conformal.discrete_metric import angle_sums, length_cross_ratios
 from cembench.conformal.free_boundary import with_area_pi
 from cembench.conformal.harmonic import edge_lengths
 from cembench.core.parameterization import Parameterization
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 

@@ -19,11 +19,6 @@ Indices = NDArray[np.int64]
 REGULAR = 0.5 / np.sqrt(3)
 
 
-def side_lengths(V: Real, F: Indices) -> Real:
-    """How long is the side opposite to each corner? Shape (m, 3)."""
-    return np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
-
-
 def scaled(lengths: Real, F: Indices, u: Real) -> Real:
     """Lengths (m, 3) with vertices scaled by u (n,): l exp((u_i + u_j) / 2)."""
     corners = u[F]

@@ -14,6 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.mesh.flips import Independence, area_of_sides, distance_across
+from cembench.mesh.gluing import twins_of_half_edges
+
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
@@ -66,10 +69,10 @@ class _Corners:
         self.vertex: Indices = F.flatten()
         self.length: Real = lengths.flatten()
         self.weight: Real = weights.flatten()
-        self.twin = _twins(F)
-        # Scratch, the same before and after each call.
-        self._moved_to = np.arange(F.size)
-        self._first = np.full(len(F), F.size)
+        opposite = np.roll(twins_of_half_edges(F).reshape(-1, 3), -1, axis=1).ravel()
+        self.twin = np.where(opposite < 0, -1, opposite - opposite % 3 + (opposite + 2) % 3)
+        self._apart = Independence(len(F))
+        self._moved_to = np.arange(F.size)  # the same before and after each flip
 
     def not_delaunay(self, corners: Indices) -> Indices:
         """Those of these corners whose edge is not Delaunay; the lower one of an edge's two."""
@@ -82,13 +85,7 @@ class _Corners:
 
     def sharing_no_triangle(self, corners: Indices) -> Indices:
         """Of these edges, one after another, those whose triangles no earlier one has."""
-        s, t = corners // 3, self.twin[corners] // 3
-        order = np.arange(len(corners))
-        for triangles in (s, t):
-            np.minimum.at(self._first, triangles, order)
-        free = (self._first[s] == order) & (self._first[t] == order)
-        self._first[s] = self._first[t] = len(self.vertex)
-        return corners[free]
+        return corners[self._apart(corners // 3, self.twin[corners] // 3)]
 
     def flip(self, corners: Indices) -> Indices:
         """Flip these edges, of triangles (k, i, j) and (h, j, i); all corners of those.
@@ -98,11 +95,7 @@ class _Corners:
         k, h = corners, self.twin[corners]
         (i, j), (j2, i2) = _following(k), _following(h)
         s, t = 3 * (k // 3), 3 * (h // 3)
-        # In the plane, with the edge ij on an axis.
-        base = self.length[k]
-        foot, height = _foot_and_height(base, self.length[j], self.length[i])
-        foot2, height2 = _foot_and_height(base, self.length[j2], self.length[i2])
-        diagonal = np.hypot(foot - foot2, height + height2)
+        diagonal = distance_across(*(self.length[x] for x in (k, j, i, j2, i2)))
         triangles = self.vertex[np.stack([[k, i, h], [h, j, k]])]
         # Outer edges ih, ki, jk and hj: where they are, and where they go.
         old, new = np.concatenate([j2, j, i, i2]), np.concatenate([s, s + 2, t, t + 2])
@@ -116,13 +109,13 @@ class _Corners:
         self.twin[s + 1], self.twin[t + 1] = t + 1, s + 1
         changed = np.concatenate([s, t])[:, None] + np.arange(3)
         self.vertex[changed] = np.concatenate(triangles, axis=1).T
-        self.weight[changed] = half_cotangents_of(self.length[changed])
+        self.weight[changed] = half_cotangents_of_sides(self.length[changed])
         return changed.ravel()
 
 
-def half_cotangents_of(lengths: Real) -> Real:
+def half_cotangents_of_sides(lengths: Real) -> Real:
     """Half the cotangent (m, 3) of the angle opposite to each edge, of edge lengths (m, 3)."""
-    area = _area(*lengths.T)
+    area = area_of_sides(*lengths.T)
     found = np.empty_like(lengths)
     for c in range(3):
         x, y, z = lengths[:, c], lengths[:, c - 2], lengths[:, c - 1]
@@ -135,28 +128,3 @@ def _following(corner: Indices) -> tuple[Indices, Indices]:
     """The next two corners of the same triangle."""
     first = corner - corner % 3
     return first + (corner + 1) % 3, first + (corner + 2) % 3
-
-
-def _foot_and_height(base: Real, left: Real, right: Real) -> tuple[Real, Real]:
-    """Where a triangle's tip lies over its base: from the base's left end, and above it."""
-    foot = (base * base + (left - right) * (left + right)) / (2 * base)
-    return foot, 2 * _area(base, left, right) / base
-
-
-def _area(a: Real, b: Real, c: Real) -> Real:
-    """Triangles' areas from their edge lengths; Kahan's order keeps the digits of thin ones."""
-    z, y, x = np.sort([a, b, c], axis=0)
-    product = (x + (y + z)) * (z - (x - y)) * (z + (x - y)) * (x + (y - z))
-    area: Real = 0.25 * np.sqrt(np.maximum(product, 0))
-    return area
-
-
-def _twins(F: Indices) -> Indices:
-    """The corner on the other side of each corner's edge; -1 on the boundary."""
-    ends = np.sort(np.stack([F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()]), axis=0)
-    keys = ends[0] * (int(F.max()) + 1) + ends[1]
-    order = np.argsort(keys, kind="stable")
-    same = np.flatnonzero(np.diff(keys[order]) == 0)
-    twins = np.full(F.size, -1)
-    twins[order[same]], twins[order[same + 1]] = order[same + 1], order[same]
-    return twins

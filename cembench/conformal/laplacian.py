@@ -12,6 +12,7 @@ from scipy import sparse
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
 from cembench.core.clock import phase
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
@@ -77,8 +78,7 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
     with phase("laplacian"):
         if not delaunay:
             return cotangent_laplacian(mesh.V, mesh.F)
-        corners = mesh.V[mesh.F]
-        lengths = np.linalg.norm(corners[:, [1, 2, 0]] - corners[:, [2, 0, 1]], axis=2)
+        lengths = side_lengths(mesh.V, mesh.F)
         F, _, weights = intrinsic_delaunay(mesh.F, lengths, half_cotangents(mesh.V, mesh.F))
         return laplacian_of_weights(F, weights, mesh.n)
 

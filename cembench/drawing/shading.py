@@ -21,6 +21,7 @@ from cembench.drawing import scene as look
 from cembench.drawing.camera import view_rotation
 from cembench.drawing.draw_numpy import LEGIBLE, SAMPLES, shrunk
 from cembench.drawing.rasterizer import Raster, rasterize
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -134,7 +135,7 @@ def edges(panel: RasterPanel) -> Real:
     """The colours of the mesh: dark edges; grey where triangles are too small to be told apart."""
     corners = _samples(panel)
     doubled = np.abs(look.doubled_areas(corners.reshape(-1, 2)))
-    opposite = np.linalg.norm(corners[:, [2, 0, 1]] - corners[:, [1, 2, 0]], axis=2)
+    opposite = side_lengths(corners.reshape(-1, 2), np.arange(3 * len(corners)).reshape(-1, 3))
     heights = doubled[:, None] / np.maximum(opposite, look.TINY)
     distance = (panel.raster.weights * heights[panel.raster.face]).min(axis=1)
     return _between(BETWEEN, EDGE_COLOUR, np.clip(EDGE + 0.5 - distance, 0, 1) * 0.85)

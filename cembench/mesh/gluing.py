@@ -36,6 +36,17 @@ def paired_half_edges(edge: Indices, faces: Indices) -> Indices:
     return order[faces[edge[order]] == 2].reshape(-1, 2)
 
 
+def twins_of_half_edges(F: Indices) -> Indices:
+    """Return the half-edge on the other side of each one of an oriented manifold; -1: boundary."""
+    ends = np.sort(half_edges(F), axis=1)
+    keys = ends[:, 0] * (int(F.max(initial=0)) + 1) + ends[:, 1]
+    order = np.argsort(keys, kind="stable")
+    same = np.flatnonzero(np.diff(keys[order]) == 0)
+    twins = np.full(F.size, -1)
+    twins[order[same]], twins[order[same + 1]] = order[same + 1], order[same]
+    return twins
+
+
 def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
     """Glue triangles along these pairs of half-edges (k, 2), and nowhere else.
 

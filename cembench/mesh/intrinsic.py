@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import AlgorithmFailed
-from cembench.mesh.gluing import edges_of_half_edges, paired_half_edges
+from cembench.mesh.flips import Independence, distance_across
+from cembench.mesh.gluing import twins_of_half_edges
+from cembench.mesh.side_lengths import side_lengths
 
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -52,10 +54,7 @@ class Triangulation:
         `mirror` (n,) gives each vertex's copy, a boundary vertex being its own.
         """
         m = len(F)
-        _, edge, faces = edges_of_half_edges(F)
-        twin = np.full(3 * m, -1)
-        left, right = paired_half_edges(edge, faces).T
-        twin[left], twin[right] = right, left
+        twin = twins_of_half_edges(F)
         h = np.arange(3 * m)
         t, c = h // 3, h % 3
         copy = 3 * (m + t) + 2 - (c + 1) % 3
@@ -63,7 +62,7 @@ class Triangulation:
         inside = twin >= 0
         both[h] = np.where(inside, twin, copy)
         both[copy] = np.where(inside, copy[twin], h)
-        length = np.linalg.norm(V[np.roll(F, -1, axis=1)] - V[F], axis=2).ravel()
+        length = np.roll(side_lengths(V, F), 1, axis=1).ravel()  # side c + 2 starts at corner c
         log_length = np.empty(6 * m)
         log_length[h] = log_length[copy] = np.log(length)
         return cls(np.concatenate([F, mirror[F][:, ::-1]]), both, log_length)
@@ -86,6 +85,7 @@ class Triangulation:
             Flips do not come to an end.
 
         """
+        apart = Independence(len(self.F))
         candidates = np.flatnonzero(np.arange(len(self.twin)) < self.twin)
         for _ in range(MOST_ROUNDS):
             h = candidates
@@ -95,7 +95,7 @@ class Triangulation:
             if not len(bad):
                 return
             bad = bad[np.argsort(cosines[cosines < SURELY], kind="stable")]
-            chosen = self._apart(bad)
+            chosen = bad[apart(bad // 3, self.twin[bad] // 3)]
             touched = self._flip(chosen, flat=flat)
             rest = np.setdiff1d(bad, chosen, assume_unique=True)
             around = (3 * touched[:, None] + np.arange(3)).ravel()
@@ -113,15 +113,6 @@ class Triangulation:
         with np.errstate(over="ignore"):
             return np.asarray((np.exp(a - b) + np.exp(b - a) - np.exp(2 * e - a - b)) / 2)
 
-    def _apart(self, edges: Indices) -> Indices:
-        """Edges no two of which share a triangle, the first of them first."""
-        rank = np.arange(len(edges))
-        first = np.full(len(self.F), len(edges))
-        sides = edges // 3, self.twin[edges] // 3
-        for side in sides:
-            np.minimum.at(first, side, rank)
-        return edges[(first[sides[0]] == rank) & (first[sides[1]] == rank)]
-
     def _flip(self, h: Indices, *, flat: bool) -> Indices:
         """Flip edges that share no triangle; the triangles that changed."""
         g = self.twin[h]
@@ -133,7 +124,8 @@ class Triangulation:
         lam = self.log_length
         e = lam[h]
         if flat:
-            new = _across(*(np.exp(lam[x] - e) for x in (n2, n1, m1, m2))) + e
+            sides = (np.exp(lam[x] - e) for x in (n2, n1, m1, m2))
+            new = np.log(distance_across(np.ones(len(h)), *sides)) + e
         else:
             new = np.logaddexp(lam[n2] + lam[m2], lam[n1] + lam[m1]) - e
         moved = np.arange(len(self.twin))
@@ -149,10 +141,3 @@ class Triangulation:
         self.twin, self.log_length, self._moved = twin, lengths, moved
         self.flips += len(h)
         return np.concatenate([t, s])
-
-
-def _across(ki: Real, jk: Real, il: Real, lj: Real) -> Real:
-    """The logarithm of the distance from k to l across the edge ij of length 1, k on its left."""
-    x, z = (1 + ki**2 - jk**2) / 2, (1 + il**2 - lj**2) / 2
-    y, w = np.sqrt(np.maximum(ki**2 - x**2, 0)), np.sqrt(np.maximum(il**2 - z**2, 0))
-    return np.asarray(np.log(np.hypot(x - z, y + w)))

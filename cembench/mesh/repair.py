@@ -47,6 +47,7 @@ from cembench.mesh.defects import (
 )
 from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
 from cembench.mesh.polygons import triangulate
+from cembench.mesh.side_lengths import side_lengths
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -260,15 +261,14 @@ def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
     return twice
 
 
-def _lengths(V: Points, F: Indices) -> Points:
+def _half_edge_lengths(V: Points, F: Indices) -> Points:
     """Return the length of each side of each triangle, (m, 3); side c starts at corner c."""
-    found: Points = np.linalg.norm(V[np.roll(F, -1, axis=1)] - V[F], axis=2)
-    return found
+    return np.roll(side_lengths(V, F), 1, axis=1)
 
 
 def _collapse_needles(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
     """Merge the ends of the shortest side of degenerate triangles where it is next to nothing."""
-    lengths = _lengths(V, F[bad])
+    lengths = _half_edge_lengths(V, F[bad])
     needles = lengths.min(axis=1) <= _NEEDLE * lengths.max(axis=1)
     if not needles.any():
         return F, 0
@@ -297,7 +297,7 @@ def _flip(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
     partner[pairs[:, 0]], partner[pairs[:, 1]] = pairs[:, 1], pairs[:, 0]
     touched: set[int] = set()
     flips = 0
-    side = _lengths(V, F[bad]).argmax(axis=1)
+    side = _half_edge_lengths(V, F[bad]).argmax(axis=1)
     for t, c in zip(bad.tolist(), side.tolist(), strict=True):
         other = int(partner[3 * t + c])
         s, d = divmod(other, 3)

@@ -7,11 +7,12 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.conformal.discrete_metric import BlockPattern, angles, scaled, side_lengths
+from cembench.conformal.discrete_metric import BlockPattern, angles, scaled
 from cembench.conformal.laplacian import laplacian_of_weights
 from cembench.conformal.metrics import all_metrics, corner_angles
 from cembench.linear_algebra import cholesky
 from cembench.mesh.files import read_mesh
+from cembench.mesh.side_lengths import side_lengths
 from tests import gallery
 from tests.hard_surfaces import hard_surface
 from tests.real_meshes import real_mesh

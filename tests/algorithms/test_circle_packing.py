@@ -5,7 +5,7 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import AlgorithmFailed, DiskMesh
-from cembench.conformal.discrete_metric import side_lengths
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.topology import undirected_edges
 from tests import gallery
 
