@@ -51,13 +51,23 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
         z[b] = arc_length_circle(mesh)
         right = rows[:, b] @ z[b]
     with phase("factorisation"):
-        factor = linalg.splu(
-            A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        factor = _factored(A)
     with phase("solves"):
         z[i] = factor.solve(right.real) + 1j * factor.solve(right.imag)
     z, repair = accepted_repair(mesh, z, interior_without_folds(mesh, z))
     return Parameterization(z, extras=repair)
+
+
+def _factored(A: sparse.csc_array) -> linalg.SuperLU:
+    try:
+        return linalg.splu(
+            A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
+    except RuntimeError as error:  # all that SuperLU raises
+        raise AlgorithmFailed(
+            "the mean value weights make a matrix that cannot be factored; the mesh has triangles "
+            "too thin for them"
+        ) from error
 
 
 def _weights(mesh: DiskMesh) -> sparse.csr_array:
@@ -67,8 +77,10 @@ def _weights(mesh: DiskMesh) -> sparse.csr_array:
     after, before = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
     to_after = np.linalg.norm(mesh.V[after] - mesh.V[F], axis=2)
     to_before = np.linalg.norm(mesh.V[before] - mesh.V[F], axis=2)
-    # tan(a / 2) = sin a / (1 + cos a), both multiplied by the lengths of the sides.
-    tangent = double_area[:, None] / (to_after * to_before + dots)
+    # tan(a / 2) = sin a / (1 + cos a) = (1 - cos a) / sin a, multiplied by the sides' lengths; the
+    # second where the angle is above 90 degrees, so that nothing cancels.
+    sides, sine = to_after * to_before, double_area[:, None]
+    tangent = np.where(dots > 0, sine, sides - dots) / np.where(dots > 0, sides + dots, sine)
     i = np.concatenate([F.ravel(), F.ravel()])
     j = np.concatenate([after.ravel(), before.ravel()])
     w = np.concatenate([(tangent / to_after).ravel(), (tangent / to_before).ravel()])

@@ -1,9 +1,11 @@
 import numpy as np
 import pytest
+from cembench.algorithms import mean_value as mean_value_module
 from cembench.algorithms.harmonic_tutte import harmonic_tutte
 from cembench.algorithms.mean_value import mean_value
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from scipy import sparse
 
 from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.harmonic import arc_length_circle
@@ -44,3 +46,27 @@ def test_positive_weights_do_not_fold(f, seed):
 def test_mean_values_need_an_interior():
     with pytest.raises(AlgorithmFailed, match="no interior vertex"):
         mean_value(DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6)))
+
+
+@pytest.mark.parametrize("height", [1e-1, 1e-8, 1e-12])
+def test_mean_values_take_angles_near_180_degrees(height):
+    """1 + cos a is lost to rounding there: the weights were infinite."""
+    V, F = gallery.flat_rectangle(4, 4)
+    V = np.array(V, dtype=float)
+    face = F[12]
+    V[face[2]] = (V[face[0]] + V[face[1]]) / 2
+    V[face[2], 2] += height
+    mesh = DiskMesh.from_arrays(V, F)
+    half = np.arctan(1 / (2 * height))  # of the angle at the corner that is nearly flat
+    weights = mean_value_module._weights(mesh)[face[2]].data
+    assert np.isfinite(weights).all()
+    assert weights.max() > np.tan(half)
+    assert np.isfinite(mean_value(mesh).uv).all()
+
+
+def test_a_matrix_that_cannot_be_factored_is_told(monkeypatch):
+    mesh = flat_disk(100)
+    none = sparse.csr_array((mesh.n, mesh.n))
+    monkeypatch.setattr(mean_value_module, "_weights", lambda _: none)
+    with pytest.raises(AlgorithmFailed, match="too thin"):
+        mean_value(mesh)
