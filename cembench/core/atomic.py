@@ -219,6 +219,8 @@ def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
             raise OSError(errno.EIO, f"{arrived} of {file.end} bytes arrived")
     finally:
         with suppress(OSError):  # what was said before counts
+            file.close()  # or it would be closed when it is deleted, and find `opened` closed
+        with suppress(OSError):
             opened.close()
 
 
