@@ -23,8 +23,9 @@ def soup_of_arrays(
 ) -> Soup:
     """Return the surface in arrays: of the names asked for, the usual ones, or the two that fit.
 
-    Two arrays fit where one is (n, 3) or (n, 2) and the other one (m, 3) with every whole number
-    from the first vertex to the last among its corners. A flat surface gets z = 0.
+    Two arrays fit where one is (n, 3) or (n, 2) and the other one (m, 3) with whole numbers, the
+    first vertex and the last among them. Flat vertices are taken where no others
+    fit, and get z = 0.
 
     Parameters
     ----------
@@ -45,6 +46,7 @@ def soup_of_arrays(
     notices: tuple[Notice, ...] = ()
     if pair is None:
         pairs = [(v, f) for v in found for f in found if v != f and _fits(found[v], found[f])]
+        pairs = [pair for pair in pairs if found[pair[0]].shape[1] == 3] or pairs
         if len(pairs) != 1:
             fitting = "; ".join(f"{v} and {f}" for v, f in pairs)
             why = f"several pairs fit: {fitting}" if pairs else "no two of them fit"
