@@ -17,7 +17,7 @@ def read_gii(path: Path) -> Soup:
     import nibabel
 
     try:
-        image = nibabel.load(path)
+        image = nibabel.gifti.GiftiImage.from_filename(path)
         points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
         triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
         V, F = ([np.asarray(one.data) for one in found] for found in (points, triangles))

@@ -25,7 +25,7 @@ def read_gltf(path: Path) -> Soup:
     except Exception as error:  # whatever a library raises on damaged bytes
         raise damaged(f"it cannot be read as glTF: {type(error).__name__}: {error}") from None
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
-    notices = ()
+    notices: tuple[Notice, ...] = ()
     if len(meshes) < len(pieces):
         told = f"{len(pieces) - len(meshes)} pieces that are points or lines were left"
         notices = (Notice(NoticeKind.LINES_IGNORED, told),)

@@ -34,7 +34,7 @@ def read_vtk(path: Path) -> Soup:
             "triangles."
         )
     others = {b.type: len(b.data) for b in mesh.cells if b not in blocks and len(b.data)}
-    notices = ()
+    notices: tuple[Notice, ...] = ()
     if others:
         told = ", ".join(f"{count} of type {kind}" for kind, count in others.items())
         notices = (Notice(NoticeKind.LINES_IGNORED, f"cells that are no faces were left: {told}"),)
