@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import importlib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +16,7 @@ from cembench.mesh.soup import Soup, damaged
 def read_gii(path: Path) -> Soup:
     """Read the points and the triangles of a GIFTI file."""
     require(Extra.FORMATS, "reading .gii files", "nibabel")
-    import nibabel
+    nibabel: Any = importlib.import_module("nibabel")
 
     try:
         image = nibabel.gifti.GiftiImage.from_filename(path)

@@ -12,9 +12,10 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO, cast
 
@@ -88,7 +89,7 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
     for path in _first(found, limit):
         inside = path.relative_to(folder)
         name = names.of(inside.with_suffix("").as_posix().replace("/", "-"))
-        yield _provided(name, str(path), lambda path=path: read_mesh(path, TriangleMesh))
+        yield _provided(name, str(path), partial(read_mesh, path, TriangleMesh))
 
 
 def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Provided]:
@@ -199,7 +200,7 @@ def _provided(
 
 
 def _as(kind: type[TriangleMesh], mesh: TriangleMesh, name: str) -> TriangleMesh:
-    return kind.from_arrays(mesh.V, mesh.F, name=name, notices=mesh.notices)
+    return kind.from_arrays(mesh.V, mesh.F, name=name)
 
 
 class _Names:
@@ -234,7 +235,7 @@ class _Member:
     open: Callable[[], BinaryIO]
 
 
-def _members(path: Path) -> Iterator[_Member]:
+def _members(path: Path) -> Generator[_Member, None, None]:
     """Give the regular files of an archive that are named like meshes."""
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
