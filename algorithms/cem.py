@@ -47,6 +47,28 @@ def cem(
     Cholesky factor serves the start, and its leading block all Dirichlet solves. `delaunay` takes
     the weights of the intrinsic Delaunay triangulation.
     """
+    return map_from_triangle(
+        mesh,
+        None,
+        tolerance=tolerance,
+        max_iterations=max_iterations,
+        inversion=inversion,
+        best=best,
+        delaunay=delaunay,
+    )
+
+
+def map_from_triangle(
+    mesh: DiskMesh,
+    triangle: int | None,
+    *,
+    tolerance: float = 1e-5,
+    max_iterations: int = 20,
+    inversion: bool = True,
+    best: bool = False,
+    delaunay: bool = False,
+) -> Parameterization:
+    """Map by CEM with the start's triangle given by hand; None for the usual one."""
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
     ring = Cholesky(bordered.L_bb)
@@ -55,7 +77,7 @@ def cem(
         return ring.solve(-(bordered.L_bi @ f_i))  # Eq. 23
 
     f_b, f_i, history, order_kept = iterate_boundary(
-        on_circle(pole_start(mesh.V, mesh.F, bordered.solved_boundary)),
+        on_circle(pole_start(mesh.V, mesh.F, bordered.solved_boundary, triangle)),
         bordered.dirichlet,
         ring_solution,
         bordered.conformal_energy,

@@ -49,6 +49,7 @@ def fdm(
     tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-5,
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 5,
     delaunay: bool = False,
+    public_program: bool = False,
 ) -> Parameterization:
     """Which disk map comes from correcting a harmonic one, in the half plane and by reflection?
 
@@ -83,7 +84,7 @@ def fdm(
     def energy(z: Complex) -> float:
         return 0.5 * float(np.vdot(z, L @ z).real) - polygon_area(z[mesh.boundary])
 
-    z = _corrected_in_half_plane(mesh, _start(mesh, L), own)
+    z = _corrected_in_half_plane(mesh, _start(mesh, L), own, public_program)
     mu = _coefficients(mesh, z)
     distortion, history = _mean_modulus(mu), [energy(z)]
     best, least, dropped = z, distortion, 0
@@ -93,7 +94,7 @@ def fdm(
         before, distortion = distortion, _mean_modulus(mu)
         history.append(energy(z))
         dropped += 1
-        if distortion < least + tolerance:
+        if public_program or distortion < least + tolerance:
             best, least, dropped = z, min(distortion, least), 0
         if abs(before - distortion) < tolerance:
             break
@@ -125,13 +126,16 @@ def _start(mesh: DiskMesh, L: sparse.csc_array) -> Complex:
     return harmonic_extension(uniform, mesh.boundary, circle)
 
 
-def _corrected_in_half_plane(mesh: DiskMesh, z: Complex, L: sparse.csc_array | None) -> Complex:
+def _corrected_in_half_plane(
+    mesh: DiskMesh, z: Complex, L: sparse.csc_array | None, public_program: bool
+) -> Complex:
     """Make the map conformal but for what lies near z = 1, where it is kept ("north pole").
 
     L is the surface's Laplacian where that is to be solved with.
     """
     b = mesh.boundary
-    z = z / _middle_of_best_edge(mesh, z)
+    p, q = _ends_of_best_edge(mesh, z)
+    z = z / (_public_turn(p, q) if public_program else _middle(p, q))
     w = 1j * (1 + z) / (1 - z)
     w[b] = w[b].real
     if L is None:
@@ -149,15 +153,24 @@ def _corrected_in_half_plane(mesh: DiskMesh, z: Complex, L: sparse.csc_array | N
     return (w - 1j) / (w + 1j)
 
 
-def _middle_of_best_edge(mesh: DiskMesh, z: Complex) -> complex:
-    """Where on the circle is the middle of the boundary edge with the least |mu| at its ends?"""
+def _ends_of_best_edge(mesh: DiskMesh, z: Complex) -> tuple[complex, complex]:
+    """Where on the circle are the ends of the boundary edge with the least |mu| at them?"""
     corners, b = mesh.F.ravel(), mesh.boundary
     mu = np.repeat(_coefficients(mesh, z), 3)
     total = np.bincount(corners, mu.real) + 1j * np.bincount(corners, mu.imag)
     at = np.abs(total / np.bincount(corners))[b]
     k = int(np.argmin(at + np.roll(at, -1)))
-    p, q = z[b[k]], z[np.roll(b, -1)[k]]
+    return complex(z[b[k]]), complex(z[np.roll(b, -1)[k]])
+
+
+def _middle(p: complex, q: complex) -> complex:
+    """Return the middle of the shorter arc between two points of the unit circle."""
     return complex(p / abs(p) * np.exp(0.5j * np.angle(q / p)))
+
+
+def _public_turn(p: complex, q: complex) -> complex:
+    """Return what the public program divides by: the angles are a and b, and it takes a + b/2."""
+    return complex(np.exp(1j * (np.angle(p) + np.angle(q) / 2)))
 
 
 def _corrected_by_reflection(

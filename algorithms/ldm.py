@@ -60,6 +60,26 @@ def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     `delaunay` takes the weights of the intrinsic Delaunay triangulation in every solve: both linear
     Beltrami solvers have the surface's own Laplacian as their matrix.
     """
+    return map_numbered(mesh, farthest_from_mean(mesh), delaunay=delaunay)
+
+
+def map_numbered(
+    mesh: DiskMesh, first: int, *, mirrored: bool = False, delaunay: bool = False
+) -> Parameterization:
+    """Map by LDM with what the numbering of a mesh decides given by hand.
+
+    Parameters
+    ----------
+    mesh : DiskMesh
+        The surface.
+    first : int
+        Which vertex of the boundary loop is the first of the three, counted from 0.
+    mirrored : bool
+        Whether the most regular triangle is taken from the mirror copy, where it is as regular.
+    delaunay : bool
+        As for `ldm`.
+
+    """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
     L = laplacian(mesh, delaunay=delaunay)
@@ -67,9 +87,9 @@ def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     with phase("assembly"):
         L_double = doubled_laplacian(L, double)
         V = double.on_both(mesh.V)
-    z = balanced_planar_map(L_double, V, double.F)
+    z = balanced_planar_map(L_double, V, np.roll(double.F, mesh.m if mirrored else 0, axis=0))
     w = _corrected_at_north(double, V, z, L_double if delaunay else None)
-    z = _laid_on_disk(mesh, w[: mesh.n])
+    z = _laid_on_disk(mesh, w[: mesh.n], first)
     b = mesh.boundary
     if delaunay:
         z = harmonic_extension(L, b, z[b])
@@ -102,11 +122,15 @@ def _corrected_at_north(
     return linear_beltrami_solver(double.F, _weights(w, double.F, V), held, w[held])
 
 
-def _laid_on_disk(mesh: DiskMesh, w: Complex) -> Complex:
+def farthest_from_mean(mesh: DiskMesh) -> int:
+    """Which vertex of the boundary loop lies farthest from the mean vertex?"""
+    apart = np.linalg.norm(mesh.V[mesh.boundary] - mesh.V.mean(axis=0), axis=1)
+    return int(np.argmax(apart))
+
+
+def _laid_on_disk(mesh: DiskMesh, w: Complex, first: int) -> Complex:
     """Carry the half of the sphere that w shows to the disk, its boundary to the circle."""
-    b = mesh.boundary
-    first = int(np.argmax(np.linalg.norm(mesh.V[b] - mesh.V.mean(axis=0), axis=1)))
-    b = np.roll(b, -first)
+    b = np.roll(mesh.boundary, -first)
     loop = to_sphere(w[b], "south")
     far = int(np.argmax(np.linalg.norm(loop - loop[0], axis=1)))
     between = (far + 1) // 2 if far > 1 else (far + len(b)) // 2

@@ -4,7 +4,7 @@ A decorator only marks a function with its :class:`Algorithm` or :class:`Surface
 at import. A :class:`Registry` is then collected from entry points (``cembench.algorithms``,
 ``cembench.surfaces``, ``cembench.datasets``: the built-in ones are found no differently from
 anybody's) and from plug-ins named by the user, a file or ``module:name``. A dataset needs no mark:
-it is a :class:`cembench.mesh.datasets.Dataset`, an object at module level.
+it is a :class:`cembench.mesh.datasets.Dataset`, an object at module level, or a tuple of them.
 """
 
 from __future__ import annotations
@@ -489,6 +489,8 @@ class Registry:
     #: Algorithms of others, libraries and programs, that need not be on this machine: they are run
     #: only where they are named.
     peers: Mapping[str, Algorithm] = field(default_factory=dict)
+    #: Files of models that can be fetched but are no surfaces.
+    parts: Mapping[str, Dataset] = field(default_factory=dict)
 
     @property
     def usual_algorithms(self) -> list[str]:
@@ -506,6 +508,22 @@ class Registry:
     def dataset(self, name: str) -> Dataset:
         """The dataset of this name; :class:`RegistryError` lists the known ones."""
         return _look_up("dataset", self.datasets, name)
+
+    @property
+    def groups(self) -> dict[str, list[Dataset]]:
+        """The datasets and the parts of models by group, in the order in which they are listed."""
+        found: dict[str, list[Dataset]] = {}
+        for dataset in (*self.datasets.values(), *self.parts.values()):
+            if dataset.group:
+                found.setdefault(dataset.group, []).append(dataset)
+        return found
+
+    def group(self, name: str) -> list[Dataset]:
+        """The datasets of this group; :class:`RegistryError` lists the known ones."""
+        if name not in self.groups:
+            known = ", ".join(self.groups) or "none"
+            raise RegistryError(f"unknown group of datasets {name!r}; known: {known}.")
+        return self.groups[name]
 
 
 R = TypeVar("R", Algorithm, Surface, Dataset)
@@ -551,13 +569,27 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
         for spec in declared_by(plugin):
             _add(algorithms if isinstance(spec, Algorithm) else surfaces, spec)
     peers = {name: peer for name, peer in installed.peers.items() if name not in algorithms}
-    return Registry(algorithms, surfaces, installed.datasets, peers)
+    return Registry(algorithms, surfaces, installed.datasets, peers, installed.parts)
 
 
 @functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
-    kinds = _all_declared(Algorithm), _all_declared(Surface), _all_declared(Dataset)
-    return Registry(*kinds, _all_declared(Algorithm, PEERS))
+    found = _all_datasets()
+    surfaces = {name: dataset for name, dataset in found.items() if dataset.part is None}
+    parts = {name: dataset for name, dataset in found.items() if dataset.part is not None}
+    kinds = _all_declared(Algorithm), _all_declared(Surface), surfaces
+    return Registry(*kinds, _all_declared(Algorithm, PEERS), parts)
+
+
+def _all_datasets() -> dict[str, Dataset]:
+    """The datasets of all entry points: each is one, or a tuple of them under a name of its own."""
+    known: dict[str, Dataset] = {}
+    for entry in sorted(entry_points(group=_GROUPS[Dataset]), key=lambda entry: entry.name):
+        loaded = _load_entry(entry)
+        several = isinstance(loaded, tuple) and all(isinstance(one, Dataset) for one in loaded)
+        for dataset in loaded if several else (_declared_at(entry, Dataset),):
+            _add(known, dataset)
+    return known
 
 
 def _all_declared(kind: type[R], group: str = "") -> dict[str, R]:

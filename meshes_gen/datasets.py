@@ -1,44 +1,65 @@
-"""Real meshes that can be fetched: four public ones, three of them models of the paper."""
+"""Real meshes that can be fetched: what `real_meshes.tsv` lists, and the ICT face model's files."""
 
 from __future__ import annotations
 
-from cembench.mesh.datasets import Dataset
+import csv
+import itertools
+from collections.abc import Mapping
+from functools import partial
+from importlib.resources import files
+from pathlib import Path
+from urllib.parse import quote
 
-_DISK_MAPS = (
-    "https://raw.githubusercontent.com/garyptchoi/disk-conformal-map/"
-    "9961ed1f7ebc75e481b9b32f77a0af662ca81fe7"
-)
+from cembench.mesh.datasets import Dataset, Part
 
-chinese_lion = Dataset(
-    "chinese-lion",
-    "Chinese Lion",
-    f"{_DISK_MAPS}/chinese_lion.mat",
-    sha256="1a54710cfdfecca95546ca61cd4035e5e02e8b142e81b968c838b5c62957840e",
-    licence="Apache-2.0",
-    size=500_213,
-    paper_row="Chinese Lion",
-    mesh_hash="285d3e3ec360fb238b8fe73f6429f1c008c4c78b1608d5fc89489002e1e8c1f5",
-)
-human_brain = Dataset(
-    "human-brain",
-    "Human Brain",
-    f"{_DISK_MAPS}/human_brain.mat",
-    sha256="e6f8c9cd972a465b6affff3233795b208a2a224679c2a9d9c65b2a32b50d43cc",
-    licence="Apache-2.0",
-    paper_row="Human Brain",
-)
-left_hand = Dataset(
-    "left-hand",
-    "Left Hand",
-    f"{_DISK_MAPS}/hand.mat",
-    sha256="a88112a32b7f9d351c5ecfbd17042253ca79b50ab1a2e86b424e317487935386",
-    licence="Apache-2.0",
-    paper_row="Left Hand",
-)
-human_face = Dataset(
-    "human-face",
-    "Human Face",
-    f"{_DISK_MAPS}/human_face.mat",
-    sha256="705421e733d7368ec2aa80daa1ca8751bc0afd0d71fa21157049bbc160a64571",
-    licence="Apache-2.0",
-)
+from .ict_model import EXPRESSIONS, IDENTITIES, NEUTRAL, model_folder, read_small, small_arrays
+
+_RAW = "https://raw.githubusercontent.com"
+_ICT = f"{_RAW}/ICT-VGL/ICT-FaceKit/da5f95a607f5e6b37755b38d3385d7f2853732e5/FaceXModel"
+#: Bytes of one of the model's files, about: they are text of the same numbers of lines.
+_ICT_SIZE = 2_558_000
+
+
+def dataset_of(row: Mapping[str, str]) -> Dataset:
+    """Return the dataset of a row of `real_meshes.tsv`; empty cells are not known."""
+    first, _, last = row["polygons"].partition("-")
+    vertices, _, triangles = row["arrays"].partition(",")
+    return Dataset(
+        row["name"],
+        row["title"],
+        f"{_RAW}/{row['repository']}/{row['commit']}/{quote(row['path'])}",
+        sha256=row["sha256"],
+        licence=row["licence"],
+        size=int(row["bytes"]) if row["bytes"] else None,
+        paper_row=row["paper_row"],
+        mesh_hash=row["mesh_hash"],
+        group=row["group"],
+        faces=int(row["faces"]),
+        arrays=(vertices, triangles) if triangles else None,
+        polygons=(int(first), int(last)) if last else None,
+        note="; ".join(filter(None, (f"terms: {row['terms']}", row["note"]))),
+    )
+
+
+def _real_meshes() -> tuple[Dataset, ...]:
+    text = (files(__package__) / "real_meshes.tsv").read_text(encoding="utf-8")
+    return tuple(map(dataset_of, csv.DictReader(text.splitlines(), delimiter="\t")))
+
+
+def _ict_file(name: str) -> Dataset:
+    """Return a file of the ICT face model, which is kept as small arrays.
+
+    Most of their checksums are not known here; a file must have the model's polygons.
+    """
+    kept = partial(_ict_place, name)
+    part = Part(kept, small_arrays, lambda path: read_small(path) is not None)
+    url, group = f"{_ICT}/{name}.obj", "ict-face"
+    return Dataset(f"ict-{name}", name, url, "", "MIT", size=_ICT_SIZE, group=group, part=part)
+
+
+def _ict_place(name: str) -> Path:
+    return model_folder() / f"{name}.npz"
+
+
+REAL_MESHES = _real_meshes()
+ICT_FACE = tuple(map(_ict_file, itertools.chain((NEUTRAL,), IDENTITIES, EXPRESSIONS)))

@@ -462,7 +462,7 @@ def run(
     docs/measuring.md tells what is timed, and what an interval means.
     """
     from cembench.results import run_folder
-    from cembench.results.paper.profiles import algorithms_of, surfaces_of
+    from cembench.results.paper.profiles import algorithms_of, paper_parameters, surfaces_of
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
@@ -488,9 +488,11 @@ def run(
     with err.status("reading surfaces", spinner="line"):
         found, standing = gather_surfaces(registry, chosen, files, generated, faces, mend=mend)
     tasks = []
+    reproduced = any(role.paper_row for role in standing.values())
+    given = (paper_parameters(wanted) if reproduced else {}) | assignments(parameter)
     for policy in policies:
         how = MeasurementSettings(policy, _installed(backend), threads, repeats)
-        tasks += plan_cells(chosen, found, assignments(parameter), how, plugin, standing)
+        tasks += plan_cells(chosen, found, given, how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
         return
@@ -517,7 +519,7 @@ def reproduce(
     from cembench.core import folders
     from cembench.registry import load_registry
     from cembench.results import run_folder
-    from cembench.results.paper.profiles import surfaces_of
+    from cembench.results.paper.profiles import paper_parameters, surfaces_of
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.local import Options
@@ -535,7 +537,8 @@ def reproduce(
             surfaces.append(generate_surface(registry, name))
     chosen = [registry.algorithm(name) for name in registry.usual_algorithms]
     standing = paper_roles(registry, names)
-    tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), standing=standing)
+    given = paper_parameters(registry.usual_algorithms)
+    tasks = plan_cells(chosen, surfaces, given, MeasurementSettings(repeats=1), standing=standing)
     records = _measure(tasks, Store(output), options)
     command = f"cembench reproduce -o {output}"
     report, folder = report_verbs.make_report(output, None, command)

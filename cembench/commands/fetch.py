@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,6 +25,15 @@ def fetch(
         list[str] | None, typer.Argument(metavar="NAME", help="Which; none: list them all.")
     ] = None,
     *,
+    group: Annotated[
+        list[str],
+        typer.Option("--group", help="All of a group: paper, disks, holes, closed, stress."),
+    ] = [],  # noqa: B006
+    have: Annotated[
+        list[Path],
+        typer.Option("--have", help="A folder whose files are taken where they are the same."),
+    ] = [],  # noqa: B006
+    jobs: Annotated[int, typer.Option(min=1, max=16, help="Files fetched at once.")] = 4,
     timeout: Annotated[
         float,
         typer.Option(min=0.1, max=LONGEST, callback=finite, help="Seconds a server may be silent."),
@@ -35,42 +44,78 @@ def fetch(
 
     Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its
     SHA-256 must be the known one. $CEMBENCH_DATA_URL points to a mirror.
-    `map NAME` and `run --dataset NAME` fetch by themselves.
+    A file that fails stops none of the others; the same command again goes
+    on where this one ended. `--group ict-face` fetches the files of the face
+    model. `map NAME` and `run --dataset NAME` fetch by themselves.
     """
-    from cembench.core.errors import DatasetError
     from cembench.registry import load_registry
     from cembench.report.render.terminal import datasets_table
 
     registry = load_registry()
-    if not names:
+    if not names and not group:
         known = list(registry.datasets.values())
         if as_json:
             print_json([_about(dataset) for dataset in known])
             return
         out.print(datasets_table([(d, _about(d)["fetched"]) for d in known]))
-        for dataset in known:
-            out.print(f"{dataset.name}: {dataset.url}", style="dim", markup=False, soft_wrap=True)
+        models = {p.group: len(registry.group(p.group)) for p in registry.parts.values()}
+        for name, count in models.items():
+            out.print(f"{name}: {count} files of a model, fetched with --group {name}")
         return
-    wanted = [registry.dataset(name) for name in dict.fromkeys(names)]
-    found: list[dict[str, Any]] = []
-    for dataset in wanted:
-        try:
-            path = fetched(dataset, timeout=timeout)
-        except DatasetError as error:
-            found.append(_about(dataset) | {"error": str(error)})
-            complain(str(error))
-            continue
-        found.append(_about(dataset))
-        if not as_json:
-            out.print(f"{dataset.name}: {path}", markup=False, soft_wrap=True)
+    wanted = [registry.dataset(name) for name in dict.fromkeys(names or [])]
+    wanted += [one for name in group for one in registry.group(name) if one not in wanted]
+    found = _fetch_all(wanted, jobs, timeout, have, quiet=as_json)
     if as_json:
-        print_json(found)
-    if any("error" in about for about in found):
+        print_json([found[dataset.name] for dataset in wanted])
+    if any("error" in about for about in found.values()):
         raise typer.Exit(1)
 
 
+def _fetch_all(
+    wanted: list[Dataset], jobs: int, timeout: float, have: list[Path], *, quiet: bool
+) -> dict[str, dict[str, Any]]:
+    """Fetch them, say how it goes, and return what is known of each by name."""
+    from cembench.mesh import datasets
+
+    missing = {d.path: d for d in wanted if not datasets.is_fetched(d)}
+    if len(wanted) > 1 and not quiet:
+        err.print(_intent(len({d.path for d in wanted}), list(missing.values())), style="dim")
+    found: dict[str, dict[str, Any]] = {}
+    with _bars(list(missing.values())) as progress:
+        for one in datasets.fetch_all(
+            wanted, jobs=jobs, timeout=timeout, have=have, progress=progress
+        ):
+            found[one.dataset.name] = _about(one.dataset)
+            if one.error is not None:
+                found[one.dataset.name]["error"] = str(one.error)
+                complain(str(one.error))
+            elif not quiet:
+                only = " (no licence stated: do not pass it on)" if one.dataset.fetch_only else ""
+                told = f"{one.dataset.name}: {one.path}{only}"
+                out.print(told, markup=False, soft_wrap=True)
+    failed = sum("error" in about for about in found.values())
+    if len(wanted) > 1 and not quiet:
+        err.print(
+            f"{len(found) - failed} of {len(wanted)} are there"
+            + (f", {failed} could not be fetched; the same command tries them again" * bool(failed))
+            + ".",
+            style="dim",
+        )
+    return found
+
+
+def _intent(count: int, missing: list[Dataset]) -> str:
+    """Say how many files there are and how much is to be fetched, before it begins."""
+    from cembench.report.render.terminal import bytes_text
+
+    total = bytes_text(sum(d.size or 0 for d in missing))
+    unknown = sum(d.size is None for d in missing)
+    more = f", and {unknown} of unknown size" if unknown else ""
+    return f"{count} files, {count - len(missing)} already here; to fetch: {total}{more}."
+
+
 def fetched(dataset: Dataset, *, timeout: float = 60.0) -> Path:
-    """Where is this dataset's file? Fetched if need be, with a bar on a terminal.
+    """Where is the file to read this dataset from? Fetched if need be, with a bar on a terminal.
 
     Raises
     ------
@@ -80,8 +125,9 @@ def fetched(dataset: Dataset, *, timeout: float = 60.0) -> Path:
     """
     from cembench.mesh import datasets
 
-    with _shown(dataset) as progress:
-        return datasets.fetch(dataset, timeout=timeout, progress=progress)
+    with _bars([dataset]) as progress:
+        datasets.fetch(dataset, timeout=timeout, progress=progress(dataset))
+    return datasets.surface_file(dataset)
 
 
 def _about(dataset: Dataset) -> dict[str, Any]:
@@ -91,7 +137,11 @@ def _about(dataset: Dataset) -> dict[str, Any]:
         "name": dataset.name,
         "title": dataset.title,
         "paper_row": dataset.paper_row or None,
+        "group": dataset.group or None,
+        "faces": dataset.faces,
         "licence": dataset.licence,
+        "fetch_only": dataset.fetch_only,
+        "note": dataset.note or None,
         "url": dataset.url,
         "sha256": dataset.sha256,
         "size": dataset.path.stat().st_size if dataset.path.is_file() else dataset.size,
@@ -107,30 +157,56 @@ class _Bar:
     bars: Bars
     line: TaskID
     total: int = 0
+    whole: TaskID | None = None
+    seen: int = 0
 
     def update(self, count: int) -> None:
+        """Show that so many more have arrived."""
         self.bars.update(self.line, advance=count, total=self.total or None)
+        self._advance_whole(count)
 
     def reset(self) -> None:
+        """Show that none have arrived; the loop of the download ends with this and all at once."""
         self.bars.reset(self.line)
+        self._advance_whole(-self.seen)
 
     def close(self) -> None:
+        """Show no more of this file where there are others."""
         self.bars.stop_task(self.line)
+        if self.whole is not None:
+            self.bars.update(self.line, visible=False)
+
+    def _advance_whole(self, count: int) -> None:
+        self.seen += count
+        if self.whole is not None:
+            self.bars.update(self.whole, advance=count)
 
 
 @contextmanager
-def _shown(dataset: Dataset) -> Iterator[Progress | None]:
-    """A bar on a terminal; nothing elsewhere."""
+def _bars(datasets: list[Dataset]) -> Iterator[Callable[[Dataset], Progress | None]]:
+    """On a terminal a bar for each file that is being fetched, and nothing elsewhere."""
     if not err.is_terminal:
-        yield None
+        yield lambda dataset: None
         return
     from rich.progress import BarColumn, DownloadColumn, TextColumn
     from rich.progress import Progress as Bars
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(20), DownloadColumn())
+    total = sum(d.size or 0 for d in datasets)
     with Bars(*columns, console=err, transient=True) as bars:
-        yield _Bar(bars, bars.add_task(f"fetching {dataset.name}", total=dataset.size))
+        whole = bars.add_task("all files", total=total or None) if len(datasets) > 1 else None
+
+        def bar(dataset: Dataset) -> Progress:
+            line = bars.add_task(f"fetching {dataset.name}", total=dataset.size)
+            return _Bar(bars, line, whole=whole)
+
+        yield bar
 
 
 #: Each verb with the examples that its help shows.
-VERBS = ((fetch, "Examples:  cembench fetch  ·  cembench fetch chinese-lion left-hand --json"),)
+VERBS = (
+    (
+        fetch,
+        "Examples:  cembench fetch  ·  cembench fetch --group disks  ·  cembench fetch left-hand",
+    ),
+)

@@ -16,13 +16,15 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def pole(V: Real, F: NDArray[np.int64]) -> tuple[NDArray[np.int64], Complex]:
+def pole(
+    V: Real, F: NDArray[np.int64], triangle: int | None = None
+) -> tuple[NDArray[np.int64], Complex]:
     """Which right-hand side puts a pole at the triangle in the middle (Eq. 14)?
 
-    V is (n, 2 or 3). The triangle is the one whose barycentre is nearest to the mean vertex; its
-    corners (3,) come back with their values (3,), all others are zero.
+    V is (n, 2 or 3). The triangle is the one whose barycentre is nearest to the mean vertex, if
+    none is given; its corners (3,) come back with their values (3,), all others are zero.
     """
-    corners = middle_triangle(V, F)
+    corners = middle_triangle(V, F) if triangle is None else F[triangle]
     p_a, p_b, p_c = V[corners]
     base = p_b - p_a
     alpha = np.dot(p_c - p_a, base) / np.dot(base, base)
@@ -36,13 +38,18 @@ def pole(V: Real, F: NDArray[np.int64]) -> tuple[NDArray[np.int64], Complex]:
     return corners, np.array(values)
 
 
-def pole_start(V: Real, F: NDArray[np.int64], solve: Callable[[Complex], Complex]) -> Complex:
+def pole_start(
+    V: Real,
+    F: NDArray[np.int64],
+    solve: Callable[[Complex], Complex],
+    triangle: int | None = None,
+) -> Complex:
     """Where does the boundary lie in the map with a pole in the middle (Eqs. 13, 14, 18)?
 
-    `solve` gives f_b of L f = rhs (n,).
+    `solve` gives f_b of L f = rhs (n,); `triangle` is the one in the middle, if not the usual one.
     """
     with phase("start"):
-        corners, values = pole(V, F)
+        corners, values = pole(V, F, triangle)
         rhs = np.zeros(len(V), dtype=np.complex128)
         rhs[corners] = values
         f_b = solve(rhs)

@@ -31,7 +31,7 @@ class Extra(StrEnum):
 #: The modules that each extra brings.
 MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.FETCH: ("pooch", "requests"),
-    Extra.FORMATS: ("OpenEXR",),
+    Extra.FORMATS: ("OpenEXR", "meshio", "nibabel", "trimesh"),
     Extra.PARDISO: ("pypardiso",),
     Extra.PARQUET: ("pyarrow",),
     Extra.REPORT: ("jinja2", "markupsafe", "plotly"),

@@ -17,6 +17,8 @@ class NoticeKind(StrEnum):
     #: Lines of a file that its format does not know were ignored.
     LINES_IGNORED = "lines_ignored"
     POLYGONS_CUT = "polygons_cut"
+    #: Two arrays of a file were taken for vertices and triangles, because they fit.
+    ARRAYS_GUESSED = "arrays_guessed"
     #: Something was mended on request.
     REPAIRED = "repaired"
     CUT_OPEN = "cut_open"

@@ -3,21 +3,29 @@
 `CEMBENCH_CACHE` says where they are kept. `CEMBENCH_DATA_URL` points to a mirror: a directory that
 holds the files under their own names. The libraries that download load when something is fetched:
 every process that measures reads this file.
+
+A file is used only while it is what was published: its SHA-256 is the known one, or, where none is
+known, the mesh in it is. A file that lies there already is known by its content, whatever it is
+called.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable
+import shutil
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Protocol
+from typing import BinaryIO, Protocol, cast
+from urllib.parse import quote
 
 from platformdirs import user_cache_dir
 
-from cembench.core.atomic import write
-from cembench.core.errors import DatasetError, RecordError
+from cembench.core.atomic import write, write_bytes
+from cembench.core.errors import CembenchError, DatasetError, MeshError, RecordError
 from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
 
@@ -48,6 +56,19 @@ class Progress(Protocol):
 
 
 @dataclass(frozen=True)
+class Part:
+    """How a file of a model is kept: its place, what is kept of it, whether that is whole."""
+
+    path: Callable[[], Path]
+    converted: Callable[[Path], bytes]
+    is_whole: Callable[[Path], bool]
+
+
+#: The licence of a dataset whose publisher states none: fetch it for yourself, do not pass it on.
+NONE_STATED = "none stated"
+
+
+@dataclass(frozen=True)
 class Dataset:
     """A mesh file that can be fetched: pure data, offered as an entry point.
 
@@ -68,6 +89,18 @@ class Dataset:
     mesh_hash : str
         Hash of the mesh in it, by which the same surface in another file is recognised; "" if not
         known.
+    group : str
+        What it is fetched with: "disks".
+    faces : int or None
+        Triangles of its mesh, if known.
+    arrays : tuple of two str, optional
+        The arrays of vertices and triangles, where its file holds several meshes.
+    polygons : tuple of two int, optional
+        The first and the last polygon of the surface, counted from 0, where its file holds more.
+    note : str
+        What is to be known of it.
+    part : Part, optional
+        For a file that is no surface but belongs to a model: what is kept of it.
 
     """
 
@@ -79,6 +112,12 @@ class Dataset:
     size: int | None = None
     paper_row: str = ""
     mesh_hash: str = ""
+    group: str = ""
+    faces: int | None = None
+    arrays: tuple[str, str] | None = None
+    polygons: tuple[int, int] | None = None
+    note: str = ""
+    part: Part | None = None
 
     @property
     def file(self) -> str:
@@ -89,12 +128,19 @@ class Dataset:
     def url(self) -> str:
         """Where it is fetched from: the mirror if one is set."""
         mirror = os.environ.get(MIRROR_VARIABLE)
-        return f"{mirror.rstrip('/')}/{self.file}" if mirror else self.source_url
+        return f"{mirror.rstrip('/')}/{quote(self.file)}" if mirror else self.source_url
 
     @property
     def path(self) -> Path:
         """Where it lies once it has been fetched."""
+        if self.part:
+            return self.part.path()
         return cache_directory() / "datasets" / file_name(self.file)
+
+    @property
+    def fetch_only(self) -> bool:
+        """Whether no licence is stated that would allow to pass it on."""
+        return self.licence == NONE_STATED
 
     @property
     def origin(self) -> str:
@@ -104,13 +150,38 @@ class Dataset:
 
 def is_fetched(dataset: Dataset) -> bool:
     """Does the file lie in the cache, whole? Nothing is fetched."""
-    return dataset.path.is_file() and _sha256(dataset.path) == dataset.sha256
+    return dataset.path.is_file() and _is_whole(dataset, dataset.path)
 
 
-def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None = None) -> Path:
+def _is_whole(dataset: Dataset, path: Path) -> bool:
+    if dataset.part and path == dataset.path:
+        return dataset.part.is_whole(path)
+    if dataset.sha256:
+        return _sha256(path) == dataset.sha256
+    return not dataset.mesh_hash or _hash_of_mesh(dataset, path) == dataset.mesh_hash
+
+
+def _hash_of_mesh(dataset: Dataset, path: Path) -> str | None:
+    from cembench.mesh.files import read_mesh
+    from cembench.mesh.triangle_mesh import TriangleMesh
+
+    try:
+        return read_mesh(path, TriangleMesh, arrays=dataset.arrays, polygons=dataset.polygons).hash
+    except MeshError:
+        return None
+
+
+def fetch(
+    dataset: Dataset,
+    *,
+    timeout: float = 60.0,
+    progress: Progress | None = None,
+    have: Sequence[Path] = (),
+) -> Path:
     """Where is this dataset's file? Fetched if it is not in the cache, or not whole there.
 
-    `timeout` in seconds is that of the server's answer, not of the whole download.
+    `timeout` in seconds is that of the server's answer, not of the whole download. A file of the
+    same content in the cache or in a folder of `have` is taken, whatever it is called.
 
     Raises
     ------
@@ -125,19 +196,117 @@ def fetch(dataset: Dataset, *, timeout: float = 60.0, progress: Progress | None 
     """
     if is_fetched(dataset):
         return dataset.path
-    require(Extra.FETCH, f"fetching {dataset.file} from {dataset.url}")
     try:
-        write(
-            dataset.path,
-            lambda file: _download(dataset, file, timeout, progress),
-            check=lambda draft: _check_sum(dataset, draft),
-        )
+        if same := _of_same_content(dataset, have):
+            _keep(dataset, lambda file: _copied(same, file))
+            return dataset.path
+        require(Extra.FETCH, f"fetching {dataset.file} from {dataset.url}")
+        _keep(dataset, lambda file: _download(dataset, file, timeout, progress))
     except RecordError as error:
         raise RecordError(
             f"cannot keep {dataset.file} from {dataset.url}: {error} {CACHE_VARIABLE} names the "
             "folder of the cache."
         ) from error
     return dataset.path
+
+
+def _keep(dataset: Dataset, fill: Callable[[BinaryIO], object]) -> None:
+    """Put what `fill` writes to its place once it has been found to be whole."""
+    if not dataset.part:
+        write(dataset.path, fill, check=lambda draft: _check_whole(dataset, draft))
+        return
+    with tempfile.NamedTemporaryFile(suffix=Path(dataset.file).suffix) as file:
+        fill(cast(BinaryIO, file))
+        file.flush()
+        published = Path(file.name)
+        if dataset.sha256:
+            _check_whole(dataset, published)
+        write_bytes(dataset.path, dataset.part.converted(published))
+
+
+def _copied(path: Path, file: BinaryIO) -> None:
+    with path.open("rb") as source:
+        shutil.copyfileobj(source, file)
+
+
+def _of_same_content(dataset: Dataset, have: Sequence[Path]) -> Path | None:
+    """Return a file with this dataset's content, in the cache's folder or in one of `have`."""
+    if not dataset.sha256:
+        return None
+    for folder in (dataset.path.parent, *have):
+        for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
+            if not path.is_file() or (dataset.size and path.stat().st_size != dataset.size):
+                continue
+            if _sha256(path) == dataset.sha256:
+                return path
+    return None
+
+
+@dataclass(frozen=True)
+class Fetched:
+    """How it went with a dataset: its place, or the error."""
+
+    dataset: Dataset
+    path: Path | None
+    error: CembenchError | None = None
+
+
+def fetch_all(
+    datasets: Iterable[Dataset],
+    *,
+    jobs: int = 4,
+    timeout: float = 60.0,
+    have: Sequence[Path] = (),
+    progress: Callable[[Dataset], Progress | None] = lambda dataset: None,
+) -> Iterator[Fetched]:
+    """Fetch several datasets at once, and give each as it ends; an error stops none of the others.
+
+    Datasets of one file fetch it once. What was fetched before an interruption stays, so that
+    the same call again goes on from there.
+
+    Raises
+    ------
+    RecordError
+        The cache cannot be written to, or its disk is full: nothing more is begun.
+
+    """
+    by_place: dict[Path, list[Dataset]] = {}
+    for dataset in datasets:
+        by_place.setdefault(dataset.path, []).append(dataset)
+
+    def one(dataset: Dataset) -> Path:
+        return fetch(dataset, timeout=timeout, have=have, progress=progress(dataset))
+
+    with ThreadPoolExecutor(max_workers=jobs) as pool:
+        waiting = {pool.submit(one, same[0]): same for same in by_place.values()}
+        try:
+            for done in as_completed(waiting):
+                error = done.exception()
+                if error is not None and not isinstance(error, DatasetError):
+                    raise error
+                for dataset in waiting[done]:
+                    path = None if error else dataset.path
+                    yield Fetched(dataset, path, cast("CembenchError | None", error))
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def surface_file(dataset: Dataset) -> Path:
+    """Return the file to read a fetched dataset's surface from.
+
+    It is the fetched file, or an OBJ of the part of it that the dataset is.
+    """
+    if dataset.arrays is None and dataset.polygons is None:
+        return dataset.path
+    from cembench.mesh.files import read_mesh, write_mesh
+    from cembench.mesh.triangle_mesh import TriangleMesh
+
+    key = dataset.sha256[:16]
+    path = dataset.path.parent / "parts" / key / f"{file_name(dataset.name)}.obj"
+    mesh = read_mesh(dataset.path, TriangleMesh, arrays=dataset.arrays, polygons=dataset.polygons)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_mesh(path, mesh)
+    return path
 
 
 def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progress | None) -> None:
@@ -155,19 +324,24 @@ def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progre
         ) from error
 
 
-def _check_sum(dataset: Dataset, path: Path) -> None:
-    if _sha256(path) != dataset.sha256:
-        raise DatasetError(
-            f"{dataset.file} from {dataset.url} is damaged or another file: its SHA-256 is not "
-            f"{dataset.sha256}. Try again, or set {MIRROR_VARIABLE} to another mirror."
-        )
+def _check_whole(dataset: Dataset, path: Path) -> None:
+    if _is_whole(dataset, path):
+        return
+    what = f"SHA-256 is not {dataset.sha256}"
+    if not dataset.sha256:
+        what = f"mesh is not the known one (hash {dataset.mesh_hash})"
+    raise DatasetError(
+        f"{dataset.file} from {dataset.url} is damaged or another file: its {what}. Try again, "
+        f"or set {MIRROR_VARIABLE} to another mirror."
+    )
 
 
 def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:
     """Which dataset is it that was read from this file? Known by its bytes, or by its mesh."""
     checksum = _sha256(path)
     for dataset in datasets:
-        if mesh_hash == dataset.mesh_hash or checksum == dataset.sha256:
+        whole = dataset.arrays is None and dataset.polygons is None
+        if mesh_hash == dataset.mesh_hash or (whole and checksum == dataset.sha256):
             return dataset
     return None
 

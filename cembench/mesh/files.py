@@ -34,8 +34,26 @@ from cembench.mesh.writers.vtp import vtp_bytes
 M = TypeVar("M", bound=TriangleMesh)
 
 
-def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:  # type: ignore[assignment]
+def read_mesh(
+    path: str | os.PathLike[str],
+    mesh_type: type[M] = DiskMesh,  # type: ignore[assignment]
+    *,
+    arrays: tuple[str, str] | None = None,
+    polygons: tuple[int, int] | None = None,
+) -> M:
     """Read a file as a checked surface, which is named after the file's stem.
+
+    Parameters
+    ----------
+    path : path
+        OBJ, OFF, PLY, STL, MAT, NPZ; with the extra "meshes" also VTK, VTU, GLB, GLTF and GII.
+    mesh_type : type
+        What it must be: `DiskMesh`, `HoledMesh`, or `TriangleMesh` for any surface.
+    arrays : tuple of two str, optional
+        For MAT and NPZ files: the names of the vertices and of the triangles; default: found.
+    polygons : tuple of two int, optional
+        The first and the last polygon that is taken, counted from 0; default: all. The vertices
+        of the others are left out.
 
     Raises
     ------
@@ -43,7 +61,7 @@ def read_mesh(path: str | os.PathLike[str], mesh_type: type[M] = DiskMesh) -> M:
         The file is missing, empty, of unknown format or damaged, or its mesh fails a check.
 
     """
-    return checked(read_soup(path), mesh_type, Path(path))
+    return checked(read_soup(path, arrays=arrays, polygons=polygons), mesh_type, Path(path))
 
 
 def read_repaired(path: Path) -> tuple[Soup, Repaired]:

@@ -1,4 +1,4 @@
-"""MATLAB files of versions 5 to 7.2: v (n, 3), and f (m, 3) counted from 1.
+"""MATLAB files of versions 5 to 7.2: v (n, 3) and f (m, 3) counted from 1, or two that fit.
 
 Own code, because scipy's reader crashes the process on some damaged files, and never ends on some
 of version 4. Here every length is compared with what is there before anything is read.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import MeshError
+from cembench.mesh.array_pairs import soup_of_arrays
 from cembench.mesh.soup import Soup, damaged
 
 _HEADER_BYTES = 128
@@ -31,11 +32,23 @@ _NUMERIC_CLASSES, _COMPLEX = range(6, 16), 0x0800
 _BEGINNING = 4096
 
 
-def read_mat(path: Path) -> Soup:
-    """Read the variables v and f of a MATLAB file; all others are skipped."""
+def read_mat(path: Path, arrays: tuple[str, str] | None = None) -> Soup:
+    """Read the vertices and triangles of a MATLAB file: v and f, those named, or two that fit."""
     content = path.read_bytes()
+    if arrays:
+        return soup_of_arrays(_read(content, lambda name, shape: name in arrays), arrays, 1)
+    found = _read(content, lambda name, shape: name in ("v", "f"))
+    if not {"v", "f"} <= set(found):
+        found |= _read(content, lambda name, shape: shape[1:] in ([2], [3]))
+    return soup_of_arrays(found, None, 1)
+
+
+def _read(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[str, NDArray[Any]]:
+    """Return the wanted arrays by name; the lengths of all others are checked.
+
+    `is_wanted` is told an array's name, and its shape where it holds real numbers.
+    """
     order = _byte_order(content)
-    present: list[str] = []
     found: dict[str, NDArray[Any]] = {}
     for kind, element in _elements(content[_HEADER_BYTES:], order):
         begin, size = element, 0
@@ -45,25 +58,15 @@ def read_mat(path: Path) -> Soup:
             begin = begin[8:]
         if kind != _ARRAY:
             raise damaged(f"it cannot be read as MAT: an element of type {kind} where arrays are")
-        name = _head(_elements(begin, order), order)[0]
-        present.append(name)
-        if name in ("v", "f") and name not in found:
+        name, shape, flags = _head(_elements(begin, order), order)
+        if is_wanted(name, shape if _is_numeric(flags) else []) and name not in found:
             whole = element if begin is element else _inflated_whole(element, size + 8)[8:]
             found[name] = _matrix(whole, order)
         elif begin is not element:
             _check_compressed(element, size + 8)
         else:  # as there: damage in what is not wanted may not be the only one
             deque(_elements(element, order), maxlen=0)
-    missing = [name for name in ("v", "f") if name not in found]
-    if missing:
-        raise MeshError(
-            f"no variable {missing[0]!r}; it has: {', '.join(present) or 'none'}. Needed are "
-            "v (n, 3), the vertices, and f (m, 3), the triangles counted from 1."
-        )
-    v, f = found["v"], found["f"]
-    if (np.abs(f.astype(np.float64)) >= 2**53).any() or (np.round(f) != f).any() or (f < 1).any():
-        raise MeshError("variable 'f' must hold whole numbers from 1 on, the triangles' corners.")
-    return Soup.from_arrays(v, f, np.full(len(f), 3), counted_from=1)
+    return found
 
 
 def _byte_order(content: bytes) -> str:
@@ -159,12 +162,17 @@ def _head(parts: Iterator[tuple[int, bytes]], order: str) -> tuple[str, list[int
     return name.tobytes().decode("latin-1"), shape.tolist(), int(flags[0])
 
 
+def _is_numeric(flags: int) -> bool:
+    """Whether an array's class is one of real numbers."""
+    return flags & 0xFF in _NUMERIC_CLASSES and not flags & _COMPLEX
+
+
 def _matrix(content: bytes, order: str) -> NDArray[Any]:
-    """The real numbers (rows, 3) of an array."""
+    """The real numbers (rows, 3), or (rows, 2), of an array."""
     parts = _elements(content, order)
     name, shape, flags = _head(parts, order)
-    numeric = flags & 0xFF in _NUMERIC_CLASSES and not flags & _COMPLEX
-    if not numeric or len(shape) != 2 or shape[1] != 3:
+    numeric = _is_numeric(flags)
+    if not numeric or len(shape) != 2 or shape[1] not in (2, 3):
         raise MeshError(
             f"variable {name!r} must be real numbers of shape (rows, 3); it has shape "
             f"{tuple(shape)} and is {'numeric' if numeric else 'not real numbers'}."
@@ -172,6 +180,7 @@ def _matrix(content: bytes, order: str) -> NDArray[Any]:
     numbers = _numbers(next(parts, (0, b"")), order)
     if len(numbers) != math.prod(shape):
         raise damaged(
-            f"variable {name!r} declares {shape[0]} rows of 3, but {len(numbers)} numbers follow"
+            f"variable {name!r} declares {shape[0]} rows of {shape[1]}, but {len(numbers)} numbers "
+            "follow"
         )
     return numbers.reshape(shape, order="F")

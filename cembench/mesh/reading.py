@@ -1,4 +1,4 @@
-"""Mesh files as soups of polygons: OBJ, OFF, PLY (ASCII and binary), STL and MATLAB files.
+"""Mesh files as soups of polygons: OBJ, OFF, PLY (ASCII and binary), STL, MATLAB files and others.
 
 Every vertex is kept, in the file's order and in float64, and only the geometry. No face is lost in
 silence: what the file declares must be what it holds, and what is no legal statement is an error or
@@ -13,12 +13,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from cembench.core.errors import MeshError
+from cembench.mesh.gii_reader import read_gii
+from cembench.mesh.gltf_reader import read_gltf
 from cembench.mesh.mat_reader import read_mat
+from cembench.mesh.npz_reader import read_npz
 from cembench.mesh.obj_reader import read_obj
 from cembench.mesh.off_reader import read_off
 from cembench.mesh.ply_reader import read_ply
 from cembench.mesh.soup import Soup
 from cembench.mesh.stl_reader import read_stl
+from cembench.mesh.vtk_reader import read_vtk
 
 READERS: dict[str, Callable[[Path], Soup]] = {
     ".obj": read_obj,
@@ -26,6 +30,17 @@ READERS: dict[str, Callable[[Path], Soup]] = {
     ".ply": read_ply,
     ".stl": read_stl,
     ".mat": read_mat,
+    ".npz": read_npz,
+    ".vtk": read_vtk,
+    ".vtu": read_vtk,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".gii": read_gii,
+}
+#: Formats of arrays, of which two can be named.
+_OF_ARRAYS: dict[str, Callable[[Path, tuple[str, str] | None], Soup]] = {
+    ".mat": read_mat,
+    ".npz": read_npz,
 }
 _SPECIAL_FILES = (
     (stat.S_ISDIR, "a folder"),
@@ -41,8 +56,16 @@ def is_named_like_a_mesh(path: Path) -> bool:
     return path.suffix.lower() in READERS
 
 
-def read_soup(path: str | os.PathLike[str]) -> Soup:
+def read_soup(
+    path: str | os.PathLike[str],
+    *,
+    arrays: tuple[str, str] | None = None,
+    polygons: tuple[int, int] | None = None,
+) -> Soup:
     """Read the vertices and polygons of a file, without any check of the surface.
+
+    `arrays` names the vertices and the triangles of a MAT or NPZ file; `polygons` is the first and
+    the last polygon that is taken, counted from 0.
 
     Raises
     ------
@@ -54,7 +77,13 @@ def read_soup(path: str | os.PathLike[str]) -> Soup:
     path = Path(path)
     try:
         _check_file(path)
-        return READERS[path.suffix.lower()](path).named(path.stem)
+        suffix = path.suffix.lower()
+        if arrays and suffix not in _OF_ARRAYS:
+            raise MeshError(
+                f"arrays are named for {', '.join(_OF_ARRAYS)} files only, not for {suffix}."
+            )
+        soup = _OF_ARRAYS[suffix](path, arrays) if arrays else READERS[suffix](path)
+        return (soup.subset(*polygons) if polygons else soup).named(path.stem)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error.__cause__
     except MemoryError as error:

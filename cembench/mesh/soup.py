@@ -97,6 +97,25 @@ class Soup:
         """The same under another name."""
         return replace(self, name=name)
 
+    def subset(self, first: int, last: int) -> Self:
+        """Return the polygons from `first` to `last`, counted from 0, and their vertices only.
+
+        Raises
+        ------
+        MeshError
+            There are no such polygons.
+
+        """
+        if not 0 <= first <= last < len(self.sizes):
+            raise MeshError(
+                f"polygons {first} to {last} were asked for; it has {len(self.sizes)}, counted "
+                "from 0."
+            )
+        ends = np.cumsum(self.sizes)
+        corners = self.corners[ends[first] - self.sizes[first] : ends[last]]
+        used, corners = np.unique(corners, return_inverse=True)
+        return replace(self, V=self.V[used], corners=corners, sizes=self.sizes[first : last + 1])
+
     @property
     def polygons(self) -> list[NDArray[np.int64]]:
         """The polygons in order, as blocks (k, c) of k successive ones with c corners each."""

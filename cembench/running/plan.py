@@ -197,6 +197,10 @@ def gather_surfaces(
     return found, standing | paper_roles(registry, names)
 
 
+#: A file of this kind in a folder is a mesh only where it is named: most hold other arrays.
+_OF_ANYTHING = (".npz",)
+
+
 def mesh_files(folder: Path) -> list[Path]:
     """The entries of a folder that are named like mesh files, by name.
 
@@ -210,7 +214,8 @@ def mesh_files(folder: Path) -> list[Path]:
 
     """
     try:
-        found = sorted(path for path in folder.iterdir() if is_named_like_a_mesh(path))
+        named = (path for path in folder.iterdir() if is_named_like_a_mesh(path))
+        found = sorted(path for path in named if path.suffix.lower() not in _OF_ANYTHING)
     except (FileNotFoundError, NotADirectoryError):
         why = "is not a folder"
     except OSError as error:

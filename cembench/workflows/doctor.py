@@ -27,7 +27,7 @@ _REQUIRED = {
 #: What each extra is for.
 _FOR = {
     Extra.FETCH: "fetches public surfaces",
-    Extra.FORMATS: "writes geometry images as EXR",
+    Extra.FORMATS: "reads VTK, glTF and GIFTI files, writes geometry images as EXR",
     Extra.PARDISO: "another back end",
     Extra.PARQUET: "exports runs as Parquet",
     Extra.REPORT: "writes reports",

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from cembench.algorithms import fdm as module
-from cembench.algorithms.fdm import fdm
+from cembench.algorithms.fdm import _middle, _public_turn, fdm
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
@@ -12,7 +12,9 @@ from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian, non_delaunay_share
 from cembench.conformal.metrics import all_metrics
 from cembench.conformal.planar import signed_areas
+from cembench.mesh.files import read_mesh
 from tests import gallery
+from tests.real_meshes import real_mesh
 
 
 def error_of_reflected_coefficients(faces):
@@ -86,6 +88,25 @@ def test_iterations_that_diverge_on_a_coarse_mesh_are_dropped():
     energy = all_metrics(mesh, found.uv)["conformal_energy"]
     assert found.energy_history[-1] == pytest.approx(energy)
     assert found.energy_history[-1] == min(found.energy_history)
+
+
+def test_the_public_program_gives_the_printed_digits_of_nefertiti():
+    mesh = read_mesh(real_mesh("nefertiti.obj"))
+    found = [all_metrics(mesh, fdm(mesh.fresh(), public_program=slip).uv) for slip in (True, False)]
+    keys = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
+    slip, corrected = ([one[key] for key in keys] for one in found)
+    assert [f"{slip[0]:.4f}", f"{slip[1]:.2f}", f"{slip[2]:.2f}"] == ["0.0242", "2.48", "3.36"]
+    assert slip == pytest.approx([0.02416, 2.4768, 3.3558], abs=1e-4)
+    assert f"{corrected[0]:.4f}" == "0.0241"
+
+
+def test_the_public_program_returns_the_last_iterate_and_turns_by_a_and_half_of_b():
+    mesh = hemi_ellipsoid(200, z=8.0)
+    assert fdm(mesh, public_program=True).extras["iterations_dropped"] == 0
+    assert fdm(mesh).extras["iterations_dropped"] > 0
+    p, q = np.exp(0.4j), np.exp(0.6j)
+    assert np.angle(_middle(p, q)) == pytest.approx(0.5)
+    assert np.angle(_public_turn(p, q)) == pytest.approx(0.7)
 
 
 def test_delaunay_weights_are_nearer_to_the_surface_where_its_edges_are_not_delaunay():

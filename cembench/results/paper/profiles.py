@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from enum import StrEnum
+from typing import Any
 
 from cembench.core.errors import RegistryError
 from cembench.registry import Registry
@@ -72,3 +73,14 @@ def algorithms_of(profile: Profile, registry: Registry) -> list[str]:
     if profile is Profile.quick:
         return [name for name in paper.ALGORITHMS if name in registry.algorithms]
     return registry.usual_algorithms
+
+
+def paper_parameters(algorithms: Iterable[str]) -> dict[str, Any]:
+    """Return the parameters with which the paper's tables are reproduced, as `plan_cells` has them.
+
+    The public program of FDM has a slip that the printed figures contain; see docs/paper_models.md.
+
+    >>> paper_parameters(["cem", "fdm"])
+    {'fdm.public_program': True}
+    """
+    return {"fdm.public_program": True} if "fdm" in algorithms else {}

@@ -3,7 +3,13 @@ import pytest
 from cembench import DiskMesh, RegistryError, surface_family
 from cembench.registry import Registry, load_registry
 from cembench.results import paper
-from cembench.results.paper.profiles import Profile, algorithms_of, models, surfaces_of
+from cembench.results.paper.profiles import (
+    Profile,
+    algorithms_of,
+    models,
+    paper_parameters,
+    surfaces_of,
+)
 
 
 def registry_of(rows):
@@ -50,3 +56,11 @@ def test_quick_takes_the_paper_s_algorithms_and_the_others_all():
     assert algorithms_of(Profile.quick, known) == ["qiem", "fdm", "ldm", "cem"]
     assert algorithms_of(Profile.paper, known) == known.usual_algorithms
     assert set(paper.ALGORITHMS) < set(paper.table(1)["Foot"])
+
+
+def test_where_the_paper_is_reproduced_fdm_is_the_public_program():
+    given = paper_parameters(["cem", "fdm"])
+    fdm = load_registry().algorithm("fdm")
+    assert fdm.arguments({})["public_program"] is False
+    assert given == {"fdm.public_program": True}
+    assert paper_parameters(["cem"]) == {}

@@ -129,7 +129,8 @@ def _similar(evidence: Evidence, name: str, metric: str, what: str, figure: str)
         if worst
         else "No model with all three in this run.",
         verdict_of(held, len(spreads)),
-        f"{tested_on(list(spreads))} What counts as similar is our reading.",
+        f"{tested_on(list(spreads))} What counts as similar is our reading."
+        + _reading_of_fdm(evidence),
     )
 
 
@@ -155,6 +156,22 @@ def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim
         else "No model with all three in this run.",
         verdict_of(held, len(found)),
         tested_on(list(found)),
+    )
+
+
+def _reading_of_fdm(evidence: Evidence) -> str:
+    """Say which FDM it is: the public program's, slip included, or the corrected one."""
+    series = evidence.series_of("fdm")
+    if series is None or "public_program" not in series.parameters:
+        return ""
+    if series.parameters["public_program"]:
+        return (
+            " FDM is its authors' public program, which turns the map by a + b/2 where the "
+            "middle (a + b)/2 of an edge is meant: the printed figures contain that slip."
+        )
+    return (
+        " FDM is the corrected reading; the printed figures contain a slip of its authors' public "
+        "program, which fdm.public_program=true reproduces."
     )
 
 

@@ -1,0 +1,184 @@
+"""The paper's four public models: printed beside measured, and what numbering alone decides.
+
+Fills docs/paper_models.md from the files of the models (`cembench fetch --group paper`; Nefertiti
+comes with CGAL) and from other coarse disks::
+
+    python -m benchmarks.paper_models FOLDER_OF_MESHES
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from cembench.algorithms.cem import cem, map_from_triangle
+from cembench.algorithms.fdm import fdm
+from cembench.algorithms.ldm import farthest_from_mean, ldm, map_numbered
+from cembench.algorithms.qiem import qiem
+
+from benchmarks.pages import ROOT, fill
+from cembench.conformal.metrics import all_metrics
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.files import read_mesh
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.results import paper
+
+PAGE = ROOT / "docs/paper_models.md"
+MODELS = {
+    "Nefertiti": "nefertiti.obj",
+    "Chinese Lion": "chinese_lion.obj",
+    "Human Brain": "human_brain.obj",
+    "Left Hand": "left_hand.obj",
+}
+#: Coarse disks on which the numbering is studied besides, and how many choices are tried at most.
+COARSE = ("nefertiti.obj", "canonical_face.obj", "hand_lowres.obj", "turtle.obj")
+MOST = 600
+
+
+@dataclass(frozen=True)
+class Cells:
+    """E_C, mean and SD of the angular distortion in degrees, and iterations if there are any."""
+
+    energy: float
+    mean: float
+    sd: float
+    iterations: int | None = None
+
+    def shown(self) -> tuple[str, str, str]:
+        """The figures with the digits that the paper prints."""
+        return f"{self.energy:.4f}", f"{self.mean:.2f}", f"{self.sd:.2f}"
+
+
+def cells(mesh: DiskMesh, found: Parameterization) -> Cells:
+    """Return the figures of a map."""
+    metrics = all_metrics(mesh, found.uv)
+    return Cells(
+        metrics["conformal_energy"],
+        metrics["angle_error_mean_deg"],
+        metrics["angle_error_sd_deg"],
+        found.iterations,
+    )
+
+
+def printed(model: str, algorithm: str) -> tuple[str, str, str]:
+    """Return the paper's cells of Tables 3 and 4."""
+    third, fourth = paper.table(3)[model], paper.table(4)[model]
+    return (
+        f"{third[algorithm]:.4f}",
+        f"{fourth[f'{algorithm}_mean']:.2f}",
+        f"{fourth[f'{algorithm}_sd']:.2f}",
+    )
+
+
+def cem_as_printed(mesh: DiskMesh, model: str) -> Parameterization:
+    """CEM stopped after the number of iterations that Table 1 prints."""
+    count = paper.table(1)[model]["cem_iterations"]
+    assert count is not None
+    return cem(mesh, max_iterations=int(count), tolerance=0)
+
+
+#: What is measured: the paper's column, what it is called here, and the call.
+RUNS: tuple[tuple[str, str, Callable[[DiskMesh, str], Parameterization]], ...] = (
+    ("qiem", "QIEM", lambda mesh, model: qiem(mesh)),
+    ("fdm", "FDM, public program", lambda mesh, model: fdm(mesh, public_program=True)),
+    ("fdm", "FDM, corrected", lambda mesh, model: fdm(mesh)),
+    ("ldm", "LDM", lambda mesh, model: ldm(mesh)),
+    ("cem", "CEM, as many iterations", cem_as_printed),
+    ("cem", "CEM, its own stop", lambda mesh, model: cem(mesh)),
+)
+
+
+def beside(folder: Path) -> Iterable[str]:
+    """Yield the lines of the table of printed beside measured figures."""
+    yield "| model | algorithm | printed E_C | mean | SD | measured E_C | mean | SD | digits |"
+    yield "|---|---|---:|---:|---:|---:|---:|---:|---|"
+    for model, file in MODELS.items():
+        mesh = read_mesh(folder / file)
+        for column, title, call in RUNS:
+            said, found = printed(model, column), cells(mesh, call(mesh.fresh(), model)).shown()
+            differ = [
+                name
+                for name, a, b in zip(("E_C", "mean", "SD"), said, found, strict=True)
+                if a != b
+            ]
+            agreed = "all agree" if not differ else f"not {', '.join(differ)}"
+            yield f"| {model} | {title} | {' | '.join(said)} | {' | '.join(found)} | {agreed} |"
+            print(model, title, flush=True)
+
+
+def ldm_choices(mesh: DiskMesh) -> list[Cells]:
+    """Return LDM's figures for every first boundary vertex, from either copy."""
+    found = []
+    for mirrored in (False, True):
+        for first in range(len(mesh.boundary)):
+            try:
+                found.append(cells(mesh, map_numbered(mesh.fresh(), first, mirrored=mirrored)))
+            except AlgorithmFailed:
+                continue
+    return found
+
+
+def cem_choices(mesh: DiskMesh) -> list[Cells]:
+    """Return CEM's figures for the start's triangle, all of them or `MOST` at even steps."""
+    found = []
+    for triangle in np.unique(np.linspace(0, mesh.m - 1, MOST).astype(int)):
+        try:
+            found.append(cells(mesh, map_from_triangle(mesh.fresh(), int(triangle))))
+        except AlgorithmFailed:
+            continue
+    return found
+
+
+def ranges(folder: Path) -> Iterable[str]:
+    """Yield the lines of the table of what numbering decides."""
+    yield "| surface | triangles | algorithm | choices | here | smallest E_C | median | largest |"
+    yield "|---|---:|---|---:|---|---|---|---|"
+    for file in COARSE:
+        mesh = read_mesh(folder / file)
+        usual: Mapping[str, tuple[Cells, list[Cells]]] = {
+            "LDM, first vertex and copy": (cells(mesh, ldm(mesh.fresh())), ldm_choices(mesh)),
+            "CEM, start triangle": (cells(mesh, cem(mesh.fresh())), cem_choices(mesh)),
+        }
+        for name, (here, found) in usual.items():
+            ordered = sorted(found, key=lambda one: one.energy)
+            three = (ordered[0], ordered[len(ordered) // 2], ordered[-1])
+            shown = " | ".join(" ".join(one.shown()) for one in (here, *three))
+            yield f"| {file} | {mesh.m:,} | {name} | {len(found)} | {shown} |"
+            print(file, name, flush=True)
+
+
+def nefertiti(folder: Path) -> str:
+    """Return what the choices on Nefertiti say of the printed cell of LDM."""
+    mesh = read_mesh(folder / MODELS["Nefertiti"])
+    found = ldm_choices(mesh)
+    said = printed("Nefertiti", "ldm")
+    lowest = int(np.argmin(mesh.boundary))
+    first = cells(mesh, map_numbered(mesh.fresh(), lowest)).shown()
+    near = [one for one in found if one.shown()[1:] == said[1:]]
+    energies = sorted({one.shown()[0] for one in near})
+    return (
+        f"LDM on Nefertiti is printed {' '.join(said)}. Over {len(found)} choices E_C runs from "
+        f"{min(one.energy for one in found):.4f} to {max(one.energy for one in found):.4f}; "
+        f"{len(near)} of them give the printed mean and SD, with E_C {', '.join(energies)}. The "
+        f"lowest-numbered vertex, the program's own first, gives {' '.join(first)}; the vertex "
+        f"farthest from the middle, which `ldm` takes (number {farthest_from_mean(mesh)} of the "
+        f"loop), {' '.join(cells(mesh, ldm(mesh.fresh())).shown())}."
+    )
+
+
+def main() -> None:
+    """Measure, and fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    folder = parser.parse_args().folder
+    parts = ["## Printed beside measured", "", *beside(folder), "", "## What numbering decides", ""]
+    parts += [nefertiti(folder), "", *ranges(folder)]
+    fill(PAGE, "paper_models", "\n".join(parts))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,354 @@
+"""How good is the registration of Section 6? Error against the true correspondence of faces.
+
+Pairs of faces of the ICT face model, whose correspondence is known at every vertex: other people,
+other expressions of one person, and both. Each is registered by the paper's method (Moebius
+alignment, then (34)) with 0, 3, 6 and 20 landmarks, and by Moebius maps alone. The table, the
+figure and the figures of every pair are written by one command::
+
+    CEMBENCH_ICT_FACE=folder python -m benchmarks.registration
+
+The two faces of a pair have different triangles (8,000 and 9,000), so that no method gains from
+equal meshes. What the triangles alone cost is measured too: the first face registered to itself.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from cembench.surfaces.ict_face import LANDMARKS, ict_face, landmarks_of, sample, triangulation
+from cembench.surfaces.ict_model import load_model
+from scipy import optimize
+
+from benchmarks.pages import ROOT, fill
+from cembench.conformal.moebius import Moebius
+from cembench.conformal.planar import signed_areas
+from cembench.core.atomic import write, write_text
+from cembench.core.errors import AlgorithmFailed, ParameterError
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.results.intervals import median_interval
+from cembench.workflows.morphing.align import aligned, centred, to_centre, vertex_areas
+from cembench.workflows.morphing.landmarks import check_order
+from cembench.workflows.morphing.registration import register
+from cembench.workflows.morphing.transport import locate
+from cembench.workflows.parameterize import parameterize
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+PAGE = ROOT / "docs/registration.md"
+FIGURE = ROOT / "docs/registration.png"
+PAIRS = ROOT / "docs/registration.csv"
+#: Triangles of the first and of the second face of a pair.
+FACES = (8_000, 9_000)
+COUNTS = (0, 3, 6, 20)
+KINDS = {
+    "identity": "other people",
+    "expression": "other expressions",
+    "both": "both",
+}
+#: The methods. "fitted" is the Moebius map that meets the landmarks best, where the paper's takes
+#: the first landmark to the centre and turns; "oracle" is fitted to the true correspondence of all
+#: vertices of the face, which nobody knows. "floor" is the face on itself.
+PLAIN, FITTED, PAPER, ORACLE, FLOOR = "Moebius", "Moebius, fitted", "(34)", "oracle", "floor"
+
+
+@dataclass(frozen=True)
+class Face:
+    """A sample on a mesh of its own, its map, and where the model's vertices lie on it."""
+
+    mesh: DiskMesh
+    z: np.ndarray
+    landmarks: np.ndarray
+    whole: np.ndarray
+
+
+@dataclass(frozen=True)
+class Row:
+    """The error of one method on one pair: None where it gave no map."""
+
+    pair: int
+    kind: str
+    method: str
+    landmarks: int
+    error: float | None
+
+
+def face(seed: int, expression: str, faces: int, algorithm: str) -> Face:
+    """Return a sample with its conformal map and its landmarks."""
+    mesh = ict_face(faces, seed=seed, expression=expression, part="disk")
+    assert isinstance(mesh, DiskMesh)
+    found = landmarks_of(triangulation("disk", faces))
+    z = parameterize(mesh, algorithm).z
+    whole = sample(load_model(), seed, expression)
+    return Face(mesh, z, np.array(list(found.values())), whole)
+
+
+def errors_of_pair(
+    first: Face, other: Face, itself: Face | None = None
+) -> dict[tuple[str, int], float]:
+    """Return the mean error of each method that gave a map, by method and number of landmarks.
+
+    `itself` is the first face on the other one's triangles.
+
+    An error is the distance in space between where a vertex of the first face is carried on the
+    other one and where it truly belongs, over the vertices of the face without neck, skull and
+    sockets, weighted by area, in percent of the distance between the outer corners of the eyes.
+    """
+    made = triangulation("disk", FACES[0])
+    seen = np.flatnonzero(made.kept < NARROW)
+    weights = vertex_areas(first.mesh)[seen]
+    truth = other.whole[made.kept[seen]]
+    unit = np.linalg.norm(np.subtract(*other.whole[[LANDMARKS[name] for name in EYES]]))
+
+    def error(points: np.ndarray) -> float:
+        return float(
+            100 * np.average(np.linalg.norm(points - truth, axis=1), weights=weights) / unit
+        )
+
+    def carried(uv: np.ndarray, z: np.ndarray) -> float:
+        at = locate(uv, other.mesh.F, other.mesh.boundary, z[seen])
+        return error(at.carry(other.mesh.F, other.mesh.V))
+
+    found: dict[tuple[str, int], float] = {}
+    stretch = _stretch(other)
+    true_image = _interpolated(truth, other, other.z)
+    best = fitted(first.z[seen], true_image, weights * _interpolated(truth, other, stretch))
+    found[ORACLE, 0] = carried(other.z, _applied(best, first.z))
+    if itself is not None:
+        found[FLOOR, 0] = errors_of_pair(first, itself)[PLAIN, COUNTS[-1]]
+    for count in COUNTS:
+        here, there = first.landmarks[:count], other.landmarks[:count]
+        z = centred(first.mesh, first.z, here)
+        moved = aligned(other.mesh, other.z, there, first.mesh, z, here)
+        found[PLAIN, count] = carried(moved, z)
+        if not count:
+            continue
+        move = fitted(first.z[here], other.z[there], stretch[there])
+        found[FITTED, count] = carried(other.z, _applied(move, first.z))
+        try:
+            check_order(list(LANDMARKS)[:count], z[here], moved[there], ("first", "other"))
+            uv = register(other.mesh, moved, there, z[here]).uv
+        except (AlgorithmFailed, ParameterError):
+            continue  # counted as a failure
+        found[PAPER, count] = carried(uv, z)
+    return found
+
+
+#: So many of the model's first vertices are the face without neck, skull and sockets.
+NARROW = 6_706
+EYES = ("eye_outer_right", "eye_outer_left")
+
+
+def _stretch(face: Face) -> np.ndarray:
+    """Return the square of the factor from distances in the disk to those in space, (n,)."""
+    image = np.bincount(
+        face.mesh.F.ravel(),
+        weights=np.repeat(signed_areas(face.z, face.mesh.F) / 3, 3),
+        minlength=face.mesh.n,
+    )
+    return vertex_areas(face.mesh) / image
+
+
+def _interpolated(points: np.ndarray, face: Face, values: np.ndarray) -> np.ndarray:
+    """Return the values (p,) at points of the surface, of values (n,) at its vertices."""
+    import igl  # slow to load
+
+    _, faces, on = igl.point_mesh_squared_distance(points, np.array(face.mesh.V), face.mesh.F)
+    corners = face.mesh.F[np.asarray(faces)]
+    a, b, c = (np.ascontiguousarray(face.mesh.V[corners[:, k]]) for k in range(3))
+    weights = igl.barycentric_coordinates(np.asarray(on), a, b, c)
+    return np.einsum("pc,pc->p", np.asarray(weights), values[corners])
+
+
+def _applied(move: Moebius, z: np.ndarray) -> np.ndarray:
+    moved = move(z)
+    return moved / np.maximum(np.abs(moved), 1.0)
+
+
+def fitted(z: np.ndarray, targets: np.ndarray, weights: np.ndarray) -> Moebius:
+    """Return the Moebius map of the disk that brings points nearest to their targets.
+
+    Weighted least squares over its three degrees of freedom, from eight turns. With weights that
+    turn distances in the disk into those on the surface, the latter count.
+    """
+
+    def move(x: np.ndarray) -> Moebius:
+        a = complex(x[0], x[1])
+        return to_centre(a / (1 + abs(a)), x[2])
+
+    def apart(x: np.ndarray) -> np.ndarray:
+        away = np.sqrt(weights / weights.sum()) * (move(x)(z) - targets)
+        return np.concatenate([away.real, away.imag])
+
+    starts = ([0.0, 0.0, turn] for turn in np.arange(8) * np.pi / 4)
+    return move(min((optimize.least_squares(apart, x) for x in starts), key=lambda f: f.cost).x)
+
+
+def specimens(pairs: int) -> list[tuple[str, tuple[int, str], tuple[int, str]]]:
+    """Return the kind of each pair, and the seed and expression of its faces."""
+    found = []
+    for k in range(pairs):
+        kind = list(KINDS)[k % 3]
+        other = 1_000 + k if kind != "expression" else k
+        found.append((kind, (k, "neutral"), (other, "random" if kind != "identity" else "neutral")))
+    return found
+
+
+def measured(
+    pairs: int, algorithm: str, tell: Callable[[str], object] = print
+) -> tuple[list[Row], int]:
+    """Return a row for every pair and method, and how many identity modes there were."""
+    rows = []
+    for k, (kind, one, another) in enumerate(specimens(pairs)):
+        first, itself = (face(*one, faces, algorithm) for faces in FACES)
+        other = face(*another, FACES[1], algorithm)
+        found = errors_of_pair(first, other, itself)
+        rows += [
+            Row(k, kind, method, count, found.get((method, count))) for method, count in METHODS
+        ]
+        tell(f"pair {k + 1} of {pairs}")
+    return rows, len(load_model().identities)
+
+
+#: Every method with its number of landmarks, in the table's order.
+METHODS = (
+    *((PLAIN, count) for count in COUNTS),
+    *((FITTED, count) for count in COUNTS[1:]),
+    *((PAPER, count) for count in COUNTS[1:]),
+    (ORACLE, 0),
+    (FLOOR, 0),
+)
+
+
+def table(rows: Sequence[Row], modes: int) -> str:
+    """Return the tables in Markdown: medians with 95 % intervals, and what (34) adds."""
+    pairs = len({row.pair for row in rows})
+    lines = [
+        f"{pairs} pairs ({modes} of 100 identity modes); median error in percent of the distance "
+        "between the outer corners of the eyes, with the 95 % interval of the median; fails: pairs "
+        "without a map.",
+        "",
+        f"| method | landmarks | all | {' | '.join(KINDS.values())} | fails |",
+        "|---|---:|---|---|---|---|---:|",
+    ]
+    for method, count in METHODS:
+        mine = [row for row in rows if (row.method, row.landmarks) == (method, count)]
+        cells = [_cell(mine), *(_cell([r for r in mine if r.kind == kind]) for kind in KINDS)]
+        fails = sum(row.error is None for row in mine)
+        shown = "" if method in (ORACLE, FLOOR) else count
+        lines.append(f"| {TITLES[method]} | {shown} | {' | '.join(cells)} | {fails or ''} |")
+    lines += ["", "What (34) changes, pair by pair (error of (34) less that of the other):", ""]
+    lines += ["| landmarks | against | median change | (34) better on |", "|---:|---|---|---:|"]
+    for count in COUNTS[1:]:
+        for against, there in ((PLAIN, count), (FITTED, count), (PLAIN, 0)):
+            change = differences(rows, (PAPER, count), (against, there))
+            name = "Moebius by curvature" if not there else TITLES[against]
+            better = f"{sum(c < 0 for c in change)} of {len(change)}"
+            lines.append(f"| {count} | {name} | {_interval(change, '+.2f')} | {better} |")
+    return "\n".join(lines)
+
+
+TITLES: Mapping[str, str] = {
+    PLAIN: "Moebius, as the paper aligns",
+    FITTED: "Moebius, least squares",
+    PAPER: "the paper's: Moebius, then (34)",
+    ORACLE: "best Moebius map, fitted to the truth",
+    FLOOR: "the face registered to itself, on other triangles",
+}
+
+
+def differences(rows: Sequence[Row], one: tuple[str, int], other: tuple[str, int]) -> list[float]:
+    """Return the error of one method less that of another on every pair that both have."""
+    by_pair = {
+        key: {r.pair: r.error for r in rows if (r.method, r.landmarks) == key}
+        for key in (one, other)
+    }
+    both = [(by_pair[one][pair], by_pair[other][pair]) for pair in by_pair[one]]
+    return [a - b for a, b in both if a is not None and b is not None]
+
+
+def _cell(rows: Sequence[Row]) -> str:
+    return _interval([row.error for row in rows if row.error is not None], ".2f")
+
+
+def _interval(values: Sequence[float], form: str) -> str:
+    if not values:
+        return "-"
+    around = median_interval(values)
+    middle = format(float(np.median(values)), form)
+    if around is None:
+        return middle
+    return f"{middle} [{around.low:{form}}, {around.high:{form}}]"
+
+
+def draw(rows: Sequence[Row], path: Path) -> None:
+    """Draw the error of every pair by method, medians with their intervals on top."""
+    figure, axes = plt.subplots(figsize=(8.4, 4.4))
+    colours = {PLAIN: "tab:orange", FITTED: "tab:green", PAPER: "tab:blue"}
+    rng = np.random.default_rng(0)
+    for shift, method in zip((-0.24, 0.0, 0.24), colours, strict=True):
+        for k, count in enumerate(COUNTS):
+            values = [
+                r.error
+                for r in rows
+                if (r.method, r.landmarks) == (method, count) and r.error is not None
+            ]
+            if not values:
+                continue
+            at = k + shift
+            spread = rng.uniform(-0.06, 0.06, len(values))
+            axes.plot(at + spread, values, ".", ms=4, color=colours[method], alpha=0.35)
+            around = median_interval(values)
+            if around is not None:
+                axes.plot([at, at], [around.low, around.high], color=colours[method], lw=3)
+            middle = float(np.median(values))
+            label = TITLES[method] if k == 1 else None
+            axes.plot(at, middle, "o", ms=7, mec="white", color=colours[method], label=label)
+    for method, style in ((ORACLE, "--"), (FLOOR, ":")):
+        values = [r.error for r in rows if r.method == method and r.error is not None]
+        axes.axhline(float(np.median(values)), color="0.4", ls=style, lw=1, label=TITLES[method])
+    axes.set_xticks(range(len(COUNTS)), [f"{count} landmarks" for count in COUNTS])
+    axes.set_ylabel("error, % of the outer eye distance")
+    axes.set_yscale("log")
+    axes.set_yticks([0.2, 0.5, 1, 2, 5, 10, 20, 50])
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_formatter(mpl.ticker.NullFormatter())
+    axes.grid(axis="y", alpha=0.3)
+    axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0, -0.1), ncols=2)
+    figure.tight_layout()
+    write(path, lambda file: figure.savefig(file, format="png", dpi=130, metadata={"Software": ""}))
+    plt.close(figure)
+
+
+def csv_of(rows: Sequence[Row]) -> str:
+    """Return the figures of every pair as CSV, errors in percent."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("pair", "kind", "method", "landmarks", "error_percent"))
+    for row in rows:
+        error = "" if row.error is None else f"{row.error:.4f}"
+        writer.writerow((row.pair, row.kind, row.method, row.landmarks, error))
+    return text.getvalue()
+
+
+def main() -> None:
+    """Measure, draw, and fill the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--pairs", type=int, default=30)
+    parser.add_argument("--algorithm", default="cem", help="the map to the disk")
+    chosen = parser.parse_args()
+    rows, modes = measured(chosen.pairs, chosen.algorithm)
+    write_text(PAIRS, csv_of(rows))
+    draw(rows, FIGURE)
+    fill(PAGE, "registration", table(rows, modes))
+
+
+if __name__ == "__main__":
+    main()

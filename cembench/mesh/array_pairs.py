@@ -1,0 +1,91 @@
+"""Which two of a file's arrays are the vertices and the triangles?"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.errors import MeshError
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.soup import Soup
+
+#: Names that are taken before any guess, vertices and triangles.
+USUAL = (("v", "f"), ("V", "F"))
+#: A pair of names is enough for one of these ranges of corners: 1 to n, or 0 to n - 1.
+_COUNTED_FROM = (1, 0)
+
+
+def soup_of_arrays(
+    found: Mapping[str, NDArray[Any]], asked: tuple[str, str] | None, counted_from: int | None
+) -> Soup:
+    """Return the surface in arrays: of the names asked for, the usual ones, or the two that fit.
+
+    Two arrays fit where one is (n, 3) or (n, 2) and the other one (m, 3) with whole numbers, the
+    first vertex and the last among them. Flat vertices are taken where no others
+    fit, and get z = 0.
+
+    Parameters
+    ----------
+    found : mapping of str to array
+        The arrays of numbers of two dimensions.
+    asked : tuple of two str, optional
+        The names of vertices and triangles.
+    counted_from : int or None
+        What the file's first vertex is called, 1 in MATLAB; None where that is to be found out.
+
+    Raises
+    ------
+    MeshError
+        No pair fits, or several do; the message lists the arrays.
+
+    """
+    pair = asked or next((pair for pair in USUAL if set(pair) <= set(found)), None)
+    notices: tuple[Notice, ...] = ()
+    if pair is None:
+        pairs = [(v, f) for v in found for f in found if v != f and _fits(found[v], found[f])]
+        pairs = [pair for pair in pairs if found[pair[0]].shape[1] == 3] or pairs
+        if len(pairs) != 1:
+            fitting = "; ".join(f"{v} and {f}" for v, f in pairs)
+            why = f"several pairs fit: {fitting}" if pairs else "no two of them fit"
+            raise MeshError(
+                f"no variables 'v' and 'f', and {why}. It has: {_listed(found)}. Needed are the "
+                'vertices (n, 3) and the triangles (m, 3); name them, as in arrays=("v2", "f2") of '
+                "cembench.read_mesh."
+            )
+        pair = pairs[0]
+        told = f"the arrays {pair[0]!r} and {pair[1]!r} were taken for vertices and triangles"
+        notices = (Notice(NoticeKind.ARRAYS_GUESSED, told),)
+    for name in pair:
+        if name not in found:
+            raise MeshError(f"there is no variable {name!r}; it has: {_listed(found)}.")
+    v, f = found[pair[0]], found[pair[1]]
+    if v.shape[1] not in (2, 3) or f.shape[1] != 3:
+        raise MeshError(
+            f"{pair[0]!r} must be of shape (n, 3) and {pair[1]!r} of shape (m, 3); they are "
+            f"{v.shape} and {f.shape}."
+        )
+    if v.shape[1] == 2:
+        v = np.column_stack([v, np.zeros(len(v))])
+    first = counted_from if counted_from is not None else int(f.size > 0 and f.min() == 1)
+    if not _whole(f) or (f < first).any():
+        raise MeshError(
+            f"variable {pair[1]!r} must hold whole numbers from {first} on, the triangles' corners."
+        )
+    return Soup.from_arrays(v, f, np.full(len(f), 3), counted_from=first, notices=notices)
+
+
+def _fits(v: NDArray[Any], f: NDArray[Any]) -> bool:
+    if v.shape[1] not in (2, 3) or f.shape[1] != 3 or not len(f) or not _whole(f):
+        return False
+    return any(f.min() == first and f.max() == len(v) - 1 + first for first in _COUNTED_FROM)
+
+
+def _whole(f: NDArray[Any]) -> bool:
+    return bool((np.abs(f.astype(np.float64)) < 2**53).all() and (np.round(f) == f).all())
+
+
+def _listed(found: Mapping[str, NDArray[Any]]) -> str:
+    return ", ".join(f"{name} {array.shape}" for name, array in found.items()) or "none"

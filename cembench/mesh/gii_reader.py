@@ -1,0 +1,35 @@
+"""GIFTI surfaces (`.gii`), as brain imaging has them, through nibabel."""
+
+from __future__ import annotations
+
+import importlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cembench.core.errors import MeshError
+from cembench.core.extras import Extra, require
+from cembench.mesh.soup import Soup, damaged
+
+
+def read_gii(path: Path) -> Soup:
+    """Read the points and the triangles of a GIFTI file."""
+    require(Extra.FORMATS, "reading .gii files", "nibabel")
+    nibabel: Any = importlib.import_module("nibabel")
+
+    try:
+        image = nibabel.gifti.GiftiImage.from_filename(path)
+        points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
+        triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
+        V, F = ([np.asarray(one.data) for one in found] for found in (points, triangles))
+    except Exception as error:  # whatever a library raises on damaged bytes
+        raise damaged(f"it cannot be read as GIFTI: {type(error).__name__}: {error}") from None
+    if len(V) != 1 or len(F) != 1:
+        raise MeshError(
+            f"it holds {len(V)} sets of points and {len(F)} of triangles; one of each is needed. "
+            "Files of measurements (.func.gii, .shape.gii) hold no surface; name the .surf.gii."
+        )
+    if V[0].ndim != 2 or V[0].shape[1] != 3 or F[0].ndim != 2 or F[0].shape[1] != 3:
+        raise damaged(f"its points have shape {V[0].shape} and its triangles {F[0].shape}")
+    return Soup.from_arrays(V[0], F[0], np.full(len(F[0]), 3))

@@ -1,0 +1,48 @@
+"""VTK files, legacy `.vtk` and `.vtu`, through meshio: their triangles, quads and polygons."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from cembench.core.errors import MeshError
+from cembench.core.extras import Extra, require
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.soup import Soup, damaged
+
+#: meshio's names of flat cells whose corners go round.
+_POLYGONS = ("triangle", "quad", "polygon")
+
+
+def read_vtk(path: Path) -> Soup:
+    """Read the flat cells of a file; others, such as lines and tetrahedra, with a notice."""
+    require(Extra.FORMATS, f"reading {path.suffix} files", "meshio")
+    import meshio
+
+    try:
+        mesh = meshio.read(path)
+    except (SystemExit, Exception) as error:  # it ends the process on some damaged files
+        raise damaged(
+            f"it cannot be read as {path.suffix[1:].upper()}: {type(error).__name__}: {error}"
+        ) from None
+    blocks = [b for b in mesh.cells if b.type.rstrip("0123456789") in _POLYGONS and len(b.data)]
+    curved = [b.type for b in blocks if b.type not in _POLYGONS]
+    if curved:
+        raise MeshError(
+            f"it has cells of type {curved[0]}, whose edges are curved; export it with straight "
+            "triangles."
+        )
+    others = {b.type: len(b.data) for b in mesh.cells if b not in blocks and len(b.data)}
+    notices: tuple[Notice, ...] = ()
+    if others:
+        told = ", ".join(f"{count} of type {kind}" for kind, count in others.items())
+        notices = (Notice(NoticeKind.LINES_IGNORED, f"cells that are no faces were left: {told}"),)
+    V = np.asarray(mesh.points, dtype=np.float64)
+    if V.ndim != 2 or V.shape[1] not in (2, 3):
+        raise damaged(f"its points have shape {V.shape}")
+    if V.shape[1] == 2:
+        V = np.column_stack([V, np.zeros(len(V))])
+    faces = [np.asarray(face, dtype=np.int64) for block in blocks for face in block.data]
+    corners = np.concatenate(faces) if faces else np.empty(0, dtype=np.int64)
+    return Soup.from_arrays(V, corners, [len(face) for face in faces], notices=notices)

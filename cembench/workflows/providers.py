@@ -1,0 +1,281 @@
+"""Surfaces by the hundred from what a user can reach: a folder, an archive, Thingi10K.
+
+Each gives its surfaces one after another, made ready for maps: disks and surfaces with holes as
+they are, closed ones of genus 0 cut open. What cannot be used is given too, with the reason, so
+that a count of successes has its denominator.
+"""
+
+from __future__ import annotations
+
+import importlib
+import tarfile
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path, PurePosixPath
+from typing import Any, BinaryIO, cast
+
+from cembench.core.errors import CembenchError, MeshError, ParameterError
+from cembench.mesh.cut import cut_open
+from cembench.mesh.files import read_mesh
+from cembench.mesh.reading import is_named_like_a_mesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+
+#: A member of an archive may have so many bytes.
+LARGEST_MEMBER = 2**31
+#: So many members of an archive are looked at.
+MOST_MEMBERS = 1_000_000
+_PIECE = 2**20
+
+
+@dataclass(frozen=True)
+class Provided:
+    """A surface, or why there is none.
+
+    Parameters
+    ----------
+    name : str
+        What it is called; no two of one provider are called the same.
+    source : str
+        Where it comes from: a path, a member of an archive, a file of Thingi10K.
+    mesh : DiskMesh, HoledMesh or None
+        The surface; None where it cannot be used.
+    error : str
+        Why not.
+    licence : str
+        As the provider states it; "" where it does not.
+    cut : bool
+        Whether it was closed and has been cut open.
+
+    """
+
+    name: str
+    source: str
+    mesh: TriangleMesh | None = None
+    error: str = ""
+    licence: str = ""
+    cut: bool = False
+
+
+def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Provided]:
+    """Give the surfaces of all mesh files in a folder and the folders in it, by path.
+
+    Parameters
+    ----------
+    folder : Path
+        Links to folders are not followed.
+    limit : int, optional
+        So many files at most.
+
+    Raises
+    ------
+    ParameterError
+        It is not a folder.
+
+    Examples
+    --------
+    >>> list(surfaces_of_folder(Path("examples/external")))
+    []
+
+    """
+    if not folder.is_dir():
+        raise ParameterError(f"{folder} is not a folder; name one that holds mesh files.")
+    found = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
+    names = _Names()
+    for path in _first(found, limit):
+        inside = path.relative_to(folder)
+        name = names.of(inside.with_suffix("").as_posix().replace("/", "-"))
+        yield _provided(name, str(path), partial(read_mesh, path, TriangleMesh))
+
+
+def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Provided]:
+    """Give the surfaces of all mesh files in a ZIP or TAR archive, in its order.
+
+    Nothing is unpacked beside the archive: one member at a time lies in a temporary folder, under
+    a name of ours. Links and devices in it are not followed, and a member that grows beyond
+    2 GiB is given up.
+
+    Raises
+    ------
+    ParameterError
+        It is not an archive, or is damaged.
+
+    """
+    names = _Names()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            with closing(_members(path)) as members:
+                for member in _first(members, limit):
+                    yield _unpacked(member, names, Path(folder), path)
+        except (zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, OSError) as error:
+            raise ParameterError(
+                f"{path} cannot be read as an archive ({type(error).__name__}: {error}); name a "
+                "whole .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz file."
+            ) from None
+
+
+def surfaces_of_thingi10k(
+    *,
+    limit: int | None = 100,
+    license: str | None = "creative commons|public domain",
+    num_facets: tuple[int | None, int | None] = (1_000, 200_000),
+    genus: int | None = 0,
+    cache_dir: Path | None = None,
+    **filters: Any,
+) -> Iterator[Provided]:
+    """Give surfaces of Thingi10K, models for 3D printing, through the package `thingi10k`.
+
+    Parameters
+    ----------
+    limit : int, optional
+        So many models at most; the whole set is fetched once, by the package, however many.
+    license : str, optional
+        A regular expression that the licence has to match; None for any. Each model has its own.
+    num_facets : tuple
+        Fewest and most triangles.
+    genus : int, optional
+        Of closed models, which are cut open; None for any that is a manifold, also with boundary.
+    cache_dir : Path, optional
+        Where the package keeps the set.
+    **filters
+        Further ones of `thingi10k.dataset`, such as `category`, `num_boundary_edges`.
+
+    Raises
+    ------
+    ParameterError
+        The package is not installed, or cannot fetch the set.
+
+    """
+    try:
+        thingi10k = importlib.import_module("thingi10k")
+    except ImportError as error:
+        raise ParameterError(
+            f"the package thingi10k is not there ({error}); run `pip install thingi10k`."
+        ) from None
+    wanted = {"license": license, "num_facets": num_facets, "genus": genus, "num_components": 1}
+    try:
+        thingi10k.init(variant="npz", cache_dir=None if cache_dir is None else str(cache_dir))
+        entries = thingi10k.dataset(manifold=True, oriented=True, **(wanted | filters))
+    except TypeError:
+        raise  # an unknown filter: the caller's mistake, told by the package
+    except Exception as error:  # whatever its libraries raise without a network
+        raise ParameterError(
+            f"thingi10k cannot fetch its models: {type(error).__name__}: {error}. Check the "
+            "network, or name a folder that holds them with cache_dir."
+        ) from error
+    for entry in _first(entries, limit):
+        name = f"thingi-{entry['file_id']}"
+        place = entry["file_path"]
+
+        def load(place: str = place, name: str = name) -> TriangleMesh:
+            try:
+                V, F = thingi10k.load_file(place)
+            except (OSError, ValueError) as error:
+                raise MeshError(f"{place}: {error}") from None
+            return TriangleMesh.from_arrays(V, F, name=name)
+
+        yield _provided(name, f"Thingi10K {entry['file_id']}", load, str(entry["license"]))
+
+
+def _provided(
+    name: str, source: str, load: Callable[[], TriangleMesh], licence: str = ""
+) -> Provided:
+    """Load a surface and make it ready for maps, or say why that cannot be done."""
+    try:
+        mesh = load()
+        if mesh.loops:
+            kind = DiskMesh if len(mesh.loops) == 1 else HoledMesh
+            return Provided(name, source, _as(kind, mesh, name), licence=licence)
+        edges = 3 * mesh.m // 2
+        if mesh.n - edges + mesh.m != 2:
+            why = "it is closed, and not one sphere: only closed surfaces of genus 0 are cut"
+            return Provided(name, source, error=why, licence=licence)
+        return Provided(name, source, cut_open(mesh).mesh.renamed(name), licence=licence, cut=True)
+    except CembenchError as error:
+        return Provided(name, source, error=str(error), licence=licence)
+
+
+def _as(kind: type[TriangleMesh], mesh: TriangleMesh, name: str) -> TriangleMesh:
+    return kind.from_arrays(mesh.V, mesh.F, name=name)
+
+
+class _Names:
+    """Names that differ: the second "face" is "face-2"."""
+
+    def __init__(self) -> None:
+        self.taken: set[str] = set()
+
+    def of(self, name: str) -> str:
+        """Return the name, or one with a number."""
+        number, found = 1, name
+        while found in self.taken:
+            number += 1
+            found = f"{name}-{number}"
+        self.taken.add(found)
+        return found
+
+
+def _first(items: Iterable[Any], limit: int | None) -> Iterator[Any]:
+    for count, item in enumerate(items):
+        if limit is not None and count >= limit:
+            return
+        yield item
+
+
+@dataclass(frozen=True)
+class _Member:
+    """A mesh file in an archive: its path there, its declared size, and its bytes."""
+
+    path: PurePosixPath
+    size: int
+    open: Callable[[], BinaryIO]
+
+
+def _members(path: Path) -> Generator[_Member, None, None]:
+    """Give the regular files of an archive that are named like meshes."""
+    if zipfile.is_zipfile(path):
+        with zipfile.ZipFile(path) as archive:
+            for info in archive.infolist()[:MOST_MEMBERS]:
+                inside = PurePosixPath(info.filename)
+                is_link = (info.external_attr >> 28) == 0o12
+                if not info.is_dir() and not is_link and is_named_like_a_mesh(Path(inside.name)):
+                    opened = lambda info=info: cast(BinaryIO, archive.open(info))  # noqa: E731
+                    yield _Member(inside, info.file_size, opened)
+        return
+    with tarfile.open(path) as archive_:
+        for count, member in enumerate(archive_):
+            inside = PurePosixPath(member.name)
+            if count >= MOST_MEMBERS:
+                return
+            if member.isreg() and is_named_like_a_mesh(Path(inside.name)):
+                taken = lambda member=member: cast(BinaryIO, archive_.extractfile(member))  # noqa: E731
+                yield _Member(inside, member.size, taken)
+
+
+def _unpacked(member: _Member, names: _Names, folder: Path, archive: Path) -> Provided:
+    name = names.of(member.path.stem)
+    source = f"{archive}: {member.path}"
+    if member.size > LARGEST_MEMBER:
+        return Provided(name, source, error=f"it has {member.size} bytes, more than allowed")
+    suffix = member.path.suffix.lower()
+    with tempfile.NamedTemporaryFile(dir=folder, suffix=suffix) as file:
+        try:
+            with member.open() as content:
+                left = LARGEST_MEMBER
+                while piece := content.read(_PIECE):
+                    left -= len(piece)
+                    if left < 0:
+                        return Provided(name, source, error="it is larger than it says")
+                    file.write(piece)
+        except (RuntimeError, NotImplementedError) as error:  # encrypted, or packed otherwise
+            return Provided(name, source, error=f"it cannot be unpacked: {error}")
+        file.flush()
+        place = Path(file.name)
+        found = _provided(name, source, lambda: read_mesh(place, TriangleMesh).renamed(name))
+        return Provided(
+            name, source, found.mesh, found.error.replace(str(place), source), cut=found.cut
+        )

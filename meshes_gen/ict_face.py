@@ -1,0 +1,256 @@
+"""Faces of the ICT face model: as many as one wants, with exact correspondence between them."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+from scipy.spatial import KDTree
+
+from cembench.core.errors import ParameterError
+from cembench.core.extras import Extra, require
+from cembench.mesh.soup import Soup
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.registry import surface_family
+
+from .ict_model import EXPRESSIONS, IDENTITIES, FaceModel, load_model
+
+Real = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Part = Literal["face", "narrow", "head", "disk"]
+
+#: How many of the expressions that are there a random one mixes.
+MIXED = 3
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How many of the model's first polygons and vertices a part has, and of what kind it is."""
+
+    polygons: int
+    vertices: int
+    triangles: int
+    kind: type[TriangleMesh]
+
+
+#: The holes of the first three are the eyes and the mouth; the disk has their sockets.
+PARTS: Mapping[str, Extent] = {
+    "narrow": Extent(6_560, 6_706, 13_120, HoledMesh),
+    "face": Extent(9_230, 9_409, 18_460, HoledMesh),
+    "head": Extent(11_144, 11_248, 22_288, HoledMesh),
+    "disk": Extent(14_034, 14_062, 28_068, DiskMesh),
+}
+#: Twenty of the model's 68 landmarks, the most telling first: vertices of every part.
+LANDMARKS: Mapping[str, int] = {
+    "nose_tip": 4_857,
+    "eye_outer_right": 1_507,
+    "eye_outer_left": 3_721,
+    "mouth_corner_right": 5_708,
+    "mouth_corner_left": 6_213,
+    "chin": 966,
+    "eye_inner_right": 1_528,
+    "eye_inner_left": 3_742,
+    "nose_bridge": 978,
+    "nose_base": 1_147,
+    "brow_outer_right": 268,
+    "brow_inner_right": 1_401,
+    "brow_inner_left": 3_615,
+    "brow_outer_left": 2_509,
+    "upper_lip": 0,
+    "lower_lip": 5_518,
+    "jaw_right": 1_719,
+    "jaw_left": 3_924,
+    "nostril_right": 1_140,
+    "nostril_left": 3_360,
+}
+
+
+@dataclass(frozen=True)
+class Triangulation:
+    """The triangles of a part, the same for all samples.
+
+    Parameters
+    ----------
+    kept : int64 (n,)
+        The model's vertices that its vertices are.
+    F : int64 (m, 3)
+        Triangles.
+
+    """
+
+    kept: Ints
+    F: Ints
+
+
+def landmarks(mesh: TriangleMesh) -> dict[str, int]:
+    """Return the vertex of each landmark on a sample of any part and size.
+
+    On a decimated one it is the vertex that lies nearest on the neutral face.
+    """
+    if (mesh.n, mesh.m) in [(one.vertices, one.triangles) for one in PARTS.values()]:
+        return dict(LANDMARKS)
+    for name in PARTS:
+        made = triangulation(name, mesh.m)
+        if np.array_equal(made.F, mesh.F):
+            return landmarks_of(made)
+    raise ParameterError(f"{mesh.name} is no sample of the ICT face model, so it has no landmarks.")
+
+
+def landmarks_of(made: Triangulation) -> dict[str, int]:
+    """Return the vertex of each landmark in a triangulation."""
+    V = load_model().V
+    at = V[made.kept]
+    return {
+        name: int(np.argmin(((at - V[vertex]) ** 2).sum(axis=1)))
+        for name, vertex in LANDMARKS.items()
+    }
+
+
+@surface_family(
+    "ict-face",
+    title="ICT face",
+    source="Li et al., CVPR 2020; github.com/ICT-VGL/ICT-FaceKit, MIT",
+    landmarks=landmarks,
+)
+def ict_face(
+    faces: Annotated[int, Field(ge=2_000)] = 28_068,
+    *,
+    seed: Annotated[int, Field(ge=0)] = 0,
+    expression: str = "neutral",
+    part: Part = "disk",
+) -> TriangleMesh:
+    """A face of a statistical model of scanned people: another one for each seed.
+
+    Every sample of a part has the same triangles, and a vertex is the same place on all of them.
+    `part` "disk" is the head with eye and mouth sockets, one boundary at the neck (28,068
+    triangles); "head", "face" and "narrow" end at the eyes and the mouth, three holes (22,288,
+    18,460 and 13,120). `faces` below that decimates the neutral face (with pymeshlab) and takes the
+    vertices that are left from the sample: they correspond all the same, also between different
+    numbers of `faces`.
+
+    The identity's coefficients are independent standard normal numbers, as the model has it; the
+    k-th goes to identity k, also where others are missing. `expression` is "neutral", "random"
+    (three of those that are there, with weights between 0 and 1), or names as published, with
+    weights: "jawOpen", "mouthSmile" for both sides, "mouthSmile_L:0.5+jawOpen:0.3".
+
+    The model's files are fetched once (``cembench fetch --group ict-face``) or lie in the folder
+    `CEMBENCH_ICT_FACE`; with some of the modes missing the faces vary less.
+    """
+    extent, model = PARTS[part], load_model()
+    made = triangulation(part, faces)
+    V = sample(model, seed, expression)[made.kept]
+    name = "ict-face" + (f"-{seed}" if seed else "")
+    name += "" if expression == "neutral" else f"-{expression}"
+    return extent.kind.from_arrays(V, made.F, name=name)
+
+
+def sample(model: FaceModel, seed: int, expression: str = "neutral") -> Real:
+    """Return the model's vertices (14062, 3) for a seed and an expression.
+
+    Raises
+    ------
+    ParameterError
+        An expression that is unknown or not there, or a weight that is not between 0 and 1.
+
+    """
+    coefficients = np.random.default_rng([seed, 0]).standard_normal(len(IDENTITIES))
+    V = model.V.copy()
+    for name, c in zip(IDENTITIES, coefficients, strict=True):
+        if name in model.identities:
+            V += c * model.identities[name]
+    for name, weight in expression_weights(model, expression, seed).items():
+        V += weight * model.expressions[name]
+    return V
+
+
+def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict[str, float]:
+    """Return the weight of each published expression in one that a user names.
+
+    Raises
+    ------
+    ParameterError
+        An expression that is unknown or not there, or a weight that is not between 0 and 1.
+
+    """
+    if expression == "neutral":
+        return {}
+    if expression == "random":
+        rng = np.random.default_rng([seed, 1])
+        order, weights = rng.permutation(len(EXPRESSIONS)), rng.random(len(EXPRESSIONS))
+        there = [k for k in order.tolist() if EXPRESSIONS[k] in model.expressions]
+        return {EXPRESSIONS[k]: float(weights[k]) for k in there[:MIXED]}
+    found: dict[str, float] = {}
+    for term in expression.split("+"):
+        name, _, given = term.strip().partition(":")
+        weight = _weight(given, expression) if given else 1.0
+        sides = [one for one in (name, f"{name}_L", f"{name}_R") if one in model.expressions]
+        if not sides:
+            known = name in EXPRESSIONS or f"{name}_L" in EXPRESSIONS
+            why = "is not among the files that are there" if known else "is unknown"
+            raise ParameterError(
+                f"ict-face: expression {name!r} {why}; there are: neutral, random"
+                f"{''.join(f', {one}' for one in sorted(model.expressions))}."
+            )
+        found |= dict.fromkeys(sides, weight)
+    return found
+
+
+def _weight(given: str, expression: str) -> float:
+    try:
+        weight = float(given)
+    except ValueError:
+        weight = -1.0
+    if not 0 <= weight <= 1:
+        raise ParameterError(
+            f"ict-face: expression={expression!r}: the weight {given!r} is not a number from 0 to "
+            "1, as in jawOpen:0.5+mouthSmile:0.3."
+        )
+    return weight
+
+
+@functools.lru_cache(maxsize=16)
+def triangulation(part: str, faces: int) -> Triangulation:
+    """Return the triangles of a part, decimated to about `faces` where it has more.
+
+    Edges of the neutral face are collapsed to one of their ends (quadric error metric), so that
+    what is left are vertices of the model.
+
+    Raises
+    ------
+    MissingExtra
+        pymeshlab, which decimates, is not installed.
+
+    """
+    extent, model = PARTS[part], load_model()
+    sizes = model.sizes[: extent.polygons]
+    soup = Soup(model.V[: extent.vertices], model.corners[: sizes.sum()], sizes)
+    F = soup.triangles
+    if faces >= len(F):
+        return Triangulation(np.arange(extent.vertices), F)
+    return Triangulation(*_decimated(soup.V, F, faces))
+
+
+def _decimated(V: Real, F: Ints, faces: int) -> tuple[Ints, Ints]:
+    """Collapse edges to one of their ends; return the vertices that are left, and triangles."""
+    require(Extra.STANDINS, "an ICT face of fewer triangles", "pymeshlab")
+    import pymeshlab  # slow to load
+
+    meshes = pymeshlab.MeshSet(verbose=False)
+    meshes.add_mesh(pymeshlab.Mesh(V, F))
+    meshes.meshing_decimation_quadric_edge_collapse(
+        targetfacenum=faces,
+        optimalplacement=False,  # the vertices that stay are vertices of the model
+        preserveboundary=True,
+        preservenormal=True,
+        preservetopology=True,
+    )
+    made = meshes.current_mesh()
+    made.compact()
+    apart, kept = KDTree(V).query(made.vertex_matrix())
+    assert apart.max() == 0, "a vertex of the decimated face is none of the model's"
+    return kept.astype(np.int64), made.face_matrix().astype(np.int64)
