@@ -111,14 +111,18 @@ def beside(folder: Path) -> Iterable[str]:
 
 
 def ldm_choices(mesh: DiskMesh) -> list[Cells]:
-    """Return LDM's figures for every first boundary vertex, from either copy."""
+    """Return LDM's figures for every first boundary vertex, from the first copy, then the other."""
+    return [*ldm_from(mesh, mirrored=False), *ldm_from(mesh, mirrored=True)]
+
+
+def ldm_from(mesh: DiskMesh, *, mirrored: bool) -> list[Cells]:
+    """Return LDM's figures for every first boundary vertex, the triangle from one copy."""
     found = []
-    for mirrored in (False, True):
-        for first in range(len(mesh.boundary)):
-            try:
-                found.append(cells(mesh, map_numbered(mesh.fresh(), first, mirrored=mirrored)))
-            except AlgorithmFailed:
-                continue
+    for first in range(len(mesh.boundary)):
+        try:
+            found.append(cells(mesh, map_numbered(mesh.fresh(), first, mirrored=mirrored)))
+        except AlgorithmFailed:
+            continue
     return found
 
 
@@ -157,16 +161,25 @@ def nefertiti(folder: Path) -> str:
     found = ldm_choices(mesh)
     said = printed("Nefertiti", "ldm")
     lowest = int(np.argmin(mesh.boundary))
-    first = cells(mesh, map_numbered(mesh.fresh(), lowest)).shown()
+    first, mirrored = (
+        " ".join(cells(mesh, map_numbered(mesh.fresh(), lowest, mirrored=copy)).shown())
+        for copy in (False, True)
+    )
+    spans = [
+        f"{min(one.energy for one in half):.4f} to {max(one.energy for one in half):.4f}"
+        for half in (found[: len(found) // 2], found[len(found) // 2 :])
+    ]
     near = [one for one in found if one.shown()[1:] == said[1:]]
     energies = sorted({one.shown()[0] for one in near})
     return (
         f"LDM on Nefertiti is printed {' '.join(said)}. Over {len(found)} choices E_C runs from "
-        f"{min(one.energy for one in found):.4f} to {max(one.energy for one in found):.4f}; "
-        f"{len(near)} of them give the printed mean and SD, with E_C {', '.join(energies)}. The "
-        f"lowest-numbered vertex, the program's own first, gives {' '.join(first)}; the vertex "
-        f"farthest from the middle, which `ldm` takes (number {farthest_from_mean(mesh)} of the "
-        f"loop), {' '.join(cells(mesh, ldm(mesh.fresh())).shown())}."
+        f"{spans[0]} with the triangle of the first copy, and from {spans[1]} with that of the "
+        f"mirror copy; {len(near)} of them give the printed mean and SD, with E_C "
+        f"{', '.join(energies)}. The lowest-numbered vertex gives {first}, or {mirrored} from the "
+        f"mirror copy; the vertex farthest from the middle, which `ldm` takes (number "
+        f"{farthest_from_mean(mesh)} of the loop), "
+        f"{' '.join(cells(mesh, ldm(mesh.fresh())).shown())}. Each cell of the table is E_C, mean "
+        "and SD."
     )
 
 

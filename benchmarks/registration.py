@@ -270,7 +270,7 @@ def differences(rows: Sequence[Row], one: tuple[str, int], other: tuple[str, int
         key: {r.pair: r.error for r in rows if (r.method, r.landmarks) == key}
         for key in (one, other)
     }
-    both = [(by_pair[one][pair], by_pair[other][pair]) for pair in by_pair[one]]
+    both = [(by_pair[one][pair], by_pair[other].get(pair)) for pair in by_pair[one]]
     return [a - b for a, b in both if a is not None and b is not None]
 
 
