@@ -36,6 +36,7 @@ BISECTIONS = 200
     target="disk",
     source="Orick, Collins & Stephenson, A linearized circle packing algorithm, 2017",
     usual=False,
+    conformal=False,
 )
 def circle_packing(
     mesh: DiskMesh,

@@ -16,6 +16,7 @@ from cembench.registry import algorithm
     title="Harmonic",
     target="disk",
     source="Eq. (10) with a prescribed boundary; Floater & Hormann 2005, Sec. 3",
+    conformal=False,
 )
 def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     """What does one Dirichlet solve give when the boundary keeps its arc length?

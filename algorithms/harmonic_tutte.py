@@ -20,6 +20,7 @@ from cembench.registry import algorithm
     target="disk",
     source="Tutte, How to draw a graph, 1963; the CEM paper, Remark 5",
     usual=False,
+    conformal=False,
 )
 def harmonic_tutte(mesh: DiskMesh) -> Parameterization:
     """What does one Dirichlet solve give that knows the graph of the mesh but not its geometry?

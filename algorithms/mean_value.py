@@ -26,6 +26,7 @@ Real = NDArray[np.float64]
     target="disk",
     source="Floater, Mean value coordinates, 2003; the CEM paper, Remark 5",
     usual=False,
+    conformal=False,
 )
 def mean_value(mesh: DiskMesh) -> Parameterization:
     """What do weights give that know the geometry and are always positive?

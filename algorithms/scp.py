@@ -58,6 +58,9 @@ def scp(
     first two the interior is eliminated: (S - M) z = lambda W z on the boundary alone, S the Schur
     complement of the Laplacian, M the area.
 
+    It is not the map of least angle errors: E_C weighs |mu|^2 by the image's scale squared, so it
+    gives up a little in many triangles for a lot in few large ones.
+
     Decided here: inverse iteration with six vectors and one factor, dense up to 5,000 boundary
     vertices, ends when the vector is within about `tolerance` of its limit: its residual over the
     gap to the next eigenvalue (`eigenvalue`, `residual`, `sweeps`). The image is scaled to area

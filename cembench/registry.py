@@ -129,6 +129,8 @@ class Algorithm(_Registered):
     source: str = ""
     steps: Steps | None = None
     usual: bool = True
+    #: Whether its maps tend to conformal ones as triangles shrink; `validate` holds it to that.
+    conformal: bool = True
     #: The external program that it is, if any; its function is never called then.
     program: Program | None = None
     #: The library of others that its function calls, if any.
@@ -155,6 +157,7 @@ def algorithm(
     notes: str = "",
     steps: Steps | None = None,
     usual: bool = True,
+    conformal: bool = True,
     library: Library | None = None,
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
@@ -175,6 +178,9 @@ def algorithm(
         Takes a mesh, `sweeps` and `outer`, and yields every :class:`MapStep` on the way to the map.
     usual : bool
         Whether a run in which no algorithms are named measures it.
+    conformal : bool
+        Whether its maps tend to conformal ones as the triangles shrink; false for a method that
+        does not promise that, of which `validate` tells the rates without judging them.
     library : Library, optional
         The library of others whose map it is: tables name it, and its version is recorded.
 
@@ -196,6 +202,7 @@ def algorithm(
         "steps": steps,
         "library": library,
         "usual": usual,
+        "conformal": conformal,
     }
 
     def mark(function: C) -> C:

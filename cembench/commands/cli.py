@@ -816,7 +816,8 @@ def _registry_as_json(
         }
 
     def about_algorithm(a: Algorithm) -> dict[str, Any]:
-        return about(a) | {"target": a.target, "takes": a.mesh_type.__name__, "usual": a.usual}
+        more = {"target": a.target, "takes": a.mesh_type.__name__}
+        return about(a) | more | {"usual": a.usual, "conformal": a.conformal}
 
     def about_surface(s: Surface) -> dict[str, Any]:
         known = facts.get(s.name)

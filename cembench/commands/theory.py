@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -88,8 +88,26 @@ def _show(exhibit: Exhibit, run: Path) -> None:
         energies.append([row["name"], *("-" if c is None else f"{c:.6f}" for c in cells)])
     heads = figures(*(f"after {k}" for k in LOOKS), "last")
     out.print(grid([*words("E_C"), *heads], energies, gap=2))
+    _show_certificate(facts["certificate"])
     out.print(exhibit.text, markup=False)
     out.print(f"picture  {place_of(run, exhibit.name, 'theory.png')}", soft_wrap=True, markup=False)
+
+
+def _show_certificate(found: dict[str, Any]) -> None:
+    from cembench.report.render.grid import figures, grid, words
+
+    if "missing" in found:
+        out.print(f"no modulus: {found['missing']}", markup=False)
+        return
+    rows = [
+        ["surface, at least", f"{found['lower']:.5f}", ""],
+        ["surface, at most", f"{found['upper']:.5f}", ""],
+        ["middle of both", f"{found['modulus']:.5f}", f"{found['reciprocal_error']:.1e}"],
+    ]
+    for name, off in found["off"].items():
+        image = "-" if off is None else f"{found['modulus'] * (1 + off):.5f}"
+        rows.append([name, image, "-" if off is None else f"{off:+.1e}"])
+    out.print(grid([*words("four boundary points"), *figures("modulus", "off by")], rows, gap=2))
 
 
 #: Each verb with the examples that its help shows.

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
-from cembench.conformal.metrics import METRICS, MapFigures, Metric
+from cembench.conformal.metrics import METRICS, MapFigures, Metric, computed
 from cembench.conformal.planar import folded_triangles, signed_areas
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -24,7 +24,7 @@ Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
 #: Figures that an atlas has none of: its outline is not meant to be round.
-_NOT_OF_AN_ATLAS = ("boundary_circularity",)
+_NOT_OF_AN_ATLAS = ("boundary_circularity", "common_gauge_energy", "overlap_share")
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +116,6 @@ class AtlasFigures(MapFigures):
         folded = folded_triangles(self.uv, self.mesh.F)
         return np.bincount(self.cut.island[folded], minlength=self.cut.islands).astype(np.int64)
 
-    @cached_property
-    def beltrami(self) -> NDArray[np.float64]:
-        """|mu| of every triangle, (m,): 0 for a conformal one, 1 for one that collapsed."""
-        K = self.dilatations
-        with np.errstate(invalid="ignore"):
-            mu = (K - 1) / (K + 1)
-        return np.where(np.isfinite(K), mu, 1.0)
-
 
 def _atlas(figures: MapFigures) -> AtlasFigures:
     assert isinstance(figures, AtlasFigures)
@@ -152,16 +144,6 @@ ATLAS_METRICS: tuple[Metric, ...] = (
         "folded triangles of the island that has most",
         lambda f: int(_atlas(f).folds.max()),
     ),
-    Metric(
-        "beltrami_mean", "|mu|, mean", "|mu|", "", ".4f", ".6f",
-        "modulus of the Beltrami coefficient: the mean",
-        lambda f: float(_atlas(f).beltrami.mean()),
-    ),
-    Metric(
-        "beltrami_max", "|mu|, largest", "|mu| max", "", ".4f", ".6f",
-        "the same: the largest",
-        lambda f: float(_atlas(f).beltrami.max()),
-    ),
 )  # fmt: skip
 
 
@@ -169,4 +151,4 @@ def atlas_metrics(mesh: TriangleMesh, corners: Complex) -> dict[str, float | int
     """Return every figure that a record of an atlas holds, under the record's keys."""
     figures = AtlasFigures(cut_map(mesh, corners))
     chosen = [metric for metric in METRICS if metric.name not in _NOT_OF_AN_ATLAS]
-    return {metric.name: metric.compute(figures) for metric in (*chosen, *ATLAS_METRICS)}
+    return computed((*chosen, *ATLAS_METRICS), figures)

@@ -6,7 +6,7 @@ are comparable between surfaces, for a free boundary only after scaling the imag
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -15,8 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.beltrami import dilatations as dilatations_between
+from cembench.conformal.gauge import gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import corner_products, half_cotangents
-from cembench.conformal.planar import fitted_circle, folded_triangles, polygon_area
+from cembench.conformal.planar import (
+    fitted_circle,
+    folded_triangles,
+    overlap_share,
+    polygon_area,
+    signed_areas,
+)
+from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -27,6 +35,8 @@ Complex = NDArray[np.complex128]
 LEAST_ENERGY = 1e-9
 #: How many triangles stand for all in :class:`SampledAngleError`.
 SAMPLE = 4_000
+#: How far from the unit circle the boundary of a map to the disk may lie, for a common gauge.
+NEAR_CIRCLE = 1e-3
 
 
 def dirichlet_energy(mesh: TriangleMesh, uv: Complex) -> float:
@@ -141,6 +151,55 @@ def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
     return max((circle.circularity for circle in boundary_circles(mesh, uv)), default=0.0)
 
 
+def surface_areas(mesh: TriangleMesh) -> Real:
+    """What area has each triangle of the surface? Shape (m,)."""
+    return corner_products(mesh.V, mesh.F)[1] / 2
+
+
+def is_disk_map(mesh: TriangleMesh, uv: Complex) -> bool:
+    """Whether the outer boundary lies on the unit circle, to :data:`NEAR_CIRCLE`."""
+    if not mesh.loops:
+        return False
+    outer = max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
+    return bool(np.all(np.abs(np.abs(uv[outer]) - 1) <= NEAR_CIRCLE))
+
+
+def in_common_gauge(mesh: TriangleMesh, uv: Complex) -> Complex:
+    """Move a map to the disk by the Moebius map that brings its mean, weighted by area, to 0.
+
+    Two maps of a surface that differ by a Moebius map of the disk come out alike but for a turn;
+    that of a mesh is taken of its vertices. uv is (n,), its outer boundary on the unit circle.
+
+    Raises
+    ------
+    AlgorithmFailed
+        A vertex lies outside the disk, or all but a point of the surface has collapsed.
+
+    """
+    if not np.abs(uv).max() <= 1 + NEAR_CIRCLE:
+        raise AlgorithmFailed("a vertex lies outside the disk, so that no gauge can be sought")
+    return moved_to_gauge(uv, gauge_measure(mesh, "area", mesh.loops[0]))
+
+
+def area_distortion(mesh: TriangleMesh, uv: Complex) -> tuple[float, float]:
+    """How unequally are areas scaled: mean and standard deviation, over the surface's area?
+
+    The logarithm of each triangle's area in the image over that on the surface, at the scale of the
+    image that is best in least squares: at which these logarithms, weighted by the surface's area,
+    have mean 0. The first figure is the mean of their absolute values, the second their standard
+    deviation, weighted alike. Folded triangles count by their size; infinite if one collapsed.
+    """
+    areas = surface_areas(mesh)
+    held = areas > 0
+    weights = areas[held] / areas[held].sum()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = np.log(np.abs(signed_areas(uv, mesh.F[held]))) - np.log(areas[held])
+    if not np.isfinite(off).all():
+        return float("inf"), float("inf")
+    off -= weights @ off
+    return float(weights @ np.abs(off)), float(np.sqrt(weights @ off**2))
+
+
 class MapFigures:
     """What the metrics of one map are computed from, each part once."""
 
@@ -167,6 +226,56 @@ class MapFigures:
         """Largest over smallest stretch of every triangle, (m,)."""
         return dilatations(self.mesh, self.uv)
 
+    @cached_property
+    def beltrami(self) -> Real:
+        """|mu| of every triangle, (m,): 0 if conformal, 1 if collapsed; as if none was folded."""
+        K = self.dilatations
+        with np.errstate(invalid="ignore"):
+            mu = (K - 1) / (K + 1)
+        return np.where(np.isfinite(K), mu, 1.0)
+
+    @cached_property
+    def beltrami_mean(self) -> float:
+        """The mean of |mu| over the surface's area."""
+        areas = surface_areas(self.mesh)
+        return float(areas @ self.beltrami / areas.sum())
+
+    @cached_property
+    def is_disk_map(self) -> bool:
+        """Whether the outer boundary lies on the unit circle."""
+        return is_disk_map(self.mesh, self.uv)
+
+    @cached_property
+    def centred(self) -> Complex | None:
+        """A map to the disk in the common gauge, another as it is; None if that cannot be had."""
+        if not self.is_disk_map:
+            return self.uv
+        try:
+            return in_common_gauge(self.mesh, self.uv)
+        except AlgorithmFailed:
+            return None
+
+    @cached_property
+    def centred_energy(self) -> float | None:
+        """E_C of a map to the disk in the common gauge; None for a map to another target."""
+        if not self.is_disk_map:
+            return None
+        if self.centred is None:
+            return float("inf")
+        return dirichlet_energy(self.mesh, self.centred) - image_area(self.mesh, self.centred)
+
+    @cached_property
+    def area_distortion(self) -> tuple[float, float]:
+        """Mean and standard deviation; of a map to the disk in the common gauge."""
+        if self.centred is None:
+            return float("inf"), float("inf")
+        return area_distortion(self.mesh, self.centred)
+
+    @cached_property
+    def overlap(self) -> float:
+        """What share of the image lies over other parts of it."""
+        return overlap_share([self.uv[loop] for loop in self.mesh.loops])
+
 
 @dataclass(frozen=True)
 class Metric:
@@ -189,7 +298,8 @@ class Metric:
     meaning : str
         One line for documents.
     compute : callable
-        From :class:`MapFigures` to the number; infinite where it does not exist.
+        From :class:`MapFigures` to the number; infinite where it does not exist, None where it
+        says nothing of such a map, which then has none.
     better : "lower" or None
         Which of two values is better; None where neither is by itself.
     gauge_invariant : bool
@@ -207,7 +317,7 @@ class Metric:
     form: str
     precise: str
     meaning: str
-    compute: Callable[[MapFigures], float | int]
+    compute: Callable[[MapFigures], float | int | None]
     better: Literal["lower"] | None = "lower"
     gauge_invariant: bool = True
     shown: Literal["overview", "page", "record"] = "record"
@@ -265,6 +375,37 @@ METRICS: tuple[Metric, ...] = (
         "distance of a boundary image from its fitted circle, relative to the radius",
         lambda f: boundary_circularity(f.mesh, f.uv),
     ),
+    Metric(
+        "beltrami_area_mean", "|mu|, mean by area", "|mu|", "", ".4f", ".6f",
+        "modulus of the Beltrami coefficient, 0 where conformal: the mean over the surface's area",
+        lambda f: f.beltrami_mean, shown="page",
+    ),
+    Metric(
+        "beltrami_max", "|mu|, largest", "|mu| max", "", ".3f", ".6f",
+        "the same: the largest",
+        lambda f: float(f.beltrami.max()), shown="page",
+    ),
+    Metric(
+        "common_gauge_energy", "E_C in a common gauge", "E_C, gauge", "", ".4f", ".6f",
+        "E_C of a disk after the Moebius map that brings its mean by area to 0",
+        lambda f: f.centred_energy, shown="page",
+    ),
+    Metric(
+        "area_distortion_mean", "area distortion, mean", "area", "", ".3f", ".4f",
+        "log of a triangle's area ratio at the best scale, absolute: the mean by area (disks in "
+        "that gauge)",
+        lambda f: f.area_distortion[0],
+    ),
+    Metric(
+        "area_distortion_sd", "area distortion, SD", "area SD", "", ".3f", ".4f",
+        "the same logarithms: the standard deviation",
+        lambda f: f.area_distortion[1], shown="page",
+    ),
+    Metric(
+        "overlap_share", "overlap of the image", "overlap", "of its area", ".1e", ".1e",
+        "share of the image that lies over other parts of it, by the boundary's winding number",
+        lambda f: f.overlap,
+    ),
 )  # fmt: skip
 
 
@@ -303,4 +444,10 @@ def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
     """Return every figure that a record holds, under the record's keys."""
     figures = MapFigures(mesh, uv)
-    return {metric.name: metric.compute(figures) for metric in METRICS}
+    return computed(METRICS, figures)
+
+
+def computed(metrics: Iterable[Metric], figures: MapFigures) -> dict[str, float | int]:
+    """Return the figures that such a map has, by their names."""
+    found = ((metric.name, metric.compute(figures)) for metric in metrics)
+    return {name: value for name, value in found if value is not None}

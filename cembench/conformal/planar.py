@@ -15,6 +15,8 @@ CERTAIN = (3 + 16 * 2.0**-53) * 2.0**-53
 UNDERFLOW = 1e-280
 #: An angle between neighbours on the unit circle is known to within this many radians.
 ANGLE_ROUNDING = 4 * float(np.finfo(float).eps)
+#: Crossings of boundaries up to which an overlap is measured; how many numbers are held for it.
+MOST_CROSSINGS, AT_ONCE = 20_000, 2_000_000
 
 
 def polygon_area(z: Complex) -> float:
@@ -121,3 +123,59 @@ def crossing_polygons(curves: Sequence[Complex]) -> tuple[int, int] | None:
     for one, other in sorted((int(i), int(j)) for i, j in pairs.T if i < j):
         return one, other
     return None
+
+
+def overlap_share(curves: Sequence[Complex]) -> float:
+    """Return what share of a region lies over other parts of it, by its boundary alone.
+
+    The curves are the closed polygons that bound the region, holes clockwise. A place that they go
+    round w times is covered w times, if nothing is folded: of these, w - 1 are too many. The share
+    is their area over the area of all layers; 0 where the curves do not cross, infinite where
+    they cross more than :data:`MOST_CROSSINGS` times or enclose nothing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> square = np.array([0, 1, 1 + 1j, 1j])
+    >>> overlap_share([square])
+    0.0
+    >>> overlap_share([np.tile(square, 2) + np.repeat([0, 1e-3], 4)]) > 0.49
+    True
+
+    """
+    if crossing_polygons(curves) is None:
+        return 0.0
+    import shapely
+
+    starts = np.concatenate(curves)
+    ends = np.concatenate([np.roll(z, -1) for z in curves])
+    if sum(polygon_area(z) for z in curves) < 0:
+        starts, ends = np.conj(starts), np.conj(ends)
+    sides = shapely.linestrings(
+        np.stack([starts.real, ends.real], axis=1), np.stack([starts.imag, ends.imag], axis=1)
+    )
+    meeting = shapely.STRtree(sides).query(sides, predicate="intersects").shape[1]
+    if (meeting - 3 * len(sides)) / 2 > MOST_CROSSINGS:  # each side meets itself and its neighbours
+        return float("inf")
+    faces = shapely.get_parts(shapely.polygonize([shapely.unary_union(sides)]))
+    inside = shapely.point_on_surface(faces)
+    layers = windings(shapely.get_x(inside) + 1j * shapely.get_y(inside), starts, ends)
+    areas = shapely.area(faces)
+    covered = float((np.maximum(layers, 0) * areas).sum())
+    over = float((np.maximum(layers - 1, 0) * areas).sum())
+    return over / covered if covered > 0 else float("inf")
+
+
+def windings(points: Complex, starts: Complex, ends: Complex) -> NDArray[np.int64]:
+    """How often do closed curves go counter-clockwise round points (k,)?
+
+    The curves are given by their sides, from `starts` to `ends` (b,); no point lies on one.
+    """
+    found = np.empty(len(points), dtype=np.int64)
+    step = max(1, AT_ONCE // len(starts))
+    for k in range(0, len(points), step):
+        a, b = (z - points[k : k + step, None] for z in (starts, ends))
+        left = np.imag(np.conj(a) * b)
+        up, down = (a.imag <= 0) & (b.imag > 0), (a.imag > 0) & (b.imag <= 0)
+        found[k : k + step] = (up & (left > 0)).sum(axis=1) - (down & (left < 0)).sum(axis=1)
+    return found

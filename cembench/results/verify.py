@@ -206,6 +206,12 @@ def different_metrics(
         "dilatation_mean": ROUNDING * worst * worst,
         "dilatation_max": ROUNDING * worst * worst,
         "boundary_circularity": ROUNDING,
+        "beltrami_area_mean": ROUNDING,
+        "beltrami_max": ROUNDING,
+        "common_gauge_energy": ROUNDING * size,
+        "area_distortion_mean": ROUNDING * worst,  # of areas, which slivers have few digits of
+        "area_distortion_sd": ROUNDING * worst,
+        "overlap_share": ROUNDING,
     }
     differing = []
     for name, found in computed.items():

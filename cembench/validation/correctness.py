@@ -7,12 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cembench.conformal.certificate import certify
 from cembench.conformal.metrics import (
     all_metrics,
     boundary_circularity,
     flipped_triangles,
     image_area,
 )
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.running.judge import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
@@ -62,11 +64,22 @@ def examine_correctness(solver: Solver, registry: Registry) -> list[ValidationFi
         return findings
     findings += [keeps_orientation(maps), *boundary_findings(solver.algorithm, maps), folds(maps)]
     findings += list(_invariances(solver, uneven))
+    limits: list[ValidationFinding] = []
     for one in series:
-        findings += [energy_vanishes(one), angles_improve(one)]
+        limits += [energy_vanishes(one), angles_improve(one)]
+        if solver.algorithm.target == "disk":
+            limits.append(keeps_the_modulus(one))
         if one.surface.exact_map is not None and solver.algorithm.target != "free boundary":
-            findings.append(reaches_the_exact_map(one))
-    return findings
+            limits.append(reaches_the_exact_map(one))
+    return findings + (limits if solver.algorithm.conformal else [told_alone(f) for f in limits])
+
+
+def told_alone(finding: ValidationFinding) -> ValidationFinding:
+    """The same of an algorithm that does not promise a conformal limit: told, not judged."""
+    if finding.ok:
+        return finding
+    measured = f"{finding.measured}; it does not promise a conformal map"
+    return finding.model_copy(update={"ok": True, "measured": measured})
 
 
 def maps_known_surfaces(maps: Sequence[CheckedMap]) -> ValidationFinding:
@@ -186,6 +199,30 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
         "Moebius map",
         remedy="the limit is not the conformal map of this surface: check the boundary's images.",
     )
+
+
+def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
+    """Is the modulus of four boundary points that of the surface, within its error certificate?"""
+    pairs = [(certify(_disk(m.mesh)), _uv(m)) for m in series.maps]
+    off = [found.off(uv[found.corners]) for found, uv in pairs]
+    finest, uv = pairs[-1]
+    return ValidationFinding(
+        stage="correctness",
+        name="modulus",
+        ok=finest.encloses(uv[finest.corners]),
+        measured=f"on {series.surface.name} off by {', '.join(f'{o:+.1e}' for o in off)}; "
+        f"reciprocal error {', '.join(f'{c.reciprocal_error:.1e}' for c, _ in pairs)}",
+        allowed="on the finest triangulation between the two bounds of the surface's own modulus: "
+        f"{finest.lower:.4f} to {finest.upper:.4f}",
+        remedy="a conformal map keeps the cross ratio of four boundary points: check where the "
+        "boundary goes on the circle.",
+    )
+
+
+def _disk(mesh: TriangleMesh) -> DiskMesh:
+    if not isinstance(mesh, DiskMesh):
+        raise TypeError(f"{mesh.name} is no disk")
+    return mesh
 
 
 def _invariances(solver: Solver, uneven: CheckedMap) -> Iterator[ValidationFinding]:

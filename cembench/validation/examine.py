@@ -116,6 +116,7 @@ def examine(
         algorithm=algorithm.name,
         title=algorithm.title,
         target=algorithm.target,
+        conformal=algorithm.conformal,
         source=_source(solver),
         parameters=algorithm.arguments(solver.parameters),
         command=asked.command,

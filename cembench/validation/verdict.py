@@ -39,6 +39,8 @@ class Validation(BaseModel):
     target: str
     source: Printable
     parameters: dict[str, Any]
+    #: Whether it promises maps that tend to conformal ones.
+    conformal: bool = True
     command: Printable
     environment: str
     findings: tuple[ValidationFinding, ...]
@@ -81,7 +83,7 @@ def sentence(validation: Validation) -> str:
     """The verdict in words."""
     if not validation.valid:
         return _invalid(validation.faults)
-    parts = ["valid"]
+    parts = ["valid" if validation.conformal else "valid; not conformal, which it does not promise"]
     several = len(validation.against) > 1
     for against in validation.against:
         parts.append(_energy_words(against))

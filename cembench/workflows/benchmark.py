@@ -95,7 +95,12 @@ class Run:
     def _repr_html_(self) -> str:
         from cembench.conformal.metrics import METRICS
 
-        names = ("conformal_energy", "angle_error_mean_deg", "flipped_triangles")
+        names = (
+            "conformal_energy",
+            "angle_error_mean_deg",
+            "flipped_triangles",
+            "beltrami_area_mean",
+        )
         shown = [metric for metric in METRICS if metric.name in names]
         heads = ["surface", "algorithm", "status", "seconds", *(m.title for m in shown)]
         lines = []

@@ -80,6 +80,8 @@ class Trajectory:
         How far any iterate lay off the unit circle.
     out_of_order : int
         The largest number of arcs that ran backward in any iterate.
+    boundary : complex128 (B,)
+        The last iterate.
 
     """
 
@@ -88,6 +90,7 @@ class Trajectory:
     largest_gap: float
     off_circle: float
     out_of_order: int
+    boundary: Complex
 
     @property
     def rises(self) -> Real:
@@ -192,7 +195,7 @@ def trajectory(K: BoundaryOperator, iterations: int, *, inversion: bool) -> Traj
         energies.append(K.energy(f_i, f_b))
         gap, backward = max(gap, _largest_gap(f_b)), max(backward, backward_arcs(f_b))
         off = max(off, float(np.abs(np.abs(f_b) - 1).max()))
-    return Trajectory(np.array(energies), np.array(steps), gap, off, backward)
+    return Trajectory(np.array(energies), np.array(steps), gap, off, backward, f_b)
 
 
 def _largest_gap(f_b: Complex) -> float:

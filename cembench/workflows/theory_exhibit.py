@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +52,7 @@ def examine_theory(
                 alternative=_summary(facts),
             ),
         ),
-        tables=_tables(found.premises, found.statements, facts["energies"]),
+        tables=_tables(found.premises, found.statements, facts),
         facts=facts,
     )
     write_exhibit(run, exhibit)
@@ -78,7 +78,7 @@ def _summary(facts: dict[str, Any]) -> str:
 
 
 def _tables(
-    given: Sequence[Check], said: Sequence[Check], energies: list[dict[str, Any]]
+    given: Sequence[Check], said: Sequence[Check], facts: dict[str, Any]
 ) -> tuple[ExhibitTable, ...]:
 
     def of(title: str, checks: Sequence[Check]) -> ExhibitTable:
@@ -91,9 +91,20 @@ def _tables(
 
     columns = ("iteration", *(f"after {k}" for k in LOOKS), "last", "iterations")
     keys = ("name", *(f"after_{k}" for k in LOOKS), "last", "iterations")
-    rows = tuple(tuple(row[key] for key in keys) for row in energies)
+    rows = tuple(tuple(row[key] for key in keys) for row in facts["energies"])
     return (
         of("Premises", given),
         of("Statements", said),
         ExhibitTable(title="Conformal energy E_C", columns=columns, rows=rows),
+        *_certificate_table(facts["certificate"]),
     )
+
+
+def _certificate_table(found: dict[str, Any]) -> Iterator[ExhibitTable]:
+    if "missing" in found:
+        return
+    keys = ("lower", "upper", "modulus", "reciprocal_error")
+    rows = [(key.replace("_", " "), found[key]) for key in keys]
+    rows += [(f"{name}: off by", value) for name, value in found["off"].items()]
+    title = "Modulus of the surface with four boundary points"
+    yield ExhibitTable(title=title, columns=("what", "figure"), rows=tuple(rows))

@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
+from cembench.conformal.certificate import certify
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm, load_registry
@@ -118,9 +121,29 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
         "rises_23": _rises(plain),
         "rises_30": _rises(inverse),
         "energies": _energies(paths, others),
+        "certificate": _certificate(mesh, paths, K.start()),
     }
     spectrum = (K.spectrum() if dense else leading).tolist()
     return TheoryFacts(facts, tuple(given), tuple(said), paths, others, spectrum, missing)
+
+
+def _certificate(mesh: DiskMesh, paths: Mapping[str, Trajectory], start: Any) -> dict[str, Any]:
+    """The modulus of the surface with four boundary points, and how far CEM's maps are from it."""
+    try:
+        found = certify(mesh)
+    except AlgorithmFailed as error:
+        return {"missing": str(error)}
+    place = [int(np.flatnonzero(mesh.boundary == corner)[0]) for corner in found.corners]
+    ends = {"CEM, start": start} | {name: path.boundary for name, path in paths.items()}
+    off = {name: found.off(z[place]) for name, z in ends.items()}
+    return {
+        "corners": found.corners.tolist(),
+        "lower": found.lower,
+        "upper": found.upper,
+        "modulus": found.modulus,
+        "reciprocal_error": found.reciprocal_error,
+        "off": {name: value if np.isfinite(value) else None for name, value in off.items()},
+    }
 
 
 def _rises(path: Any) -> dict[str, float | int]:

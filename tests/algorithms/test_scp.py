@@ -10,6 +10,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench import AlgorithmFailed
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.files import read_mesh
+from cembench.registry import load_registry
 from tests.real_meshes import DISKS, real_mesh
 
 
@@ -75,7 +76,47 @@ def test_its_energy_is_below_that_of_two_pins_on_real_surfaces(name):
     mesh = read_mesh(real_mesh(name))
     least, pinned = (all_metrics(mesh, f(mesh).uv) for f in (scp, lscm))
     assert least["conformal_energy"] < pinned["conformal_energy"]
-    assert least["angle_error_mean_deg"] < pinned["angle_error_mean_deg"]
+    # On Nefertiti 0.7 % above, as the map of libigl has it too; below on all others.
+    assert least["angle_error_mean_deg"] < 1.015 * pinned["angle_error_mean_deg"]
+
+
+def quotient(mesh, z):
+    """What it minimises, computed from the triangles alone: E_C over the boundary's spread."""
+    F = mesh.F
+    energy = 0.0
+    for t in F:
+        a, b, c = mesh.V[t]
+        x = np.linalg.norm(b - a)
+        y = np.dot(c - a, b - a) / x
+        plane = np.array([[0, 0], [x, 0], [y, np.sqrt(np.dot(c - a, c - a) - y**2)]])
+        J = np.stack([z[t[1:]].real - z[t[0]].real, z[t[1:]].imag - z[t[0]].imag])
+        J = J @ np.linalg.inv(plane[1:].T)
+        s = np.linalg.svd(J, compute_uv=False) * [1, np.sign(np.linalg.det(J))]
+        energy += 0.25 * x * plane[2, 1] * (s[0] - s[1]) ** 2
+    on = z[mesh.boundary]
+    return energy / np.sum(np.abs(on - on.mean()) ** 2)
+
+
+@pytest.mark.parametrize("name", ["uneven", "nefertiti.obj"])
+def test_no_free_boundary_has_less_energy_for_its_constraint(name):
+    mesh = uneven(150) if name == "uneven" else read_mesh(real_mesh(name))
+    known = load_registry().algorithms.values()
+    free = [a for a in known if a.target == "free boundary" and a.library is None]
+    assert len(free) >= 7
+    of = {a.name: quotient(mesh, a.function(mesh.fresh(), **a.arguments({})).uv) for a in free}
+    assert min(of, key=of.get) == "scp"
+    assert of["lscm"] > 1.01 * of["scp"]
+
+
+def test_where_its_angles_are_above_those_of_two_pins_so_are_libigl_s():
+    """Nefertiti: energy 4 % below and angles above, in a program that shares no code with ours."""
+    mesh = read_mesh(real_mesh("nefertiti.obj"))
+    UV = igl.spectra.lscm(mesh.V, mesh.F)
+    theirs = UV[:, 0] + 1j * UV[:, 1]
+    theirs, pinned = all_metrics(mesh, theirs), all_metrics(mesh, lscm(mesh).uv)
+    energies = [m["conformal_energy"] / abs(m["image_area"]) for m in (theirs, pinned)]
+    assert energies[0] < 0.98 * energies[1]
+    assert theirs["angle_error_mean_deg"] > pinned["angle_error_mean_deg"]
 
 
 def test_a_long_boundary_is_solved_for_with_the_interior(monkeypatch):

@@ -1,7 +1,7 @@
 import numpy as np
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from benchmarks.field import cell, disks, figures, tables
+from benchmarks.field import cell, disks, figures, seconds_table, tables, timed
 from cembench import DiskMesh
 from cembench.mesh.files import write_mesh
 from cembench.registry import load_registry
@@ -21,6 +21,7 @@ def test_a_map_a_refusal_and_folds_have_their_cells():
     assert "join boundary vertices" in refused["cause"]
     assert cell(refused, "mean") == "-"
     assert cell({"status": "invalid", "folds": 3}, "mean") == "3 folds"
+    assert cell({"status": "ok", "mean": 1.5, "overlap": 0.2}, "mean") == "1.5*"
 
 
 def test_tables_have_a_row_a_surface_and_a_column_an_algorithm(tmp_path):
@@ -32,6 +33,19 @@ def test_tables_have_a_row_a_surface_and_a_column_an_algorithm(tmp_path):
     known = [ALGORITHMS["bff"], ALGORITHMS["scp"]]
     kept = {name: {"triangles": mesh.m, "maps": {a.name: figures(a, mesh) for a in known}}}
     text = "\n".join(tables(kept, known))
-    assert text.count("| one.obj |") == 4
+    assert text.count("| one.obj |") == 8
     assert "| surface | triangles | bff |" in text
     assert "| surface | triangles | scp |" in text
+
+
+def test_the_cost_is_told_beside_direct_cem_s_and_a_refusal_is_a_dash(tmp_path):
+    write_mesh(tmp_path / "chinese_lion.obj", DiskMesh.from_arrays(*gallery.flat_rectangle(2, 6)))
+    known = [ALGORITHMS[name] for name in ("direct-cem", "harmonic-circle", "cetm")]
+    costs = timed(tmp_path, known, 60.0)
+    assert list(costs) == ["chinese_lion.obj"]
+    assert costs["chinese_lion.obj"]["direct-cem"]["seconds"] > 0
+    costs["chinese_lion.obj"]["harmonic-circle"] = {"seconds": 0.1234, "ratio": 0.5}
+    costs["chinese_lion.obj"]["cetm"] = None
+    lines = seconds_table(costs, known).splitlines()
+    assert lines[0] == "| algorithm | target | chinese_lion.obj, s | / direct-cem |"
+    assert lines[3:] == ["| `harmonic-circle` | disk | 0.123 | 0.50 |", "| `cetm` | disk | - | - |"]

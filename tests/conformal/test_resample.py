@@ -4,9 +4,12 @@ from cembench.surfaces.holed_disk import holed_disk
 from cembench.surfaces.spherical_cap import spherical_cap
 from scipy import special
 
-from cembench import ParameterError
+from cembench import DiskMesh, ParameterError
 from cembench.conformal.resample import geometry_image, locate, regular_remesh, square_to_disk
+from cembench.mesh.triangle_mesh import definition_1_notices
 from cembench.mesh.unit_square import to_unit_square
+from cembench.registry import load_registry
+from tests import gallery
 
 
 @pytest.fixture(scope="module")
@@ -110,3 +113,15 @@ def test_a_map_that_is_not_onto_the_disk_is_refused(cap):
     mesh, z = cap
     with pytest.raises(ParameterError, match="off the unit circle by up to 1"):
         regular_remesh(mesh, 2 * z, 9)
+
+
+def test_a_remeshed_surface_meets_definition_1():
+    """Section 2: "Otherwise, a remeshing process can be applied to reach the conditions"."""
+    i, j, F = gallery.grid(8, 8)  # two of its corners are ears, without an interior neighbour
+    V = np.stack([j / 8, i / 8, 0.2 * np.sin(i / 3.0) * np.cos(j / 4.0)], 1)
+    mesh = DiskMesh.from_arrays(V, F)
+    assert definition_1_notices(mesh.F, mesh.n, mesh.loops)
+    z = load_registry().algorithm("direct-cem").function(mesh).uv
+    again, image = regular_remesh(mesh, z, 24)
+    assert definition_1_notices(again.F, again.n, again.loops) == ()
+    assert len(image) == again.n

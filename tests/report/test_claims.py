@@ -1,12 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.spherical_cap import spherical_cap
 
-from cembench.report.content.claims import CLAIMS, claims, efficiency, iteration
+from cembench.conformal.laplacian import cotangent_laplacian
+from cembench.conformal.metrics import all_metrics, dilatations
+from cembench.registry import load_registry
+from cembench.report.content.claims import CLAIMS, claims, efficiency, iteration, premises, start
 from cembench.report.content.claims.premises import spectrum_of_iteration
 from cembench.report.content.claims.verdicts import verdict_of
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
+from cembench.results.records import Cell, Outcome, Record
+from tests import gallery
 from tests.report.small_run import write_run
 
 
@@ -94,3 +102,91 @@ def test_the_iteration_matrix_of_a_delaunay_cap_is_as_the_theorem_says():
     assert first == pytest.approx(1, abs=1e-10)
     assert second < 1 - 1e-3
     assert np.isfinite(second)
+
+
+def test_the_claims_on_the_start_hold_and_say_with_what_figures(found):
+    for name in ("any-index", "schur-start", "convex-hull"):
+        assert found[name].verdict == "holds", found[name].figures
+    counted = "(18) takes 1 factorisation and 2 real columns solved, (21) 1 and 3"
+    assert counted in found["schur-start"].figures
+    assert "near p" in found["distortion-near-p"].figures
+    assert found["distortion-near-p"].verdict == "does not hold here"
+    assert found["other-weights"].verdict == "holds"
+
+
+@pytest.mark.parametrize("k", [0, 5, -1])
+def test_the_schur_complement_and_any_pin_give_the_least_squares_solution(k):
+    """Against the dense pseudo-inverse of the singular L (Eq. 13)."""
+    mesh = spherical_cap(300)
+    L, rhs, corners = start.start_system(mesh)
+    exact = np.linalg.pinv(L.toarray(), hermitian=True) @ rhs
+    f = start.pinned(start.Solved(), L, rhs, k % mesh.n)
+    g = start.condensed(start.Solved(), L, rhs, corners, k % mesh.n)
+    assert (f[k], g[k]) == (0, 0)
+    assert start.apart(exact, f) < 1e-10
+    assert start.apart(exact, g) < 1e-10
+    assert start.apart(exact, exact + 0.1 * exact.real) > 0.01  # a difference is seen
+
+
+def test_on_a_flat_disk_the_map_with_a_pole_has_mu_z_squared():
+    """1 / z + conj(z) solves Eq. 11 there: conformal at the pole, a fold at the boundary."""
+    off, near, rim = [], [], []
+    for mesh in map(flat_disk, (600, 2400, 9600)):
+        L, rhs, _ = start.start_system(mesh)
+        f = start.pinned(start.Solved(), L, rhs, 0)
+        z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+        K = dilatations(mesh, f)
+        middle = np.abs(z[mesh.F].mean(axis=1))
+        between = (middle > 0.4) & (middle < 0.9)
+        off.append(np.abs((K - 1) / (K + 1) - middle**2)[between].mean())
+        figures = start.near_and_at_boundary(mesh)
+        near, rim = [*near, figures[0]], [*rim, figures[1]]
+    np.testing.assert_allclose(np.log2(np.array(off[:-1]) / off[1:]), 1, atol=0.15)
+    assert near[0] > 1.3 * near[1] > 1.3**2 * near[2]  # what is left there is the mesh's
+    assert 60 < rim[0] < rim[1] < rim[2]
+
+
+def test_points_leave_their_convex_hull_where_a_weight_is_negative():
+    mesh = spherical_cap(300)
+    K = premises.iteration_matrix_of(mesh, cotangent_laplacian(mesh.V, mesh.F))
+    assert premises.largest_escape(K) <= 0
+    K[0, :2] += [-0.5, 0.5]
+    assert K.min() < 0
+    np.testing.assert_allclose(K.sum(axis=1), 1)
+    assert premises.largest_escape(K - 2 * (K - np.eye(len(K)))) > 0.01
+
+
+def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
+    """Holes that are circles, and the same with one of them pulled out."""
+    mesh = gallery.three_holes()
+    uv = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    hole = next(loop for loop in mesh.loops if 0 < np.abs(uv[loop]).max() < 0.99)
+    pulled = uv.copy()
+    pulled[hole] = uv[hole].mean() + 1.2 * (uv[hole] - uv[hole].mean()).real
+    pulled[hole] += 1j * (uv[hole] - uv[hole].mean()).imag
+    koebe = load_registry().algorithm("koebe-cem")
+    records = []
+    for z in (uv, pulled):
+        cell = Cell(
+            algorithm="koebe-cem", code_hash="c", mesh="holes", mesh_hash=mesh.hash, solves="reuse"
+        )
+        facts = evidence.records[0].mesh
+        records.append(
+            Record(
+                cell=cell,
+                title=koebe.title,
+                target=koebe.target,
+                mesh=facts,
+                outcome=Outcome(status="ok", metrics=all_metrics(mesh, z)),
+                environment="machine",
+                started_at="2026-01-01T00:00:00+00:00",
+            )
+        )
+    for chosen, verdict in (
+        (records[:1], "holds"),
+        (records[1:], "does not hold here"),
+        (records, "holds in part"),
+    ):
+        claim = premises.circular_holes(replace(evidence, records=tuple(chosen)), {})
+        assert claim.verdict == verdict
+        assert "holes / " in claim.figures

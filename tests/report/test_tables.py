@@ -6,6 +6,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.other_targets import other_targets
 from cembench.report.content.policies import policies_table
 from cembench.report.content.printed_beside_measured import significant
+from cembench.report.content.surface_page import figures_table
 from cembench.report.content.table_1 import table_1
 from cembench.report.content.table_2 import averages_table, measured_rates, table_2
 from cembench.report.content.table_3 import table_3
@@ -72,6 +73,35 @@ def test_maps_to_other_targets_are_in_no_table_of_disks(evidence):
     assert not any("LSCM" in column.group for table in tables for column in table.columns)
     apart = other_targets(evidence)
     assert {row[2].text for row in apart.rows} == {"free boundary"}
+    titles = [column.title for column in apart.columns]
+    assert {"|mu|", "area SD", "overlap"} <= set(titles)
+    done = [row for row in apart.rows if row[3].text == "ok"]
+    assert done
+    assert all(0 < row[titles.index("|mu|")].number < 1 for row in done)
+
+
+def test_a_surface_page_compares_disks_in_a_common_gauge_and_gives_free_boundaries_none(evidence):
+    surface = evidence.surfaces[0]
+    table = figures_table(evidence, surface, "here")
+    column = [c.title for c in table.columns].index("E_C, gauge")
+    energies = {row[0].text: row[column] for row in table.rows if row[2].text == "ok"}
+    assert energies["LSCM *"].text == "-"
+    assert energies["LSCM *"].why == "the map does not go to the disk"
+    assert energies["CEM"].number > 0
+
+
+def test_a_record_older_than_a_figure_has_a_gap_there(evidence):
+    record = next(r for r in evidence.records if r.outcome.status == "ok")
+    kept = dict(record.outcome.metrics)
+    record.outcome.metrics = {k: v for k, v in kept.items() if k != "beltrami_area_mean"}
+    try:
+        surface = next(s for s in evidence.surfaces if s.mesh_hash == record.cell.mesh_hash)
+        table = figures_table(evidence, surface, "here")
+        column = [c.title for c in table.columns].index("|mu|")
+        whys = [row[column].why for row in table.rows if row[2].text == "ok"]
+        assert whys.count("not measured") == 1
+    finally:
+        record.outcome.metrics = kept
 
 
 def test_other_algorithms_and_surfaces_have_tables_of_their_own(evidence):

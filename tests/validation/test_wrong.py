@@ -1,10 +1,13 @@
 """Each wrong solver is caught by the check that is meant for it."""
 
+import functools
+
 import pytest
 
 from cembench.registry import load_registry
 from cembench.validation.contract import examine_contract
 from cembench.validation.correctness import examine_correctness
+from cembench.validation.verdict import Validation, sentence
 from tests.validation.in_this_process import solver_here
 
 WRONG = "tests/validation/wrong.py"
@@ -31,6 +34,7 @@ CAUGHT_BY = {
 }
 
 
+@functools.cache
 def examined(name, plugin=WRONG):
     solver = solver_here(name, plugin)
     findings = examine_contract(solver, load_registry())
@@ -54,6 +58,50 @@ def test_the_right_check_catches_it(name):
 )
 def test_the_built_in_conformal_maps_are_right(name):
     assert [f.measured for f in examined(name, None) if not f.ok] == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("scp", "bff", "bff-free", "cetm", "cetm-free", "cetm-flips", "abf-linear", "abf++"),
+        *("circle-packing", "angenent-haker", "gu-yau", "harmonic-tutte", "mean-value"),
+    ],
+)
+def test_the_families_of_the_field_are_right(name):
+    assert [f.measured for f in examined(name, None) if not f.ok] == []
+
+
+def test_rates_are_told_and_not_judged_where_no_conformal_map_is_promised():
+    found = {finding.name: finding for finding in examined("harmonic-circle", None)}
+    assert all(finding.ok for finding in found.values())
+    for name in ("E_C under refinement", "angle error under refinement", "modulus"):
+        assert found[name].measured.endswith("; it does not promise a conformal map")
+    # The same maps under another name promise it.
+    assert not all(finding.ok for finding in examined("not-conformal"))
+    validation = Validation(
+        algorithm="harmonic-circle",
+        title="Harmonic",
+        target="disk",
+        source="",
+        parameters={},
+        conformal=False,
+        command="",
+        environment="",
+        findings=tuple(found.values()),
+    )
+    assert sentence(validation) == "valid; not conformal, which it does not promise"
+
+
+def test_the_modulus_of_four_points_is_told_with_its_certificate():
+    told = [f.measured for f in examined("right") if f.name == "modulus"]
+    assert [line.split(" off by")[0] for line in told] == ["on spherical-cap", "on hemi-ellipsoid"]
+    for line in told:
+        off, gaps = (
+            [float(x) for x in part.split(",")]
+            for part in line.split(" off by ")[1].split("; reciprocal error ")
+        )
+        assert max(map(abs, off)) < 0.02 < gaps[2] < gaps[1] < gaps[0]
 
 
 def test_a_solver_without_a_fault_has_none():

@@ -9,6 +9,7 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench import DiskMesh, Parameterization, algorithm
 from cembench.core.errors import AlgorithmFailed
 from cembench.results.exhibits import read_exhibits
+from cembench.workflows import theory_facts
 from cembench.workflows.theory import (
     TOLERANCE,
     BoundaryOperator,
@@ -148,3 +149,27 @@ def test_bad_input_is_named_and_nothing_is_written(arguments, message, cli):
     assert (code, out) == (2, "")
     assert message in err
     assert [path.name for path in cli.folder.iterdir()] == ["tube.obj"]
+
+
+def test_the_certificate_is_told_in_json_and_in_eighty_columns(cli):
+    arguments = ["theory", "spherical-cap", "--faces", "600", "--iterations", "60"]
+    code, out, _ = cli(*arguments, "--json")
+    assert code == 0
+    found = json.loads(out)[0]["certificate"]
+    assert found["lower"] < found["modulus"] < found["upper"]
+    assert found["reciprocal_error"] == pytest.approx(found["upper"] / found["lower"] - 1)
+    start, end = found["off"]["CEM, start"], found["off"]["CEM, step (30)"]
+    assert abs(end) < 2e-3 < abs(start) < 0.05
+    code, out, _ = cli(*arguments)
+    assert code == 0
+    table = out[out.index("four boundary points") :]
+    assert f"{found['lower']:.5f}" in table
+    assert f"{found['off']['CEM, start']:+.1e}" in table
+    told = [line for line in out.splitlines() if not line.startswith("picture")]
+    assert max(map(len, told)) <= 80
+
+
+def test_a_surface_without_four_boundary_points_has_no_certificate():
+    V = np.array([[0, 0, 0], [4, 0, 0], [2, 3, 0], [2, 1, 0]], float)
+    mesh = DiskMesh.from_arrays(V, np.array([[0, 1, 3], [1, 2, 3], [2, 0, 3]]))
+    assert "four are needed" in theory_facts._certificate(mesh, {}, None)["missing"]

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from cembench.conformal.metrics import metrics_shown
+from cembench.conformal.metrics import METRICS
 from cembench.report.content.evidence import DISK, Evidence
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.document import Column, Table, Value, words
 
 #: What means the same for every target.
-_COMPARABLE = tuple(metric for metric in metrics_shown("overview") if metric.gauge_invariant)
+_COMPARABLE = tuple(
+    metric
+    for metric in METRICS
+    if (metric.shown == "overview" and metric.gauge_invariant)
+    or metric.name in ("beltrami_area_mean", "area_distortion_sd", "overlap_share")
+)
 
 
 def other_targets(evidence: Evidence) -> Table | None:

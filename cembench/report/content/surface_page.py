@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cembench.conformal.metrics import metrics_shown
+from cembench.conformal.metrics import Metric, metrics_shown
 from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
 from cembench.report.content.figures.angle_histograms import histogram
 from cembench.report.content.figures.energy_by_iteration import history_panel
@@ -118,7 +118,10 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
         tuple(rows),
         "Seconds are the median of the rounds, ±% is half the width of its 95 % interval; "
         "dilatation is the largest over the smallest stretch of a triangle, in the mean and at "
-        "most; memory is what the call adds.",
+        "most; |mu| is the Beltrami coefficient's modulus, its mean by the surface's area. E_C of "
+        "a disk changes with its Moebius image: 'E_C, gauge' is that of the one whose mean by area "
+        "lies at 0, and compares between methods, as area SD does, the standard deviation of "
+        "log area ratios (of disks in that gauge). Memory is what the call adds.",
         tuple(dict.fromkeys(causes)),
     )
 
@@ -149,12 +152,20 @@ def _line(
     ]
     for metric in _METRICS:
         number = outcome.metrics.get(metric.name)
-        lacking = "infinite" if metric.name in outcome.metrics else "not measured"
+        lacking = "infinite" if metric.name in outcome.metrics else _absent(record, metric)
         cells.append(value(number, metric.text(number), lacking))
     memory = outcome.memory_increase_bytes
     mib = None if memory is None else memory / 2**20
     cells.append(value(mib, f"{mib or 0:,.0f}"))
     return tuple(cells)
+
+
+def _absent(record: Record, metric: Metric) -> str:
+    """Why a record has no such figure: the map has none, or it is older than the figure."""
+    free = record.target in ("free boundary", "atlas")
+    if free and metric.name == "common_gauge_energy":
+        return "the map does not go to the disk"
+    return "not measured"
 
 
 def _plot(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, name: str) -> Plot | None:

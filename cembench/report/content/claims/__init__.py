@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from cembench.report.content.claims import accuracy, efficiency, iteration, premises
+from cembench.report.content.claims import accuracy, efficiency, iteration, premises, start
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
@@ -13,9 +13,14 @@ from cembench.report.document import Claim
 CLAIMS: tuple[Callable[[Evidence, Mapping[str, Inspection]], Claim], ...] = (
     premises.delaunay,
     premises.well_conditioned,
+    start.distortion_near_pole,
+    start.any_index,
+    start.schur_complement,
     iteration.inversion_converges_better,
     iteration.energy_decreases_monotonically,
     premises.iteration_matrix,
+    premises.convex_hull,
+    premises.other_weights,
     premises.circular_holes,
     accuracy.no_folding,
     accuracy.angles_preserved,

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
 from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.core.notices import Notice, NoticeKind, of_kind
-from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.topology import vertex_graph
+from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.report.content.claims.verdicts import tested_on, verdict_of
-from cembench.report.content.evidence import Evidence
+from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
 
 Inspections = Mapping[str, Inspection]
+#: How far out of a convex hull of size 1 rounding may bring a point.
+ROUNDING = 1e-12
 #: The eigenvalues of K are computed densely, on surfaces up to so many vertices.
 DENSE = 3_000
 
@@ -91,12 +96,104 @@ def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Claim:
 
 def spectrum_of_iteration(mesh: TriangleMesh) -> tuple[float, float, float]:
     """The smallest entry of K (Eq. 27), and the moduli of its two largest eigenvalues."""
-    L = cotangent_laplacian(mesh.V, mesh.F).toarray()
+    return _spectrum(iteration_matrix_of(mesh, cotangent_laplacian(mesh.V, mesh.F)))
+
+
+def iteration_matrix_of(mesh: TriangleMesh, L: sparse.sparray) -> NDArray[np.float64]:
+    """K (Eq. 27) of any Laplacian on the edges of the mesh, dense (B, B)."""
+    dense = L.toarray()
     i, b = mesh.interior, mesh.loops[0]
-    inner = np.linalg.solve(L[np.ix_(i, i)], L[np.ix_(i, b)])
-    K = np.linalg.solve(L[np.ix_(b, b)], L[np.ix_(i, b)].T @ inner)
+    inner = np.linalg.solve(dense[np.ix_(i, i)], dense[np.ix_(i, b)])
+    return np.linalg.solve(dense[np.ix_(b, b)], dense[np.ix_(i, b)].T @ inner)
+
+
+def _spectrum(K: NDArray[np.float64]) -> tuple[float, float, float]:
     moduli = np.sort(np.abs(np.linalg.eigvals(K)))
     return float(K.min()), float(moduli[-1]), float(moduli[-2])
+
+
+def _small_disks(evidence: Evidence) -> Iterator[tuple[MeasuredSurface, TriangleMesh]]:
+    for surface in evidence.surfaces:
+        mesh = evidence.mesh(surface) if surface.vertices <= DENSE else None
+        if mesh is not None and len(mesh.loops) == 1 and len(mesh.interior):
+            yield surface, mesh
+
+
+def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does K map boundary points into their convex hull (Remark 4)?"""
+    out: dict[MeasuredSurface, float] = {}
+    for surface, mesh in _small_disks(evidence):
+        K = iteration_matrix_of(mesh, cotangent_laplacian(mesh.V, mesh.F))
+        out[surface] = largest_escape(K)
+    held = sum(escape <= ROUNDING for escape in out.values())
+    listed = "; ".join(f"{s.title}: {escape:.1e}" for s, escape in out.items())
+    return Claim(
+        "convex-hull",
+        "the matrix K, defined as in Theorem 2, maps all the entries of a vector f to their "
+        "convex hull",
+        "Remark 4",
+        "Of points on the unit circle and of hundred random sets, no image lies outside their "
+        "convex hull by more than rounding; the largest distance is given.",
+        listed or f"No surface of at most {DENSE:,} vertices is kept in this run.",
+        verdict_of(held, len(out)),
+        f"{tested_on(list(out))} It follows from K > 0 and K 1 = 1, so it can fail where a weight "
+        "is negative.",
+    )
+
+
+def largest_escape(K: NDArray[np.float64], sets: int = 100) -> float:
+    """How far outside the convex hull of f can K f lie, over sets of points f of size 1?"""
+    n = len(K)
+    rng = np.random.default_rng(0)
+    points = np.exp(2j * np.pi * np.arange(n) / n)[:, None]
+    points = np.hstack(
+        [points, rng.standard_normal((n, sets)) + 1j * rng.standard_normal((n, sets))]
+    )
+    points /= np.abs(points).max(axis=0)
+    images = K @ points
+    # A point lies in the hull if it is nowhere farther out than the points themselves.
+    turns = np.exp(-1j * np.linspace(0, 2 * np.pi, 64, endpoint=False))
+    found = ((turn * images).real.max(axis=0) - (turn * points).real.max(axis=0) for turn in turns)
+    return float(max(escape.max() for escape in found))
+
+
+def other_weights(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does Corollary 1 hold for any positive weights (Remark 5)?"""
+    held, tested, parts = 0, [], []
+    for surface, mesh in _small_disks(evidence):
+        if definition_1_notices(mesh.F, mesh.n, mesh.loops):
+            continue
+        tested.append(surface)
+        found = [_spectrum(iteration_matrix_of(mesh, L)) for L in _positive_laplacians(mesh)]
+        good = all(
+            least > 0 and abs(first - 1) < 1e-9 and second < 1 for least, first, second in found
+        )
+        held += good
+        parts.append(
+            f"{surface.title}: next eigenvalue {', '.join(f'{second:.4f}' for *_, second in found)}"
+        )
+    return Claim(
+        "other-weights",
+        "Corollary 1 can be generalized to the Laplacian matrix of weighted graphs with positive "
+        "weights that satisfies the conditions (i)-(iv) in Definition 1",
+        "Remark 5",
+        "K > 0, its largest eigenvalue 1 and all others smaller, with the weight 1 on every edge "
+        "(Tutte) and with random weights from 0.01 to 100, on each small surface that satisfies "
+        "Definition 1.",
+        "; ".join(parts) or f"No such surface of at most {DENSE:,} vertices is kept in this run.",
+        verdict_of(held, len(tested)),
+        tested_on(tested),
+    )
+
+
+def _positive_laplacians(mesh: TriangleMesh) -> Iterator[sparse.csc_array]:
+    """Laplacians with weights 1, and random ones, on the edges of the mesh."""
+    edges = sparse.triu(sparse.csr_array(vertex_graph(mesh.F, mesh.n)), k=1)
+    rng = np.random.default_rng(0)
+    for weights in (np.ones(edges.nnz), 10 ** rng.uniform(-2, 2, edges.nnz)):
+        upper = sparse.coo_array((weights, (edges.row, edges.col)), shape=edges.shape)
+        W = upper + upper.T
+        yield sparse.csc_array(sparse.diags_array(W.sum(axis=0)) - W)
 
 
 def circular_holes(evidence: Evidence, inspections: Inspections) -> Claim:

@@ -1,0 +1,185 @@
+"""Claims about the linear map that CEM starts from (Section 3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from cembench.conformal.boundary_iteration import pole
+from cembench.conformal.laplacian import cotangent_laplacian
+from cembench.conformal.metrics import angle_errors
+from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.report.content.claims.verdicts import tested_on, verdict_of
+from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.inspection import Inspection
+from cembench.report.document import Claim
+
+Inspections = Mapping[str, Inspection]
+Complex = NDArray[np.complex128]
+#: The start is solved for anew on surfaces up to so many vertices.
+MOST_VERTICES = 20_000
+#: Two solutions are the same where they differ by less, relative to their size.
+SAME = 1e-8
+#: Share of the triangles that count as near p, and their least number.
+NEAR, LEAST_NEAR = 0.01, 10
+
+
+class Solved:
+    """Solutions with symmetric matrices, and what they took, counted."""
+
+    def __init__(self) -> None:
+        self.factorisations = 0
+        self.columns = 0
+
+    def __call__(self, A: sparse.sparray, rhs: NDArray[Any]) -> NDArray[Any]:
+        """A^-1 rhs, rhs (k,) or (k, columns); a complex column is two real ones."""
+        self.factorisations += 1
+        width = 1 if rhs.ndim == 1 else rhs.shape[1]
+        self.columns += width * (2 if np.iscomplexobj(rhs) else 1)
+        return np.asarray(Cholesky(sparse.csc_array(A)).solve(rhs))
+
+
+def pinned(solve: Solved, L: sparse.csr_array, rhs: Complex, k: int) -> Complex:
+    """Eq. 18 with any index: the solution of L f = rhs that is 0 at k (Theorem 1)."""
+    u = np.delete(np.arange(L.shape[0]), k)
+    f = np.zeros(L.shape[0], dtype=np.complex128)
+    f[u] = solve(L[u][:, u], rhs[u])
+    return f
+
+
+def condensed(
+    solve: Solved, L: sparse.csr_array, rhs: Complex, w: NDArray[np.int64], zero: int
+) -> Complex:
+    """Eq. 21: the solution of the same system, 0 at `zero`, by the Schur complement of L_ww.
+
+    By Woodbury's formula: L_vv is solved with for the three columns of L_vw, then a system of order
+    3 remains, which is singular as L is; its least solution is taken.
+    """
+    v = np.setdiff1d(np.arange(L.shape[0]), w)
+    L_vw = L[v][:, w].toarray()
+    inverse = solve(L[v][:, v], L_vw)
+    capacity = L[w][:, w].toarray() - L_vw.T @ inverse
+    f = np.empty(L.shape[0], dtype=np.complex128)
+    f[w] = np.linalg.pinv(capacity, rcond=1e-10, hermitian=True) @ rhs[w]
+    f[v] = -(inverse @ f[w])
+    return f - f[zero]
+
+
+def start_system(mesh: TriangleMesh) -> tuple[sparse.csr_array, Complex, NDArray[np.int64]]:
+    """L, b (Eqs. 6, 14) and the corners of the triangle with the pole."""
+    corners, values = pole(mesh.V, mesh.F)
+    rhs = np.zeros(mesh.n, dtype=np.complex128)
+    rhs[corners] = values
+    return sparse.csr_array(cotangent_laplacian(mesh.V, mesh.F)), rhs, corners
+
+
+def apart(f: Complex, g: Complex) -> float:
+    """How far apart are two solutions that differ by a constant, relative to their size?"""
+    difference = f - g
+    difference = difference - difference.mean()
+    return float(np.abs(difference).max() / np.abs(f - f.mean()).max())
+
+
+def _disks(evidence: Evidence) -> Iterator[tuple[MeasuredSurface, TriangleMesh]]:
+    for surface in evidence.surfaces:
+        mesh = evidence.mesh(surface) if surface.vertices <= MOST_VERTICES else None
+        if mesh is not None and len(mesh.loops) == 1:
+            yield surface, mesh
+
+
+def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Can any vertex be pinned (Theorem 1)?"""
+    off: dict[MeasuredSurface, float] = {}
+    for surface, mesh in _disks(evidence):
+        L, rhs, corners = start_system(mesh)
+        indices = (mesh.n - 1, 0, int(corners[0]), int(mesh.loops[0][0]), mesh.n // 2)
+        first, *others = (pinned(Solved(), L, rhs, k) for k in indices)
+        off[surface] = max(apart(first, f) for f in others)
+    held = sum(value <= SAME for value in off.values())
+    return Claim(
+        "any-index",
+        "the linear system Lf = b in (13) can be reduced into a nonsingular one by removing the "
+        "k-th entries ... Here the index k can be chosen as any number",
+        "Theorem 1",
+        "The last, the first and the middle vertex, one of the pole's and one of the boundary give "
+        f"the same map up to a constant, within {SAME:g} of its size.",
+        f"so on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
+        if off
+        else f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        verdict_of(held, len(off)),
+        tested_on(list(off)),
+    )
+
+
+def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Does (21) give the same as (18), for more work?"""
+    off: dict[MeasuredSurface, float] = {}
+    less, work = 0, ""
+    for surface, mesh in _disks(evidence):
+        L, rhs, corners = start_system(mesh)
+        one, other = Solved(), Solved()
+        f = pinned(one, L, rhs, mesh.n - 1)
+        off[surface] = apart(f, condensed(other, L, rhs, corners, mesh.n - 1))
+        less += one.factorisations <= other.factorisations and one.columns < other.columns
+        work = (
+            f"; (18) takes {one.factorisations} factorisation and {one.columns} real columns "
+            f"solved, (21) {other.factorisations} and {other.columns}"
+        )
+    same = sum(value <= SAME for value in off.values())
+    return Claim(
+        "schur-start",
+        "the linear systems (18) and (21) are mathematically equivalent. However ... solving Eq. "
+        "(18) is slightly more efficient than Eq. (21)",
+        "Section 3.1, below Eq. (21)",
+        f"Both give the same map up to a constant, within {SAME:g} of its size; and (18) factors "
+        "no more matrices and solves for fewer columns: counted, not timed.",
+        f"the same on {same} of {len(off)} surfaces, at most {max(off.values()):.1e} apart{work}"
+        if off
+        else f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        verdict_of(min(same, less), len(off)),
+        f"{tested_on(list(off))} (21) is solved by Woodbury's formula, as the paper says it can "
+        "be: three columns, of orders that differ by two.",
+    )
+
+
+def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
+    """Is the angular distortion of the map (12) large near p and small at the boundary?"""
+    ratios: dict[MeasuredSurface, tuple[float, float]] = {}
+    for surface, mesh in _disks(evidence):
+        ratios[surface] = near_and_at_boundary(mesh)
+    held = sum(near > rim for near, rim in ratios.values())
+    listed = "; ".join(
+        f"{s.title}: {near:.1f} near p, {rim:.2f} at the boundary"
+        for s, (near, rim) in ratios.items()
+    )
+    return Claim(
+        "distortion-near-p",
+        "the angular distortion of the map f in (12) is relatively large around the neighborhood "
+        "of p ... so that the angular distortion is relatively small on the boundary",
+        "Section 3.1, below Eq. (12)",
+        f"In degrees, the mean over the {NEAR:.0%} of the triangles nearest to p (at least "
+        f"{LEAST_NEAR}) is above that over the triangles at the boundary.",
+        listed or f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        verdict_of(held, len(ratios)),
+        f"{tested_on(list(ratios))} On a flat disk with p in its middle Eq. (11) with the natural "
+        "boundary has the solution 1 / z + conj(z), whose |mu| is |z|^2: conformal at p, where "
+        "only the mesh is too coarse for a pole, and a fold at the boundary. It is the boundary's "
+        "image alone that is right there, and all that CEM takes from it.",
+    )
+
+
+def near_and_at_boundary(mesh: TriangleMesh) -> tuple[float, float]:
+    """Mean angular distortion of the map (12) in degrees: near p, and at the boundary."""
+    L, rhs, corners = start_system(mesh)
+    f = pinned(Solved(), L, rhs, mesh.n - 1)
+    errors = angle_errors(mesh, f).mean(axis=1)
+    middle = mesh.V[corners].mean(axis=0)
+    away = np.linalg.norm(mesh.V[mesh.F].mean(axis=1) - middle, axis=1)
+    near = np.argsort(away)[: max(LEAST_NEAR, round(NEAR * mesh.m))]
+    rim = np.isin(mesh.F, mesh.loops[0]).any(axis=1)
+    return float(errors[near].mean()), float(errors[rim].mean())
