@@ -168,6 +168,9 @@ class Round(BaseModel):
     calls: Annotated[tuple[CallSeconds, ...], Field(min_length=1)]
     #: Seconds by phase of the call that is the round's figure; they add up to it.
     phases: dict[str, Seconds] = Field(default_factory=dict)
+    #: CPU seconds of the process and of all it started, of the call whose seconds are the figure;
+    #: None where the system does not tell, and in records older than this field.
+    cpu_seconds: Seconds | None = None
     #: SHA-256 of the last call's map.
     uv_hash: str | None = None
     #: Of each timed call, whether its map has the same bits as the checked one.

@@ -10,7 +10,7 @@ from __future__ import annotations
 import gc
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -45,6 +45,7 @@ from cembench.running.external.call import ProgramCalls
 from cembench.running.external.present import library_version, missing
 from cembench.running.judge import faults, remarks
 from cembench.running.memory import Memory, memory_of_call
+from cembench.running.processor import processor_now
 from cembench.running.quality import quality_notes
 from cembench.running.returned import (
     hash_of,
@@ -139,7 +140,7 @@ def time_cell(
     call = _call(algorithm, mesh, cell)
     try:
         with linear_algebra(cell.solves, cell.backend):
-            timings, maps = _timed(call, mesh, algorithm.target)
+            timings, maps, used = _timed(call, mesh, algorithm.target)
         start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
     except BaseException as error:
         return outcome_of_error(error, mesh)
@@ -155,7 +156,7 @@ def time_cell(
         return not_ok("invalid", *problems)
     hashes = [hash_of(uv) for uv in maps if not isinstance(uv, Fault)]
     same = tuple(found == checked.uv_hash for found in hashes)
-    found = _program_round(_round(timings), call, len(timings), start)
+    found = _program_round(_round(timings, used), call, len(timings), start)
     return found.model_copy(update={"uv_hash": hashes[-1], "same_bits": same})
 
 
@@ -176,21 +177,23 @@ def _program_round(measured: Round, call: Call, calls: int, start: float | None)
 
 def _timed(
     call: Call, mesh: TriangleMesh, target: str
-) -> tuple[list[Timing], list[Complex | Fault]]:
-    """Return the timed calls, and the map of each as it was right after the call."""
-    found, timing = _without_collector(call)
+) -> tuple[list[Timing], list[Complex | Fault], list[float]]:
+    """Return the timed calls, the map of each as it was right after it, and its CPU seconds."""
+    found, timing, used = _with_processor(call)
     if timing.total > LONG_CALL:
-        return [timing], [map_of(found, mesh, target)]
+        return [timing], [map_of(found, mesh, target)], [used]
     timings: list[Timing] = []
     maps: list[Complex | Fault] = []
+    processor: list[float] = []
     gc.collect()
     gc.freeze()  # collecting again looks at what is new, and leaves the rest out of the caches
     while len(timings) < ENOUGH_CALLS and sum(t.total for t in timings) < ENOUGH_SECONDS:
-        found, timing = _without_collector(call)
+        found, timing, used = _with_processor(call)
         timings.append(timing)
         maps.append(map_of(found, mesh, target))
+        processor.append(used)
     gc.unfreeze()
-    return timings, maps
+    return timings, maps, processor
 
 
 def _other_maps(
@@ -298,10 +301,21 @@ def _without_collector(call: Call) -> tuple[Any, Timing]:
         gc.enable()
 
 
-def _round(timings: list[Timing]) -> Round:
-    middle = sorted(timings, key=lambda timing: timing.total)[(len(timings) - 1) // 2]
+def _with_processor(call: Call) -> tuple[Any, Timing, float]:
+    """Call; the CPU seconds besides, of a program those of its process and what that started."""
+    before = processor_now()
+    found, timing = _without_collector(call)
+    after = processor_now()
+    if isinstance(call, ProgramCalls):
+        return found, timing, after.others - before.others
+    return found, timing, after.total - before.total
+
+
+def _round(timings: list[Timing], used: Sequence[float] = ()) -> Round:
+    middle = sorted(range(len(timings)), key=lambda k: timings[k].total)[(len(timings) - 1) // 2]
     calls = tuple(timing.total for timing in timings)
-    return Round(calls=calls, phases=middle.phases)
+    processor = max(0.0, used[middle]) if used else None
+    return Round(calls=calls, phases=timings[middle].phases, cpu_seconds=processor)
 
 
 def _with_memory(outcome: Outcome, memory: Memory) -> Outcome:

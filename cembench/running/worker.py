@@ -24,6 +24,7 @@ from cembench.results.records import Cell, Outcome, Round
 from cembench.running.external.call import use_folder
 from cembench.running.measure import Checked, check_cell, time_cell
 from cembench.running.process import die_with_parent, limit_memory
+from cembench.running.processor import keep_orphans
 
 #: What the geometry loads where it needs it, because it takes a tenth of a second.
 _LOADED_LATE = ("igl", "scipy.optimize")
@@ -65,6 +66,7 @@ def main(path: Path) -> None:
     """Do the job that the file describes."""
     job = Job.model_validate_json(path.read_bytes())
     die_with_parent(job.parent)
+    keep_orphans()
     load_libraries()
     if job.memory_bytes is not None:
         limit_memory(job.memory_bytes)
