@@ -35,6 +35,7 @@ BISECTIONS = 200
     target="disk",
     source="Orick, Collins & Stephenson, A linearized circle packing algorithm, 2017",
     usual=False,
+    combinatorial=True,
 )
 def circle_packing(
     mesh: DiskMesh,

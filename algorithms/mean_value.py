@@ -14,6 +14,7 @@ from cembench.conformal.laplacian import corner_products
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.work import count_analysis, count_columns, count_factorisation
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
@@ -54,6 +55,9 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
         factor = linalg.splu(
             A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
+    count_analysis()
+    count_factorisation(A.shape[0], lambda: int(factor.nnz))
+    count_columns(2)
     with phase("solves"):
         z[i] = factor.solve(right.real) + 1j * factor.solve(right.imag)
     z, repair = accepted_repair(mesh, z, interior_without_folds(mesh, z))

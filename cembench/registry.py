@@ -133,6 +133,8 @@ class Algorithm(_Registered):
     program: Program | None = None
     #: The library of others that its function calls, if any.
     library: Library | None = None
+    #: Its map depends on the triangles alone, not on the coordinates.
+    combinatorial: bool = False
 
 
 @dataclass(frozen=True)
@@ -156,6 +158,7 @@ def algorithm(
     steps: Steps | None = None,
     usual: bool = True,
     library: Library | None = None,
+    combinatorial: bool = False,
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
 
@@ -177,6 +180,9 @@ def algorithm(
         Whether a run in which no algorithms are named measures it.
     library : Library, optional
         The library of others whose map it is: tables name it, and its version is recorded.
+    combinatorial : bool
+        Whether its map depends on the triangles alone, so that another shape has the same one: what
+        another method returns unchanged for another shape is taken for a kept result.
 
     The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
     Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
@@ -196,6 +202,7 @@ def algorithm(
         "steps": steps,
         "library": library,
         "usual": usual,
+        "combinatorial": combinatorial,
     }
 
     def mark(function: C) -> C:

@@ -7,10 +7,12 @@ tree of processes. On Linux this process becomes the parent of descendants whose
 
 from __future__ import annotations
 
+import os
 import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from threading import get_native_id
 from time import process_time, thread_time
 
 import psutil
@@ -29,6 +31,8 @@ class Processor:
     process: float
     #: Of the processes it has started, directly or not.
     others: float
+    #: How many other threads, of this process and of those, run or wait for a processor.
+    running: int = 0
 
     @property
     def total(self) -> float:
@@ -41,10 +45,16 @@ class Processor:
         return self.total - self.thread
 
 
-def processor_now() -> Processor:
-    """How many CPU seconds were used until now? Outside what is timed: it takes a look at /proc."""
-    others = _of_children()
-    return Processor(thread_time(), process_time(), others)
+def before_call() -> Processor:
+    """How many CPU seconds were used until now? The look at other processes comes first."""
+    others, running = _of_children(), others_running()
+    return Processor(thread_time(), process_time(), others, running)
+
+
+def after_call() -> Processor:
+    """The same, and the look at other processes comes last."""
+    process, thread = process_time(), thread_time()
+    return Processor(thread, process, _of_children(), others_running())
 
 
 def keep_orphans() -> None:
@@ -54,6 +64,29 @@ def keep_orphans() -> None:
     import ctypes
 
     ctypes.CDLL(None).prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+
+
+def others_running() -> int:
+    """How many threads run, or would, but the one that asks? Those of descendants are counted."""
+    count = running_threads(os.getpid(), get_native_id())
+    if _has_children():
+        with suppress(psutil.Error):
+            tree = psutil.Process().children(recursive=True)
+            count += sum(running_threads(one.pid) for one in tree)
+    return count
+
+
+def running_threads(pid: int, but: int = 0) -> int:
+    """How many of a process's threads run or wait for a processor? 0 where nobody tells (Linux)."""
+    count = 0
+    with suppress(OSError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            if int(task.name) == but:
+                continue
+            with suppress(OSError):
+                state = (task / "stat").read_text().rpartition(")")[2].split()[0]
+                count += state == "R"
+    return count
 
 
 def _of_children() -> float:
