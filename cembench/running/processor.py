@@ -19,6 +19,8 @@ import psutil
 
 #: The option of ``prctl`` that makes a process the parent of orphans below it.
 _SET_CHILD_SUBREAPER = 36
+#: The state in /proc of a thread that runs, or waits for a processor.
+_RUNS = "R"
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ def running_threads(pid: int, but: int = 0) -> int:
                 continue
             with suppress(OSError):
                 state = (task / "stat").read_text().rpartition(")")[2].split()[0]
-                count += state == "R"
+                count += state == _RUNS
     return count
 
 
