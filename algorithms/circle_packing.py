@@ -37,6 +37,7 @@ BISECTIONS = 200
     source="Orick, Collins & Stephenson, A linearized circle packing algorithm, 2017",
     usual=False,
     conformal=False,
+    combinatorial=True,
 )
 def circle_packing(
     mesh: DiskMesh,

@@ -14,6 +14,7 @@ from cembench.conformal.laplacian import corner_products
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.work import count_analysis, count_columns, count_factorisation
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
@@ -53,6 +54,9 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
         right = rows[:, b] @ z[b]
     with phase("factorisation"):
         factor = _factored(A)
+    count_analysis()
+    count_factorisation(A.shape[0], lambda: int(factor.nnz))
+    count_columns(2)
     with phase("solves"):
         z[i] = factor.solve(right.real) + 1j * factor.solve(right.imag)
     z, repair = accepted_repair(mesh, z, interior_without_folds(mesh, z))

@@ -135,6 +135,8 @@ class Algorithm(_Registered):
     program: Program | None = None
     #: The library of others that its function calls, if any.
     library: Library | None = None
+    #: Its map depends on the triangles alone, not on the coordinates.
+    combinatorial: bool = False
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,7 @@ def algorithm(
     usual: bool = True,
     conformal: bool = True,
     library: Library | None = None,
+    combinatorial: bool = False,
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
 
@@ -183,6 +186,9 @@ def algorithm(
         does not promise that, of which `validate` tells the rates without judging them.
     library : Library, optional
         The library of others whose map it is: tables name it, and its version is recorded.
+    combinatorial : bool
+        Whether its map depends on the triangles alone, so that another shape has the same one: what
+        another method returns unchanged for another shape is taken for a kept result.
 
     The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
     Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
@@ -203,6 +209,7 @@ def algorithm(
         "library": library,
         "usual": usual,
         "conformal": conformal,
+        "combinatorial": combinatorial,
     }
 
     def mark(function: C) -> C:

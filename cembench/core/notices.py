@@ -43,6 +43,8 @@ class NoticeKind(StrEnum):
     #: Timed calls returned other bits than the checked one.
     NOT_DETERMINISTIC = "not_deterministic"
     PROCESSES_LEFT = "processes_left"
+    #: The first call of a process took far longer than the later ones.
+    COLD_FIRST_CALL = "cold_first_call"
     #: What is to be known of the seconds of an external program.
     PROGRAM_SECONDS = "program_seconds"
 

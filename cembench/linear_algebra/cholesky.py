@@ -22,6 +22,7 @@ from cembench.core.errors import NotPositiveDefinite, ParameterError
 from cembench.core.extras import Extra, command
 from cembench.linear_algebra.backends import Backend, available_backends, default_backend
 from cembench.linear_algebra.real_columns import by_real_columns
+from cembench.linear_algebra.work import count_columns
 
 Solves = Literal["reuse", "backslash"]
 
@@ -132,6 +133,7 @@ class Cholesky:
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """A x = b; b (n,) or (n, k), real or complex; x alike."""
         factor = self._kept or _factor(self._how.backend, self._A, None)
+        _count(b)
         with phase("solves"):
             return by_real_columns(factor.solve, b)
 
@@ -139,6 +141,7 @@ class Cholesky:
         """A[:leading, :leading] x = b; b (leading,) or (leading, k), real or complex; x alike."""
         if self._leading is None:
             raise ValueError("solve_leading needs the order of the leading block at construction")
+        _count(b)
         if self._kept is not None:
             with phase("solves"):
                 return by_real_columns(self._kept.solve_leading, b)
@@ -171,6 +174,7 @@ class Cholesky:
             with phase("solves"):
                 found = self._kept.condensed(b)
             if found is not None:
+                _count(b, 0.5)
                 return found
         return b[k:] - sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
 
@@ -181,6 +185,7 @@ class Cholesky:
         """
         k = self._leading
         if self._kept is not None and self._kept.schur_factor() is not None:
+            _count(x, 0.5)
             with phase("solves"):
                 return by_real_columns(self._kept.extended, x)
         return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
@@ -205,7 +210,9 @@ class Cholesky:
             S = self._A[k:, k:].toarray()
             for first in range(0, E.shape[0], _COLUMNS_AT_ONCE):
                 chosen = slice(first, first + _COLUMNS_AT_ONCE)
-                S[:, chosen] -= E @ solve(E[chosen].toarray().T)
+                right = E[chosen].toarray().T
+                _count(right)
+                S[:, chosen] -= E @ solve(right)
             try:
                 return np.asfortranarray(np.linalg.cholesky((S + S.T) / 2))
             except np.linalg.LinAlgError:
@@ -216,6 +223,12 @@ class Cholesky:
     def _leading_factor(self) -> _Factor:
         block = sparse.csc_array(self._A[: self._leading, : self._leading])
         return _factor(self._how.backend, block, None)
+
+
+def _count(b: NDArray[Any], share: float = 1.0) -> None:
+    """Count the real columns of right-hand sides (n,) or (n, k)."""
+    columns = b.size // max(1, len(b))
+    count_columns(share * columns * (2 if np.iscomplexobj(b) else 1))
 
 
 def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:

@@ -17,8 +17,9 @@ from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
-from cembench.linear_algebra.supernodes import trailing_block
+from cembench.linear_algebra.supernodes import factor_entries, trailing_block
 from cembench.linear_algebra.triangular import triangle_times
+from cembench.linear_algebra.work import count_analysis, count_factorisation
 
 # Codes of `cholmod.solve`: the whole system, and its four steps.
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
@@ -44,6 +45,7 @@ class CholmodFactor:
             _set_options()
             cholmod.options["postorder"] = self._leading is None
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
+            count_analysis()
 
     def _factor(self) -> None:
         self._trailing: NDArray[np.float64] | None = None
@@ -56,6 +58,7 @@ class CholmodFactor:
                     f"the matrix of order {self._lower.size[0]} is not positive definite "
                     f"(Cholesky pivot {error})"
                 ) from None
+            count_factorisation(self._lower.size[0], lambda: factor_entries(self._symbolic))
 
     def update(self, A: sparse.csc_array) -> None:
         """Factor another matrix of the same pattern, keeping ordering and symbolic analysis."""

@@ -12,6 +12,7 @@ from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.triangular import triangle_solved
+from cembench.linear_algebra.work import count_dense
 
 Real = NDArray[np.float64]
 
@@ -34,6 +35,8 @@ class DenseCholesky:
                 raise NotPositiveDefinite(
                     f"the dense matrix of order {len(A)} is not positive definite ({error})"
                 ) from None
+
+            count_dense(len(A))
 
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """A x = b, real or complex."""

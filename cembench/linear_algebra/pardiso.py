@@ -13,6 +13,7 @@ from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
+from cembench.linear_algebra.work import count_analysis, count_factorisation
 
 #: Pardiso's matrix type for real symmetric positive definite.
 _SPD = 2
@@ -40,6 +41,9 @@ def pardiso_solver(
             raise NotPositiveDefinite(
                 f"the matrix of order {A.shape[0]} is not positive definite ({error})"
             ) from None
+
+        count_analysis()
+        count_factorisation(A.shape[0], lambda: 0)
 
     def solve(B: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(solver.solve(upper, np.asfortranarray(B)))

@@ -11,6 +11,7 @@ from scipy.sparse.linalg import splu
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
+from cembench.linear_algebra.work import count_analysis, count_factorisation
 
 
 def superlu_solver(
@@ -34,6 +35,8 @@ def superlu_solver(
             )
         except RuntimeError as error:
             raise NotPositiveDefinite(f"the matrix is singular ({error})") from None
+        count_analysis()
+        count_factorisation(A.shape[0], lambda: int(factor.nnz) // 2)
         # With the diagonal as pivots, these are the D of L D L^T: all positive or not definite.
         pivots = factor.U.diagonal()
         if not (pivots > 0).all():

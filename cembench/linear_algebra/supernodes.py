@@ -75,6 +75,12 @@ def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | N
     return C
 
 
+def factor_entries(factor: Any) -> int:
+    """How many numbers does a supernodal factor hold? 0 where the structure is not as expected."""
+    held = _held(factor)
+    return int(held.xsize) if held is not None and _as_expected(held, held.n) else 0
+
+
 def _held(factor: Any) -> _CholmodFactor | None:
     api = ctypes.pythonapi
     name_of, pointer_of = api.PyCapsule_GetName, api.PyCapsule_GetPointer

@@ -41,7 +41,8 @@ KeptNotice = Annotated[
     Notice, BeforeValidator(lambda v: notice_of_old(v) if isinstance(v, str) else v)
 ]
 
-Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped"]
+#: "not_comparable": the map is valid, and the seconds are no figure: see docs/cheating.md.
+Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped", "not_comparable"]
 
 #: A number that a file may hold: larger ones are no counts, and no float holds them.
 Count = Annotated[int, Field(ge=0, lt=2**63)]
@@ -114,6 +115,14 @@ class FaultKind(StrEnum):
     #: A timed call returned a map that is not as good as the one that was checked.
     OTHER_MAP = "other_map"
     OTHER_ENERGY = "other_energy"
+    #: A timed call returned what was kept from another call, or depends on what was.
+    KEPT_RESULT = "kept_result"
+    #: The calls used more cores than the cell is allowed.
+    MORE_CORES = "more_cores"
+    #: Something went on working between the timed calls.
+    WORKS_AHEAD = "works_ahead"
+    #: The seconds that the process told cannot be.
+    IMPOSSIBLE_TIMES = "impossible_times"
     GAVE_UP = "gave_up"
     RAISED = "raised"
     OUT_OF_MEMORY = "out_of_memory"
@@ -168,9 +177,20 @@ class Round(BaseModel):
     calls: Annotated[tuple[CallSeconds, ...], Field(min_length=1)]
     #: Seconds by phase of the call that is the round's figure; they add up to it.
     phases: dict[str, Seconds] = Field(default_factory=dict)
-    #: SHA-256 of the last call's map.
+    #: CPU seconds of the process and of all it started, of the call whose seconds are the figure;
+    #: None where the system does not tell, and in records older than this field.
+    cpu_seconds: Seconds | None = None
+    #: Wall-clock seconds of the process's first call, which warms up; None where that is timed.
+    cold_seconds: CallSeconds | None = None
+    #: What the motions of the surface are made from, one for each call
+    #: (:mod:`cembench.running.motion`); empty in records older than this field.
+    motions: str = ""
+    #: Whether a call gave the same map as another process's call on the same moved surface, to
+    #: rounding; None where nothing was compared.
+    repeated: bool | None = None
+    #: Of older records: SHA-256 of the last call's map, and of each timed call whether its map has
+    #: the same bits as the checked one.
     uv_hash: str | None = None
-    #: Of each timed call, whether its map has the same bits as the checked one.
     same_bits: tuple[bool, ...] = ()
     #: Of an external program, whose `calls` are the wall clock of its process: that of the same
     #: program on a small mesh, None where it failed on that; and the solve time that it printed in
@@ -232,6 +252,25 @@ class ProgramRun(BaseModel):
     output_bytes: Count = 0
 
 
+class LinearAlgebraWork(BaseModel):
+    """What the checked call asked of linear algebra: :class:`cembench.linear_algebra.work.Work`.
+
+    Only what goes through cembench's linear algebra is counted.
+    """
+
+    model_config = ConfigDict(frozen=True)
+
+    symbolic: Count
+    numeric: Count
+    #: Real columns; half a solve counts half.
+    right_hand_sides: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    #: Of the largest sparse matrix and of the largest factor; 0: not known.
+    order: Count = 0
+    entries: Count = 0
+    dense: Count = 0
+    dense_order: Count = 0
+
+
 class Outcome(BaseModel):
     """What one cell's processes have to tell, or what is told of one that cannot."""
 
@@ -263,6 +302,8 @@ class Outcome(BaseModel):
     notes: tuple[KeptNotice, ...] = ()
     #: Of an external program or a library.
     program: ProgramRun | None = None
+    #: None for an external program, and in records older than this field.
+    work: LinearAlgebraWork | None = None
 
     @property
     def relative_energy(self) -> float | None:

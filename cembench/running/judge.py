@@ -18,13 +18,14 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict
 
 from cembench.conformal.atlas import AtlasFigures, cut_map
 from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
-from cembench.registry import Algorithm
+from cembench.registry import Algorithm, Target
 from cembench.results.records import Fault, FaultKind
 
 Complex = NDArray[np.complex128]
@@ -35,26 +36,50 @@ CIRCLE_TOLERANCE = 1e-9
 CIRCULAR = 1e-3
 
 
-def faults(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Fault]:
+class Promise(BaseModel):
+    """What of an algorithm its maps are judged by: data, for a process that never imports it."""
+
+    model_config = ConfigDict(frozen=True)
+
+    target: Target = "disk"
+    #: How far from the unit circle the boundary of a disk may lie.
+    circle: float = CIRCLE_TOLERANCE
+    #: Another shape of the same triangles has the same map.
+    combinatorial: bool = False
+    #: Every call is a process of its own.
+    is_program: bool = False
+
+    @classmethod
+    def of(cls, algorithm: Algorithm) -> Promise:
+        """Return what this algorithm promises."""
+        others = algorithm.program or algorithm.library
+        return cls(
+            target=algorithm.target,
+            circle=CIRCLE_TOLERANCE if others is None else others.circle,
+            combinatorial=algorithm.combinatorial,
+            is_program=algorithm.program is not None,
+        )
+
+
+def faults(promised: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> list[Fault]:
     """Return the promises that this map breaks; none for a valid one.
 
     A boundary that is in the wrong place comes before folds, one that is only out of order after
     them: it is what folded the triangles beside it.
     """
-    if algorithm.target == "atlas":
+    promise = promised if isinstance(promised, Promise) else Promise.of(promised)
+    if promise.target == "atlas":
         return judged_atlas(mesh, uv.reshape(-1, 3))
     flipped = flipped_triangles(mesh, uv)
     is_reversed = image_area(mesh, uv) <= 0 or flipped == mesh.m
     placed: list[Fault] = []
     order: list[Fault] = []
-    if algorithm.target in ("disk", "circular holes"):
-        others = algorithm.program or algorithm.library
-        tolerance = CIRCLE_TOLERANCE if others is None else others.circle
-        placed, order = _of_the_circle(mesh, uv, tolerance)
-    if algorithm.target == "circular holes":
+    if promise.target in ("disk", "circular holes"):
+        placed, order = _of_the_circle(mesh, uv, promise.circle)
+    if promise.target == "circular holes":
         placed += _crossings(mesh, uv)
         placed += _turned_holes(mesh, uv) if not (placed or is_reversed) else []
-    elif algorithm.target == "disk" and not (flipped or placed or order):
+    elif promise.target == "disk" and not (flipped or placed or order):
         order = _crossings(mesh, uv)
     if is_reversed:
         off = [fault for fault in placed if fault.kind is not FaultKind.WINDING]
@@ -92,7 +117,7 @@ def broken_premises(mesh: TriangleMesh) -> list[str]:
     )
 
 
-def remarks(algorithm: Algorithm, mesh: TriangleMesh, uv: Complex) -> list[Notice]:
+def remarks(algorithm: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> list[Notice]:
     """Return what a reader should know of a map without faults.
 
     That a free boundary overlaps itself, which its target does not rule out; and that holes are not

@@ -10,40 +10,51 @@ the next (addresses, hash seeds) is the same for all cells of a round, and avera
 
 from __future__ import annotations
 
+import atexit
 import os
 import random
 import shutil
 import sys
 import tempfile
 import uuid
-from collections.abc import Callable, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 from time import monotonic
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from cembench.core.errors import RecordError
+from cembench.core.names import file_name
 from cembench.core.notices import Notice, NoticeKind
-from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, not_ok
+from cembench.linear_algebra.backends import default_backend
+from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, Status, not_ok
 from cembench.results.samples import Samples
 from cembench.results.store import Store
+from cembench.running.comparable import impossible, incomparable, is_cold
 from cembench.running.environment import describe_environment, with_threads
 from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
-from cembench.running.measure import Checked
+from cembench.running.judge import Promise
+from cembench.running.judging import Checked, JudgedCalls, sample
+from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, WARM_UP
+from cembench.running.motion import UNMOVED
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
-from cembench.running.worker import PROGRAMS, Answer, Job
+from cembench.running.worker import PROGRAMS, Answer, Job, JobTask
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
+#: Wall-clock seconds that judging a map may take at least.
+JUDGE_SECONDS = 600.0
 #: The largest answer that is read: what a worker keeps takes a few megabytes at most.
 LARGEST_ANSWER_BYTES = 2**24
 
@@ -223,8 +234,11 @@ class _Run:
         with _Process(self.watcher, task, step):
             found = self.launcher.time(task, Checked.of(checked))
         if isinstance(found, Outcome):
-            cause = f"in {step}: {found.cause}"
-            self._save(task, found.model_copy(update={"cause": cause}))
+            more: dict[str, Any] = {"cause": f"in {step}: {found.cause}"}
+            if found.status == "not_comparable":  # the map is valid, and so are its figures
+                more |= {"status": found.status, "faults": found.faults, "rounds": ()}
+                found = checked
+            self._save(task, found.model_copy(update=more))
             return
         origin = {"sitting": self.sitting, "started_at": started}
         self._samples(task).save_round(number, found.model_copy(update=origin))
@@ -268,14 +282,26 @@ class _Process:
 
 
 def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
+    told = []
     differing = [
-        k + 1 for k, r in enumerate(rounds) if r.uv_hash != checked.uv_hash or not all(r.same_bits)
+        k + 1
+        for k, r in enumerate(rounds)
+        if r.repeated is False
+        or (r.uv_hash is not None and r.uv_hash != checked.uv_hash)
+        or not all(r.same_bits)
     ]
-    if not differing:
-        return ()
-    named = ", ".join(map(str, differing))
-    told = f"not deterministic: other bits than in the check came out in rounds {named}"
-    return (Notice(NoticeKind.NOT_DETERMINISTIC, told),)
+    if differing:
+        named = ", ".join(map(str, differing))
+        text = f"not deterministic: other maps of the same surface came out in rounds {named}"
+        told.append(Notice(NoticeKind.NOT_DETERMINISTIC, text))
+    cold = is_cold(rounds)
+    if cold is not None:
+        text = (
+            f"the first call of a process takes {cold[0]:.3g} s, later ones {cold[1]:.3g} s: the "
+            "seconds are those of later calls, which may use what the first one kept"
+        )
+        told.append(Notice(NoticeKind.COLD_FIRST_CALL, text))
+    return tuple(told)
 
 
 def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Record:
@@ -306,6 +332,16 @@ class Launcher:
     _server: ForkServer | None = None
     #: What the system says of the mesh files since they were written.
     _written: dict[Path, tuple[int, ...]] = field(default_factory=dict)
+    #: Nobody can have kept a result for motions that were drawn just now.
+    _drawn: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
+    #: How often each cell was timed.
+    _times: Counter[str] = field(default_factory=Counter)
+    #: Of each cell, a call of its last process: its motion, and the sample of its map.
+    _last: dict[str, tuple[str, Path]] = field(default_factory=dict)
+    #: Seconds of each cell's checked call.
+    _checked_seconds: dict[str, float] = field(default_factory=dict)
+    #: Whether two fresh processes gave the same map of the same surface.
+    _repeats: dict[str, bool | None] = field(default_factory=dict)
 
     def close(self) -> None:
         """End the server, if there is one."""
@@ -319,48 +355,153 @@ class Launcher:
         if answer.outcome is None:
             return _unreadable("it holds no outcome"), None
         try:
-            return answer.outcome, _read_uv(self.scratch / "uv.npy", task)
+            uv = _read_uv(self.scratch / "uv.npy", task)
         except (OSError, ValueError, EOFError) as error:
             return _unreadable(f"its map: {error}"), None
+        if uv is None:
+            return answer.outcome, None
+        judged = self._judged(task, "judge check", called=answer.outcome)
+        if judged.outcome is None:
+            return _unreadable("its map could not be judged"), None
+        self._keep(task, UNMOVED, uv)
+        self._checked_seconds[task.cell.label] = max(answer.outcome.seconds, default=0.0)
+        return judged.outcome, uv
 
     def time(self, task: Task, checked: Checked) -> Round | Outcome:
-        """The timed calls of one process, or how it ended without."""
-        answer = self._run(task, "time", 2 * self.options.timeout, checked)
-        return answer.round or answer.outcome or _unreadable("it holds no round")
+        """The timed calls of one process, or how it ended without.
+
+        Their surfaces are moved, for all cells alike. Where calls are short, the first one, which
+        only warms up, gets a motion that a call of the process before has had: so what a fresh
+        process makes of it is compared with what one did that had been called before.
+        """
+        label = task.cell.label
+        turn = f"{self.options.seed} {self._drawn} {self._times[label]}"
+        self._times[label] += 1
+        motions = [f"{turn} {k}" for k in range(ENOUGH_CALLS + 1)]
+        last = self._last.get(label)
+        replays = last is not None and not self._is_long(task)
+        if last is not None and replays:
+            motions[0] = last[0]
+        began = monotonic()
+        answer = self._run(
+            task,
+            "time",
+            2 * self.options.timeout,
+            motions=tuple(motions),
+            first_counts=not replays,
+        )
+        ended = monotonic()
+        found, used = answer.round, answer.used
+        if found is None or used is None:
+            return answer.outcome or _unreadable("it holds no round")
+        if not set(answer.motions) <= set(motions) or len(answer.names) != len(answer.motions):
+            return _unreadable("it tells of other calls than were asked for")
+        used.wall, used.cold = sum(found.calls), found.cold_seconds or 0.0
+        wrong = impossible(used, found, began, ended)
+        wrong = wrong or incomparable(used, answer.running, task.cell.threads)
+        if wrong:
+            return not_ok("not_comparable", *wrong)
+        judged = self._judged_calls(task, checked, answer)
+        if isinstance(judged, Outcome):
+            return judged
+        return found.model_copy(update={"motions": turn, "repeated": judged.repeated})
+
+    def _judged_calls(self, task: Task, checked: Checked, told: Answer) -> JudgedCalls | Outcome:
+        """What is to be said of the maps of a process; an outcome where that is nothing good."""
+        label = task.cell.label
+        known = dict([self._last[label]]) if label in self._last else {}
+        judged = self._judge_once(task, checked, told, known)
+        if isinstance(judged, JudgedCalls) and judged.doubtful is not None and not judged.faults:
+            # The surface, or the method, is one where rounding decides which of several maps.
+            maps = self.scratch / "maps.npy"
+            (self.scratch / "uv.npy").replace(maps)
+            again = self._run(task, "again", self.options.timeout, motions=(judged.doubtful,))
+            uv = _read_uv(self.scratch / "uv.npy", task)
+            if uv is None:
+                return again.outcome or _unreadable("it holds no outcome")
+            row = self.scratch / f"{file_name(label)}-again.npy"
+            _remove(row)
+            np.save(row, sample(uv))
+            maps.replace(self.scratch / "uv.npy")
+            judged = self._judge_once(task, checked, told, known | {judged.doubtful: row})
+        if isinstance(judged, Outcome):
+            return judged
+        if judged.faults or judged.kept:
+            status: Status = "invalid" if judged.faults else "not_comparable"
+            return not_ok(status, *judged.faults, *judged.kept)
+        if UNMOVED in known:
+            self._repeats[label] = judged.repeated
+        number = random.SystemRandom().randrange(int(told.names[0] == WARM_UP), len(told.names))
+        rows = np.lib.format.open_memmap(self.scratch / "uv.npy", mode="r")
+        self._keep(task, told.motions[number], np.array(rows[number]))
+        return judged
+
+    def _judge_once(
+        self, task: Task, checked: Checked, told: Answer, known: Mapping[str, Path]
+    ) -> JudgedCalls | Outcome:
+        answer = self._judged(
+            task,
+            "judge calls",
+            checked=checked,
+            names=told.names,
+            motions=told.motions,
+            known=dict(known),
+            repeats=self._repeats.get(task.cell.label),
+        )
+        return answer.judged or answer.outcome or _unreadable("its maps could not be judged")
+
+    def _keep(self, task: Task, motion: str, uv: NDArray[np.complex128]) -> None:
+        """Remember the map of this motion for the next process of the cell."""
+        file = self.scratch / f"{file_name(task.cell.label)}.npy"
+        _remove(file)
+        np.save(file, sample(uv))
+        self._last[task.cell.label] = (motion, file)
+
+    def _is_long(self, task: Task) -> bool:
+        """May its first call be one that is timed? What another process has had is not timed."""
+        return self._checked_seconds.get(task.cell.label, 0.0) > LONG_CALL / 2
+
+    def _judged(self, task: Task, what: JobTask, **more: Any) -> Answer:
+        """What a process says of a map that never saw what made it."""
+        return self._run(task, what, max(self.options.timeout, JUDGE_SECONDS), **more)
 
     def _run(
         self,
         task: Task,
-        what: Literal["check", "time"],
+        what: JobTask,
         seconds: float,
-        checked: Checked | None = None,
+        **more: Any,
     ) -> Answer:
         self._make_scratch()
         answer_file, uv_file, log = (
             self.scratch / name for name in ("answer.json", "uv.npy", "log.txt")
         )
-        for stale in (answer_file, uv_file, log, self.scratch / PROGRAMS):
+        judges = what.startswith("judge")
+        for stale in (answer_file, log, self.scratch / PROGRAMS, *([] if judges else [uv_file])):
             _remove(stale)
         job = Job(
             task=what,
             cell=task.cell,
-            plugins=task.plugins,
+            plugins=() if judges else task.plugins,
             mesh_type=type(task.mesh).__name__,
             notices=task.mesh.notices,
             mesh_files=self._mesh_files(task),
             answer_file=answer_file,
             uv_file=uv_file,
-            checked=checked or Checked(),
+            promise=Promise.of(task.algorithm),
             memory_bytes=self.options.memory_bytes,
             parent=os.getpid(),
+            **more,
         )
         limits = Limits(seconds, self.options.memory_bytes)
-        ending = self._forked(job, limits, log) if what == "time" else None
+        forked = {"time": self._forked, "again": self._forked}
+        ending = (self._by_judges if judges else forked.get(what, _never))(job, limits, log)
         ending = ending or self._started(job, limits, log)
         with suppress(OSError):  # there may be no folder any more
             _remove(self.scratch / PROGRAMS)  # of a program that was ended
         if ending.limit is None and ending.code == 0 and answer_file.exists():
-            return _with_note(_read_answer(answer_file), ending.left)
+            answer = _with_note(_read_answer(answer_file), ending.left)
+            return answer.model_copy(update={"running": ending.running})
         with suppress(OSError):  # there may be none, or no folder any more
             uv_file.unlink()
         outcome = _outcome_of(ending, seconds, self.options.memory_bytes)
@@ -401,6 +542,19 @@ class Launcher:
             self.close()
             return None
 
+    def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
+        """How a process ended that the server of judges forked; None where it forks none."""
+        server = _judges()
+        if server is None:
+            return None
+        path = self._write(job.model_copy(update={"parent": server.pid}))
+        try:
+            return run_limited(server.forking(path), limits, log)
+        except ServerGoneError:
+            _judges.cache_clear()
+            server.close()
+            return None
+
     def _write(self, job: Job) -> Path:
         path = self.scratch / "job.json"
         _remove(path)
@@ -417,6 +571,23 @@ class Launcher:
                 np.save(file, array)
                 self._written[file] = _stamp(file)
         return files
+
+
+def _never(job: Job, limits: Limits, log: Path) -> None:
+    """Fork nothing: a check has an interpreter of its own."""
+
+
+@cache
+def _judges() -> ForkServer | None:
+    """The one server of this process that judges are forked from; it ends with this process."""
+    if not can_fork(1):
+        return None
+    try:
+        server = ForkServer(with_threads(1), default_backend())
+    except ServerGoneError:
+        return None
+    atexit.register(server.close)
+    return server
 
 
 def _remove(path: Path) -> None:

@@ -1,51 +1,47 @@
-"""Measure one algorithm on one surface in this process, and check what it returns.
+"""Measure one algorithm on one surface in this process.
 
 Timed is the call alone, from the arrays V and F in memory to uv: the boundary loops, the Laplacian,
 ordering, factorisation and iterations, and nothing else. An algorithm's word is not trusted: every
-map, checked or timed, is judged (:mod:`cembench.running.judge`), and the metrics are computed here.
+map, checked or timed, is judged (:mod:`cembench.running.judging`), in another process where there
+is one, and the metrics are computed there.
 """
 
 from __future__ import annotations
 
 import gc
-import math
-import warnings
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from time import monotonic
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel
 
-from cembench.conformal.atlas import atlas_metrics
-from cembench.conformal.metrics import (
-    all_metrics,
-    boundary_circles,
-    dirichlet_energy,
-    image_area,
-    lost_in_rounding,
-)
 from cembench.core.clock import Timing, measure
-from cembench.core.errors import NotThere, said_by
+from cembench.core.errors import NotThere
 from cembench.linear_algebra.cholesky import linear_algebra
+from cembench.linear_algebra.work import Work, counting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm
 from cembench.results.records import (
-    Boundary,
     Cell,
     Fault,
     FaultKind,
+    LinearAlgebraWork,
     Outcome,
     ProgramRun,
     Round,
     not_ok,
 )
+from cembench.running.comparable import Used
 from cembench.running.external.call import ProgramCalls
 from cembench.running.external.present import library_version, missing
-from cembench.running.judge import faults, remarks
+from cembench.running.judge import Promise
+from cembench.running.judging import Checked, judged_calls, judged_check
 from cembench.running.memory import Memory, memory_of_call
-from cembench.running.quality import quality_notes
+from cembench.running.motion import UNMOVED, moved
+from cembench.running.processor import Processor, after_call, before_call
 from cembench.running.returned import (
     hash_of,
     map_of,
@@ -59,27 +55,56 @@ ENOUGH_SECONDS = 0.1
 ENOUGH_CALLS = 5
 #: A first call that takes so many seconds is not repeated: a warm-up saves tenths of one.
 LONG_CALL = 5.0
-#: How far E_C of a timed call's map may be from that of the checked one, relative to its area: two
-#: maps of a solver that draws random numbers differ by less, one that stops earlier by more.
-SAME_ENERGY = 1e-6
+#: What the first call is called where it only warms up.
+WARM_UP = "the warm-up"
 
 Complex = NDArray[np.complex128]
-Call = Callable[[], tuple[Any, Timing]]
+Call = Callable[[TriangleMesh], tuple[Any, Timing]]
 
 
-class Checked(BaseModel):
-    """What a timed call's map is compared with: bits and E_C over area of the checked map."""
+@dataclass
+class TimedCalls:
+    """The calls of one process in order, the first of which may only warm up."""
 
-    uv_hash: str | None = None
-    #: None: only the promises of the target are judged.
-    relative_energy: float | None = None
+    is_warmed_up: bool = False
+    motions: list[str] = field(default_factory=list)
+    timings: list[Timing] = field(default_factory=list)
+    #: The map of each as it was right after it.
+    maps: list[Complex | Fault] = field(default_factory=list)
+    #: CPU seconds when each began and ended.
+    before: list[Processor] = field(default_factory=list)
+    after: list[Processor] = field(default_factory=list)
+    #: Whether a call changed the surface that it was given.
+    changed: bool = False
+    began: float = field(default_factory=monotonic)
 
-    @classmethod
-    def of(cls, outcome: Outcome) -> Checked:
-        """Return what there is to compare with a checked call."""
-        energy, area = (outcome.metrics.get(name) for name in ("conformal_energy", "image_area"))
-        relative = None if energy is None or not area else energy / area
-        return cls(uv_hash=outcome.uv_hash, relative_energy=relative)
+    @property
+    def timed(self) -> list[Timing]:
+        """The calls that count."""
+        return self.timings[self.is_warmed_up :]
+
+    def names(self) -> list[str]:
+        """Return what to call each."""
+        count = len(self.timed)
+        calls = [f"call {k} of {count}" for k in range(1, count + 1)]
+        return [WARM_UP, *calls] if self.is_warmed_up else calls
+
+    def used(self) -> Used:
+        """Return what the calls that count used."""
+        first = int(self.is_warmed_up)
+        pairs = list(zip(self.before, self.after, strict=True))
+        gaps = list(zip(self.after, self.before[1:], strict=False))
+        return Used(
+            wall=sum(t.total for t in self.timed),
+            cold=self.timings[0].total if first else 0.0,
+            own=sum(b.process - a.process for a, b in pairs[first:]),
+            others=sum(b.others - a.others for a, b in pairs[first:]),
+            beside=sum(b.beside - a.beside for a, b in gaps),
+            disturbed=sum(b.running > 0 for b in self.before[1:]),
+            looked=len(self.before) - 1,
+            began=self.began,
+            ended=monotonic(),
+        )
 
 
 def check_cell(
@@ -91,16 +116,29 @@ def check_cell(
     a status with its cause. The one round of the outcome is this call, without warm-up. The second
     value is the map, also that of an invalid one if it has the right shape and is finite.
     """
+    called, uv = call_cell(algorithm, mesh, cell)
+    if uv is None:
+        return called, None
+    return judged_check(Promise.of(algorithm), mesh, called, uv), uv
+
+
+def call_cell(
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
+) -> tuple[Outcome, Complex | None]:
+    """Call once, as :func:`check_cell`, and leave the map to be judged by somebody else."""
     call = _call(algorithm, mesh, cell)
     program: dict[str, Any] = {}
+    work: Work | None = None
     try:
         if isinstance(call, ProgramCalls):
-            found, timing = call(watched=True)
+            found, timing = call(mesh, watched=True)
             memory = Memory(call.peak, call.peak)
             program = _about_program(call)
         else:
-            with linear_algebra(cell.solves, cell.backend):
-                (found, timing), memory = memory_of_call(lambda: _without_collector(call))
+            with linear_algebra(cell.solves, cell.backend), counting() as work:
+                (found, timing), memory = memory_of_call(
+                    lambda: _without_collector(lambda: call(mesh.fresh()))
+                )
     except BaseException as error:
         return outcome_of_error(error, mesh), None
     if algorithm.library is not None:
@@ -111,17 +149,12 @@ def check_cell(
     report, problems = report_of(found)
     seconds = phases_fault(timing)
     problems += [seconds] if seconds else []
-    try:
-        about, more = _judged(algorithm, mesh, uv, report.get("extras", {}))
-    except MemoryError as error:
-        return outcome_of_error(error, mesh), None
-    except Exception as error:
-        about, more = {}, [_no_metrics(error)]
-    problems = [*more, *_changes(mesh, cell), *problems]
+    problems = [*_changes(mesh, cell), *problems]
     outcome = not_ok("invalid", *problems) if problems else Outcome(status="ok")
-    about["notes"] = (*about.get("notes", ()), *program.pop("notes", ()))
+    if work is not None:
+        program["work"] = LinearAlgebraWork(**asdict(work))
     start = program.pop("start", None)
-    described = about | report | program | {"uv_hash": hash_of(uv)}
+    described = report | program | {"uv_hash": hash_of(uv)}
     if seconds is None:
         described["rounds"] = (_program_round(_round([timing]), call, 1, start),)
     return _with_memory(outcome.model_copy(update=described), memory), uv
@@ -130,33 +163,58 @@ def check_cell(
 def time_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, checked: Checked
 ) -> Round | Outcome:
+    """Time calls on the surface as it is, and judge their maps here: see :func:`timed_calls`."""
+    calls = timed_calls(algorithm, mesh, cell)
+    if isinstance(calls, Outcome):
+        return calls
+    found, told = calls
+    maps = [uv for uv in told.maps if not isinstance(uv, Fault)]
+    named = list(zip(told.names(), told.motions, maps, strict=True))
+    judged = judged_calls(Promise.of(algorithm), mesh, checked, named, {})
+    if judged.faults:
+        return not_ok("invalid", *judged.faults)
+    return found.model_copy(update={"repeated": judged.repeated})
+
+
+def timed_calls(
+    algorithm: Algorithm,
+    mesh: TriangleMesh,
+    cell: Cell,
+    motions: Sequence[str] = (),
+    *,
+    first_counts: bool = True,
+) -> tuple[Round, TimedCalls] | Outcome:
     """Time a call, after one to warm up; several calls where they are short.
 
-    A call of more than :data:`LONG_CALL` seconds is timed without a warm-up. The maps are judged
-    when all is timed. An outcome where the algorithm raised, or a call returned a worse map than
-    the one that was checked.
+    A call of more than :data:`LONG_CALL` seconds is timed without a warm-up, if `first_counts`.
+    Each call gets the surface in another motion; without `motions`, as it is. The maps are judged
+    when all is timed. An outcome where the algorithm raised, or returned no map.
     """
     call = _call(algorithm, mesh, cell)
     try:
         with linear_algebra(cell.solves, cell.backend):
-            timings, maps = _timed(call, mesh, algorithm.target)
+            told = _timed(call, mesh, algorithm.target, motions, first_counts=first_counts)
+        timings = told.timed
         start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
     except BaseException as error:
         return outcome_of_error(error, mesh)
     problems = [fault for t in timings if (fault := phases_fault(t))][:1]
-    try:
-        problems += _other_maps(algorithm, mesh, maps, checked)
-    except MemoryError as error:
-        return outcome_of_error(error, mesh)
-    except Exception as error:
-        problems.append(_no_metrics(error))
-    problems += _changes(mesh, cell)
+    for name, uv in zip(told.names(), told.maps, strict=True):
+        if isinstance(uv, Fault):
+            words = f"{name} returned another map than the check"
+            problems += [Fault(kind=FaultKind.OTHER_MAP, detail=words), uv]
+            break
+    problems += [_changed()] if told.changed else _changes(mesh, cell)
+    if not problems and min(t.total for t in told.timings) <= 0:
+        words = "its times cannot be: a call took no time, or less"
+        problems.append(Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=words))
     if problems:
         return not_ok("invalid", *problems)
-    hashes = [hash_of(uv) for uv in maps if not isinstance(uv, Fault)]
-    same = tuple(found == checked.uv_hash for found in hashes)
-    found = _program_round(_round(timings), call, len(timings), start)
-    return found.model_copy(update={"uv_hash": hashes[-1], "same_bits": same})
+    first = len(told.timings) - len(timings)
+    found = _round(timings, told.before[first:], told.after[first:], isinstance(call, ProgramCalls))
+    cold = told.timings[0].total if told.is_warmed_up else None
+    found = _program_round(found, call, len(timings), start)
+    return found.model_copy(update={"cold_seconds": cold}), told
 
 
 def _about_program(call: ProgramCalls) -> dict[str, Any]:
@@ -175,103 +233,51 @@ def _program_round(measured: Round, call: Call, calls: int, start: float | None)
 
 
 def _timed(
-    call: Call, mesh: TriangleMesh, target: str
-) -> tuple[list[Timing], list[Complex | Fault]]:
-    """Return the timed calls, and the map of each as it was right after the call."""
-    found, timing = _without_collector(call)
-    if timing.total > LONG_CALL:
-        return [timing], [map_of(found, mesh, target)]
-    timings: list[Timing] = []
-    maps: list[Complex | Fault] = []
+    call: Call, mesh: TriangleMesh, target: str, motions: Sequence[str], *, first_counts: bool
+) -> TimedCalls:
+    """Call, and note what came out and what it took."""
+    told = TimedCalls()
+
+    def once() -> None:
+        number = len(told.timings)
+        motion = motions[number] if motions else UNMOVED
+        given = moved(mesh, motion)
+        gc.collect()
+        gc.disable()
+        try:
+            told.before.append(before_call())
+            found, timing = call(given)
+            told.after.append(after_call())
+        finally:
+            gc.enable()
+        told.motions.append(motion)
+        told.timings.append(timing)
+        told.maps.append(map_of(found, given, target))
+        told.changed |= not _is_as(given, moved(mesh, motion))
+
+    once()
+    if told.timings[0].total > LONG_CALL and first_counts:
+        return told
+    told.is_warmed_up = True
     gc.collect()
     gc.freeze()  # collecting again looks at what is new, and leaves the rest out of the caches
-    while len(timings) < ENOUGH_CALLS and sum(t.total for t in timings) < ENOUGH_SECONDS:
-        found, timing = _without_collector(call)
-        timings.append(timing)
-        maps.append(map_of(found, mesh, target))
+    while len(told.timed) < ENOUGH_CALLS and sum(t.total for t in told.timed) < ENOUGH_SECONDS:
+        once()
     gc.unfreeze()
-    return timings, maps
+    return told
 
 
-def _other_maps(
-    algorithm: Algorithm, mesh: TriangleMesh, maps: list[Complex | Fault], checked: Checked
-) -> list[Fault]:
-    """Return what is wrong with the first map that is not as good as the checked one."""
-    judged = {checked.uv_hash}
-    for number, uv in enumerate(maps, start=1):
-        if isinstance(uv, Fault):
-            wrong = [uv]
-        elif hash_of(uv) in judged:
-            continue
-        else:
-            judged.add(hash_of(uv))
-            with _unruffled():
-                wrong = faults(algorithm, mesh, uv)
-                wrong = wrong or _other_energy(algorithm, mesh, uv, checked)
-        if wrong:
-            told = f"call {number} of {len(maps)} returned another map than the check"
-            return [Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong]
-    return []
-
-
-def _other_energy(
-    algorithm: Algorithm, mesh: TriangleMesh, uv: Complex, checked: Checked
-) -> list[Fault]:
-    if checked.relative_energy is None:
-        return []
-    if algorithm.target == "atlas":
-        figures = atlas_metrics(mesh, uv.reshape(-1, 3))
-        energy = figures["conformal_energy"] / figures["image_area"]
-    else:
-        area = image_area(mesh, uv)
-        energy = (dirichlet_energy(mesh, uv) - area) / area
-    if abs(energy - checked.relative_energy) <= SAME_ENERGY:
-        return []
-    told = f"E_C over the area is {energy:.9g}, not {checked.relative_energy:.9g}"
-    return [Fault(kind=FaultKind.OTHER_ENERGY, detail=told)]
-
-
-def _judged(
-    algorithm: Algorithm, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
-) -> tuple[dict[str, Any], list[Fault]]:
-    """Return what an outcome says of a map, and the faults."""
-    with _unruffled():
-        problems = faults(algorithm, mesh, uv)
-        if algorithm.target == "atlas":
-            metrics = atlas_metrics(mesh, uv.reshape(-1, 3))
-            told = [] if problems else lost_in_rounding(metrics)
-            finite = {name: _finite(v) for name, v in metrics.items()}
-            return {"metrics": finite, "notes": tuple(told)}, problems
-        metrics = all_metrics(mesh, uv)
-        told = [] if problems else [*remarks(algorithm, mesh, uv), *lost_in_rounding(metrics)]
-        if not problems:
-            told += quality_notes(algorithm.target, mesh, uv, extras)
-        about = {
-            "metrics": {name: _finite(v) for name, v in metrics.items()},
-            "boundaries": _boundaries(mesh, uv),
-            "notes": tuple(told),
-        }
-    return about, problems
-
-
-@contextmanager
-def _unruffled() -> Iterator[None]:
-    """Let no warning be an error: the algorithm may have made it one, for NumPy or for Python."""
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        yield
-
-
-def _no_metrics(error: Exception) -> Fault:
-    told = f"its metrics cannot be computed: {said_by(error)}"
-    return Fault(kind=FaultKind.NO_METRICS, detail=told)
+def _is_as(mesh: TriangleMesh, other: TriangleMesh) -> bool:
+    return np.array_equal(mesh.V, other.V) and np.array_equal(mesh.F, other.F)
 
 
 def _changes(mesh: TriangleMesh, cell: Cell) -> list[Fault]:
-    if mesh.fresh().hash == cell.mesh_hash:
-        return []
+    return [] if mesh.fresh().hash == cell.mesh_hash else [_changed()]
+
+
+def _changed() -> Fault:
     told = "the algorithm changed the mesh it was given"
-    return [Fault(kind=FaultKind.MESH_CHANGED, detail=told)]
+    return Fault(kind=FaultKind.MESH_CHANGED, detail=told)
 
 
 def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
@@ -280,16 +286,24 @@ def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
         return ProgramCalls(algorithm, mesh, arguments, cell.threads)
     lacking = missing(algorithm)
 
-    def call() -> tuple[Any, Timing]:
+    def call(given: TriangleMesh) -> tuple[Any, Timing]:
         if lacking:
             raise NotThere(lacking)
-        fresh = mesh.fresh()
-        return measure(lambda: algorithm.function(fresh, **arguments))
+        return measure(lambda: _read(algorithm.function(given, **arguments)))
 
     return call
 
 
-def _without_collector(call: Call) -> tuple[Any, Timing]:
+def _read(found: Any) -> Any:
+    """Return what an algorithm returned, its map looked at: what it puts off is its time too."""
+    with suppress(BaseException):  # told when the result is taken apart
+        _ = found.uv
+    with suppress(BaseException):
+        _ = found.corners
+    return found
+
+
+def _without_collector(call: Callable[[], tuple[Any, Timing]]) -> tuple[Any, Timing]:
     gc.collect()
     gc.disable()
     try:
@@ -298,32 +312,21 @@ def _without_collector(call: Call) -> tuple[Any, Timing]:
         gc.enable()
 
 
-def _round(timings: list[Timing]) -> Round:
-    middle = sorted(timings, key=lambda timing: timing.total)[(len(timings) - 1) // 2]
+def _round(
+    timings: Sequence[Timing],
+    before: Sequence[Processor] = (),
+    after: Sequence[Processor] = (),
+    is_program: bool = False,
+) -> Round:
+    middle = sorted(range(len(timings)), key=lambda k: timings[k].total)[(len(timings) - 1) // 2]
     calls = tuple(timing.total for timing in timings)
-    return Round(calls=calls, phases=middle.phases)
+    used = None
+    if before:
+        a, b = before[middle], after[middle]
+        used = max(0.0, b.others - a.others if is_program else b.total - a.total)
+    return Round(calls=calls, phases=timings[middle].phases, cpu_seconds=used)
 
 
 def _with_memory(outcome: Outcome, memory: Memory) -> Outcome:
     found = {"peak_memory_bytes": memory.peak, "memory_increase_bytes": memory.increase}
     return outcome.model_copy(update=found)
-
-
-def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:
-    circles = boundary_circles(mesh, uv) if len(mesh.loops) > 1 else ()
-    if not all(np.isfinite(circle.centre) for circle in circles):
-        return ()
-    return tuple(
-        Boundary(
-            vertex=circle.vertex,
-            vertices=circle.vertices,
-            centre=(circle.centre.real, circle.centre.imag),
-            radius=_finite(circle.radius),
-            circularity=_finite(circle.circularity),
-        )
-        for circle in circles
-    )
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -23,6 +23,8 @@ from typing import IO, Protocol, TypeAlias
 
 import psutil
 
+from cembench.running.processor import running_threads
+
 #: Seconds between two looks at the memory. Each look takes milliseconds of another core.
 LOOK_EVERY = 0.1
 #: How much of what a process says is kept: the end of it.
@@ -56,6 +58,8 @@ class ProcessEnd:
     said: str
     #: How many processes it left behind, which were ended.
     left: int = 0
+    #: At each look, how many threads of the tree were running or waiting for a processor.
+    running: tuple[int, ...] = ()
 
     @property
     def how(self) -> str:
@@ -119,6 +123,7 @@ def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
     """
     mark = uuid.uuid4().hex
     limit, seen, said = None, 0, b""
+    running: list[int] = []
     log.touch()
     process = start(mark, log)
     tree: dict[int, psutil.Process] = {}
@@ -129,6 +134,7 @@ def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
         while not _ended_within(process, min(LOOK_EVERY, max(deadline - monotonic(), 0))):
             _follow(tree, process.pid)
             seen = max(seen, sum(map(_resident_bytes, tree.values())))
+            running.append(sum(map(running_threads, tree)))
             said = _drain(log, said)
             if limits.memory_bytes is not None and seen > limits.memory_bytes:
                 limit = "memory"
@@ -140,7 +146,8 @@ def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
         code, left = _end_all(process, tree, mark)
     with suppress(OSError), log.open("rb") as file:  # the process may have removed it
         said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
-    return ProcessEnd(code, limit, seen, said.decode(errors="replace").strip(), left)
+    words = said.decode(errors="replace").strip()
+    return ProcessEnd(code, limit, seen, words, left, tuple(running))
 
 
 def _ended_within(process: StartedProcess, seconds: float) -> bool:

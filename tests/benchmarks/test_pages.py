@@ -27,6 +27,7 @@ def test_another_report_gives_another_table(tmp_path):
         ("README.md", "readme_speedups"),
         ("docs/surfaces.md", "surfaces_page"),
         ("docs/algorithms.md", "cem_stopping_rules"),
+        ("docs/algorithms.md", "qiem_steps"),
     ],
 )
 def test_only_what_is_between_the_marks_is_replaced(page, maker):

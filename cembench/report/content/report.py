@@ -23,6 +23,7 @@ from cembench.report.content.figures.performance_profile import performance_prof
 from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
+from cembench.report.content.linear_algebra_work import work_tables
 from cembench.report.content.other_targets import other_targets
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.content.table_1 import table_1
@@ -166,7 +167,7 @@ def _summary(evidence: Evidence) -> Section:
 
 def _tables(evidence: Evidence) -> Section:
     items: list[Item] = []
-    for make in (table_1, table_2, table_3, table_4):
+    for make in (table_1, work_tables, table_2, table_3, table_4):
         items += make(evidence)
     return Section("tables", "Tables 1 to 4", tuple(items))
 
@@ -257,6 +258,7 @@ def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Sec
     ]
     angles, _ = angle_histograms(evidence, inspections)
     energies, _ = energy_by_iteration(evidence)
+    items += work_tables(evidence)
     items += [item for item in beyond.items if not isinstance(item, Gap)]
     items += _drawn([angles, energies, cost_by_faces(evidence)], folder)
     return Section("results", "Results", tuple(items))

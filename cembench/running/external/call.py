@@ -79,8 +79,10 @@ class ProgramCalls:
     bytes: tuple[int, int] = (0, 0)
     peak: int | None = None
 
-    def __call__(self, *, watched: bool = False) -> tuple[Parameterization | Atlas, Timing]:
-        """Run the program once; its map, and the wall clock of its process.
+    def __call__(
+        self, mesh: TriangleMesh, *, watched: bool = False
+    ) -> tuple[Parameterization | Atlas, Timing]:
+        """Run the program once on this surface; its map, and the wall clock of its process.
 
         With `watched` its memory is looked at, which a timed call is spared.
 
@@ -92,7 +94,7 @@ class ProgramCalls:
             It crashed, or left no map.
 
         """
-        found, ended = self._run(self.mesh, watched=watched)
+        found, ended = self._run(mesh, watched=watched)
         self.own.append(self._own_seconds(ended.printed))
         self.walls.append(ended.seconds)
         self.peak = ended.peak

@@ -55,6 +55,8 @@ def main(mode, given, left, *more):
             uv = [(x, -y) for x, y in uv]
         case "six-digits":
             uv = [(round(x, 6), round(y, 6)) for x, y in uv]
+        case "normalised":
+            uv = on_the_disk(V)
         case "unit-square":
             uv = [((x + 1) / 2, (y + 1) / 2) for x, y in uv]
         case "too-many":
@@ -65,6 +67,16 @@ def main(mode, given, left, *more):
     print("solve: 0.125 s")
     if mode == "boasts":
         print("solve: 1e6 s")
+
+
+def on_the_disk(V):
+    """The flat disk in the unit disk, wherever it lies."""
+    z = [complex(x, y) for x, y, _ in V]
+    middle = sum(z) / len(z)
+    z = [one - middle for one in z]
+    most = max(map(abs, z))
+    z = [one / abs(one) if abs(one) > 0.99 * most else one / most for one in z]
+    return [(one.real, one.imag) for one in z]
 
 
 def read(path):

@@ -173,7 +173,8 @@ def test_what_a_program_leaves_running_is_ended_and_told():
 
 
 def test_a_run_records_programs_and_atlases_and_leaves_no_folder(tmp_path):
-    tasks = [task_of("good", seconds=r"solve: (\S+) s"), task_of("cut", target="atlas")]
+    good = task_of("normalised", seconds=r"solve: (\S+) s")
+    tasks = [good, task_of("cut", target="atlas")]
     store = Store(tmp_path / "run")
     record, atlas = run_tasks(tasks, store)
     assert record.outcome.status == "ok", record.outcome.cause

@@ -1,0 +1,229 @@
+"""Judge what calls returned, in a process that never imports the algorithm.
+
+The first call's map of the surface as it is is the map of record: its promises are judged and its
+metrics computed. Timed calls get the surface moved (:mod:`cembench.running.motion`), each another
+way; their maps have to keep the promises too, and to be the map of just that surface.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel
+
+from cembench.conformal.atlas import atlas_metrics
+from cembench.conformal.metrics import (
+    all_metrics,
+    boundary_circles,
+    dirichlet_energy,
+    image_area,
+    lost_in_rounding,
+)
+from cembench.core.errors import said_by
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.results.records import Boundary, Fault, FaultKind, Outcome, not_ok
+from cembench.running.judge import Promise, faults, remarks
+from cembench.running.motion import UNMOVED, moved
+from cembench.running.quality import quality_notes
+from cembench.running.returned import hash_of, outcome_of_error
+
+Complex = NDArray[np.complex128]
+
+#: How far E_C of a timed call's map may be from that of the checked one, relative to its area: two
+#: maps of a solver that draws random numbers differ by less, one that stops earlier by more.
+SAME_ENERGY = 1e-6
+#: Two maps are the same, to rounding, if no vertex is farther off, relative to the image's size;
+#: and nearly the same, as those of two motions are.
+SAME_MAP, NEARLY_THE_SAME = 1e-8, 1e-4
+#: At most so many entries of a map are kept to compare another with.
+SAMPLED = 4096
+
+
+class Checked(BaseModel):
+    """What a timed call's map is compared with: bits and E_C over area of the checked map."""
+
+    uv_hash: str | None = None
+    #: None: only the promises of the target are judged.
+    relative_energy: float | None = None
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> Checked:
+        """Return what there is to compare with a checked call."""
+        return cls(uv_hash=outcome.uv_hash, relative_energy=outcome.relative_energy)
+
+
+class JudgedCalls(BaseModel):
+    """What is found of a process's maps."""
+
+    #: Of the first bad one.
+    faults: tuple[Fault, ...] = ()
+    #: Valid maps, but not of the surface that was given.
+    kept: tuple[Fault, ...] = ()
+    #: The motion of a map that is far from the checked one, and of which nobody knows yet whether
+    #: it is the right one: a fresh process's call can tell.
+    doubtful: str | None = None
+    #: Whether what could be compared was the same to rounding; None: nothing could.
+    repeated: bool | None = None
+
+
+def sample(uv: Complex) -> Complex:
+    """Return at most :data:`SAMPLED` entries of a map, spread over it."""
+    return np.array(uv[:: max(1, -(-len(uv) // SAMPLED))])
+
+
+def judged_check(promise: Promise, mesh: TriangleMesh, called: Outcome, uv: Complex) -> Outcome:
+    """Return the outcome of the checked call: what is known of the call, and of its map."""
+    try:
+        about, more = _judged(promise, mesh, uv, called.extras)
+    except MemoryError as error:
+        return outcome_of_error(error, mesh)
+    except Exception as error:
+        about, more = {}, [_no_metrics(error)]
+    problems = [*more, *called.faults]
+    outcome = not_ok("invalid", *problems) if problems else Outcome(status="ok")
+    about["notes"] = (*about.get("notes", ()), *called.notes)
+    verdict = {"status": outcome.status, "cause": outcome.cause, "faults": outcome.faults}
+    return called.model_copy(update=about | verdict | {"uv_hash": hash_of(uv)})
+
+
+def judged_calls(
+    promise: Promise,
+    mesh: TriangleMesh,
+    checked: Checked,
+    maps: Sequence[tuple[str, str, Complex]],
+    known: Mapping[str, Complex],
+    *,
+    repeats: bool | None = None,
+) -> JudgedCalls:
+    """Judge the maps of a process: each with what to call it, its motion, and its values.
+
+    `known` holds samples of maps of other processes, by motion; that of :data:`UNMOVED` is the
+    checked one. `repeats` says whether fresh processes are known to repeat themselves.
+    """
+    seen = {checked.uv_hash: UNMOVED}
+    repeated, kept, doubtful = None, [], None
+    for name, motion, uv in maps:
+        bits = hash_of(uv)
+        if seen.setdefault(bits, motion) != motion and not promise.combinatorial:
+            told = (
+                f"{name} returned, bit by bit, the map of the surface in another shape: one that "
+                "was kept, or made without a look at the coordinates (declare that with "
+                "combinatorial=True)"
+            )
+            return JudgedCalls(kept=(Fault(kind=FaultKind.KEPT_RESULT, detail=told),))
+        if motion == UNMOVED and bits == checked.uv_hash:
+            repeated = repeated is not False
+            continue
+        surface = moved(mesh, motion)
+        with _unruffled():
+            wrong = faults(promise, surface, uv)
+            wrong = wrong or _other_energy(promise, surface, uv, checked)
+        only_energy = wrong and wrong[0].kind is FaultKind.OTHER_ENERGY
+        other = known.get(motion)
+        if other is not None:
+            apart = _apart(uv, other)
+            repeated = repeated is not False and apart <= SAME_MAP
+            if apart <= SAME_MAP and only_energy:
+                wrong = []
+            elif apart > SAME_MAP and not wrong and repeats and not promise.is_program:
+                told = (
+                    f"maps of the same surface by a fresh process and by one that had been called "
+                    f"before differ by {apart:.2g}, those by fresh ones do not: something is kept "
+                    "from call to call"
+                )
+                kept.append(Fault(kind=FaultKind.KEPT_RESULT, detail=told))
+        elif only_energy:
+            near = any(_apart(uv, one) <= NEARLY_THE_SAME for one in known.values())
+            doubtful = doubtful or (None if near and motion != UNMOVED else motion)
+            wrong = [] if motion != UNMOVED else wrong
+        if wrong:
+            told = f"{name} returned another map than the check"
+            return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong))
+    return JudgedCalls(kept=tuple(kept[:1]), doubtful=doubtful, repeated=repeated)
+
+
+def _apart(uv: Complex, other: Complex) -> float:
+    """How far is a map from another's sample, relative to its size?"""
+    mine = sample(uv)
+    if mine.shape != other.shape:
+        return math.inf
+    return float(np.abs(mine - other).max() / max(np.abs(other).max(), 1e-300))
+
+
+def _other_energy(
+    promise: Promise, mesh: TriangleMesh, uv: Complex, checked: Checked
+) -> list[Fault]:
+    if checked.relative_energy is None:
+        return []
+    if promise.target == "atlas":
+        figures = atlas_metrics(mesh, uv.reshape(-1, 3))
+        energy = figures["conformal_energy"] / figures["image_area"]
+    else:
+        area = image_area(mesh, uv)
+        energy = (dirichlet_energy(mesh, uv) - area) / area
+    if abs(energy - checked.relative_energy) <= SAME_ENERGY:
+        return []
+    told = f"E_C over the area is {energy:.9g}, not {checked.relative_energy:.9g}"
+    return [Fault(kind=FaultKind.OTHER_ENERGY, detail=told)]
+
+
+def _judged(
+    promise: Promise, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[Fault]]:
+    """Return what an outcome says of a map, and the faults."""
+    with _unruffled():
+        problems = faults(promise, mesh, uv)
+        if promise.target == "atlas":
+            metrics = atlas_metrics(mesh, uv.reshape(-1, 3))
+            told = [] if problems else lost_in_rounding(metrics)
+            finite = {name: _finite(v) for name, v in metrics.items()}
+            return {"metrics": finite, "notes": tuple(told)}, problems
+        metrics = all_metrics(mesh, uv)
+        told = [] if problems else [*remarks(promise, mesh, uv), *lost_in_rounding(metrics)]
+        if not problems:
+            told += quality_notes(promise.target, mesh, uv, extras)
+        about = {
+            "metrics": {name: _finite(v) for name, v in metrics.items()},
+            "boundaries": _boundaries(mesh, uv),
+            "notes": tuple(told),
+        }
+    return about, problems
+
+
+@contextmanager
+def _unruffled() -> Iterator[None]:
+    """Let no warning be an error: the algorithm may have made it one, for NumPy or for Python."""
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _no_metrics(error: Exception) -> Fault:
+    told = f"its metrics cannot be computed: {said_by(error)}"
+    return Fault(kind=FaultKind.NO_METRICS, detail=told)
+
+
+def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:
+    circles = boundary_circles(mesh, uv) if len(mesh.loops) > 1 else ()
+    if not all(np.isfinite(circle.centre) for circle in circles):
+        return ()
+    return tuple(
+        Boundary(
+            vertex=circle.vertex,
+            vertices=circle.vertices,
+            centre=(circle.centre.real, circle.centre.imag),
+            radius=_finite(circle.radius),
+            circularity=_finite(circle.circularity),
+        )
+        for circle in circles
+    )
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -1,0 +1,117 @@
+"""What solvers get that are faster than their work: none of them has seconds to compare."""
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cembench.registry import load_registry
+from cembench.results.records import FaultKind
+from cembench.results.store import Store
+from cembench.running.local import Options, run_tasks
+from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells
+from cembench.validation.examine import ValidationOptions, examine
+from cembench.validation.solver import Solver, load_solver
+
+CHEATS = Path(__file__).with_name("cheats.py")
+#: What each comes to; None: it ends ok, with the seconds of all its work.
+FOUND = {
+    "honest": None,
+    "by-content": None,
+    "late": None,
+    "patched-clock": None,
+    "by-triangles": FaultKind.KEPT_RESULT,
+    "by-shape": FaultKind.KEPT_RESULT,
+    "on-disk-by-name": FaultKind.KEPT_RESULT,
+    "keeps-laplacian": FaultKind.KEPT_RESULT,
+    "precomputed": FaultKind.KEPT_RESULT,
+    "zeros-later": FaultKind.OTHER_MAP,
+}
+#: Found by who is running, or by CPU time.
+BUSY = {
+    "eight-threads": FaultKind.MORE_CORES,
+    "six-processes": FaultKind.MORE_CORES,
+    "orphans": FaultKind.MORE_CORES,
+    "shrunk-times": FaultKind.MORE_CORES,
+    "on-disk": None,
+    "patched-ledger": FaultKind.WRONG_REPORT,
+}
+
+
+@pytest.fixture
+def surface(tmp_path, monkeypatch):
+    """A surface that one of the solvers knows, and a folder where others may keep maps."""
+    mesh = generate_surface(load_registry(), "cowboy-hat", 1200)
+    file = tmp_path / "known.npz"
+    np.savez(file, V=mesh.V, F=mesh.F)
+    monkeypatch.setenv("CHEATS_SURFACE", str(file))
+    monkeypatch.setenv("CHEATS_FOLDER", str(tmp_path))
+    return mesh
+
+
+def outcomes(names, mesh, folder, *, repeats=2):
+    registry = load_registry([str(CHEATS)])
+    chosen = [registry.algorithm(name) for name in names]
+    how = MeasurementSettings(repeats=repeats)
+    tasks = plan_cells(chosen, [mesh], {}, how, [str(CHEATS)])
+    found = run_tasks(tasks, Store(folder), Options(timeout=120))
+    return {record.cell.algorithm: record.outcome for record in found}
+
+
+def assert_as_expected(found, expected):
+    for name, outcome in found.items():
+        kinds = [fault.kind for fault in outcome.faults]
+        if expected[name] is None:
+            assert (outcome.status, outcome.cause) == ("ok", None), name
+            assert outcome.median_seconds > 0
+        else:
+            assert expected[name] in kinds, (name, outcome.status, outcome.cause)
+            assert outcome.median_seconds is None
+            assert outcome.rounds == ()
+
+
+def test_what_is_kept_from_call_to_call_has_no_seconds(surface, tmp_path):
+    found = outcomes([*FOUND, "by-id"], surface, tmp_path / "run")
+    # An id comes back when its mesh is gone, or does not: a hit is found, and a miss is honest.
+    by_id = found.pop("by-id")
+    assert (by_id.status, [f.kind for f in by_id.faults]) in (
+        ("ok", []),
+        ("not_comparable", [FaultKind.KEPT_RESULT]),
+    )
+    assert_as_expected(found, FOUND)
+    # The map of the check is valid, and keeps its figures.
+    assert found["by-shape"].status == "not_comparable"
+    assert found["by-shape"].metrics["flipped_triangles"] == 0
+    assert "in round 1 of 2: call 1 of " in found["by-shape"].cause
+    # What a map costs that is computed when it is looked at is in its time.
+    assert all(r.phases["solves"] > 0 for r in found["late"].rounds)
+    # A cache by content is never hit: each call does the work.
+    assert all(r.phases["solves"] > 0 for r in found["by-content"].rounds)
+    assert all(r.repeated for r in found["honest"].rounds)
+
+
+@pytest.mark.slow
+def test_more_cores_and_changed_clocks_have_no_seconds(surface, tmp_path):
+    found = outcomes(BUSY, surface, tmp_path / "run", repeats=1)
+    assert_as_expected(found, BUSY)
+    # The second run gets other motions: what the first one left on disk is of no use.
+    shutil.rmtree(tmp_path / "run")
+    again = outcomes(["on-disk"], surface, tmp_path / "run", repeats=1)["on-disk"]
+    assert again.rounds[0].phases["solves"] > 0
+
+
+@pytest.mark.slow
+def test_what_works_on_between_calls_has_no_seconds(surface, tmp_path):
+    found = outcomes(["works-ahead"], surface, tmp_path / "run")
+    kinds = {fault.kind for fault in found["works-ahead"].faults}
+    assert kinds & {FaultKind.WORKS_AHEAD, FaultKind.MORE_CORES}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["by-shape", "on-disk-by-name", "zeros-later"])
+def test_validate_certifies_none_of_them(surface, tmp_path, name):
+    algorithm, registry, plugins = load_solver(f"{CHEATS}:{name}")
+    asked = ValidationOptions(meshes=[surface], up_to=0, rounds=2, against=["harmonic-circle"])
+    validation = examine(Solver(algorithm, plugins), registry, tmp_path / "run", asked)
+    assert not validation.valid
