@@ -20,7 +20,8 @@ from typing import Literal
 from cembench.results.intervals import ERROR, Interval
 from cembench.results.looks import USUAL_PRECISION, share_of
 from cembench.results.records import Cell, Record, Round
-from cembench.results.signed_rank import centre_interval, p_value
+from cembench.results.signed_rank import centre_interval
+from cembench.results.student import paired_p
 
 #: "undecided": the interval holds 1. "too few rounds": there is none. "not side by side": no round
 #: of one sitting measured both.
@@ -43,7 +44,8 @@ class Comparison:
     interval: Interval | None
     verdict: Verdict
     rounds: int
-    #: The smallest share of errors at which a difference could be claimed; 1 without an interval.
+    #: The probability of a difference as clear as this by chance (:mod:`cembench.results.student`),
+    #: looking paid for: what many comparisons are corrected by. 1 without an interval.
     p: float = 1.0
 
     @property
@@ -141,7 +143,7 @@ def compare_ratios(ratios: Sequence[float], share: float = 1.0) -> Comparison:
     The median is taken of logarithms: swapping the two algorithms inverts it.
     """
     interval = ratio_interval(ratios, share)
-    p = 1.0 if interval is None else min(1.0, p_value([log(r) for r in ratios]) / share)
+    p = 1.0 if interval is None else min(1.0, paired_p([log(r) for r in ratios]) / share)
     return Comparison(_middle(ratios), interval, verdict_of(interval), len(ratios), p)
 
 

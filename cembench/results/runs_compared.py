@@ -18,6 +18,7 @@ from cembench.results.comparison import Comparison, circumstances, verdict_of
 from cembench.results.intervals import ERROR, Interval
 from cembench.results.looks import share_of
 from cembench.results.records import Record, Round
+from cembench.results.student import unpaired_p
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def _change(before: Record, after: Record) -> Change:
     interval = (
         None if found is None else Interval(min(exp(found.low), ratio), max(exp(found.high), ratio))
     )
-    p = 1.0 if interval is None else min(1.0, rank_sum.p_value(ours, theirs) / share)
+    p = 1.0 if interval is None else min(1.0, unpaired_p(ours, theirs) / share)
     rounds = min(len(new), len(old))
     return Change(
         before, after, Comparison(ratio, interval, verdict_of(interval), rounds, p), drift

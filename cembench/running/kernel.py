@@ -15,7 +15,7 @@ import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
 #: Points on a side of the grid, and how often it is factored each time.
-SIDE, TIMES = 100, 3
+SIDE, TIMES = 70, 3
 
 
 @lru_cache(maxsize=1)
