@@ -7,6 +7,7 @@ speedups in two runs overlap. Stopped, it goes on where it was when called again
 
     python -m benchmarks.aa                      # a machine with nothing else to do
     python -m benchmarks.aa --busy 1             # beside so many processes that never rest
+    python -m benchmarks.aa --profile quick --runs 2 --budget 150s -o results/aa-quick
     python -m benchmarks.aa --write-docs         # both, as far as they are there, in the page
 
 What was found is in OUTPUT/quiet.json and OUTPUT/busy.json; the runs themselves are beside.
@@ -48,6 +49,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=10)
     parser.add_argument("--faces", type=int, default=2000, help="triangles of each surface")
     parser.add_argument("--surfaces", default=",".join(SURFACES))
+    parser.add_argument("--profile", help="instead of these surfaces, as in `cembench run`")
     parser.add_argument("--algorithms", default=",".join(ALGORITHMS))
     parser.add_argument("--precision", default="10%")
     parser.add_argument("--budget", default="70s", help="of each run, see `cembench run`")
@@ -102,7 +104,11 @@ def run_command(chosen: argparse.Namespace, folder: Path, seed: int) -> list[str
     return [
         *(sys.executable, "-m", "cembench.commands.cli", "run", "--json"),
         *("--plugin", str(TWINS), "-a", ",".join([*names, *twins])),
-        *("--surfaces", chosen.surfaces, "--faces", str(chosen.faces)),
+        *(
+            ("--profile", chosen.profile)
+            if chosen.profile
+            else ("--surfaces", chosen.surfaces, "--faces", str(chosen.faces))
+        ),
         *("--precision", chosen.precision, "--budget", chosen.budget),
         *("--seed", str(seed), "-o", str(folder)),
     ]
