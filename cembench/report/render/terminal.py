@@ -109,6 +109,11 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
     if any(is_unstable(record) for record in records):
         told = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
         remarks.append(Text(told, style="yellow"))
+    noted = [r.neighbours for record in records for r in record.outcome.rounds if r.neighbours]
+    busy = sum(neighbours.busy for neighbours in noted)
+    if busy:
+        told = f"The machine was busy beside {busy} of {len(noted)} processes; close other programs"
+        remarks.append(Text(f"{told}, or add --repeat-busy.", style="yellow"))
     for record in records:
         name = f"{record.cell.mesh} / {record.cell.algorithm}"
         told = seconds_words(record)
