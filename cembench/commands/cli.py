@@ -41,22 +41,28 @@ from cembench.commands.console import (
 from cembench.commands.ending import Verbs, ending
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
+    Budget,
     Faces,
+    FixedRounds,
     Memory,
+    MostRounds,
     Parameters,
     Plugins,
+    Precision,
     Repair,
-    Repeats,
+    RepeatBusy,
     Seed,
     Threads,
     Timeout,
+    budget_seconds,
     memory_bytes,
+    settings_of_rounds,
 )
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
+from cembench.results.looks import USUAL_MOST_ROUNDS
 from cembench.results.paper.profiles import Profile
-from cembench.results.records import DEFAULT_ROUNDS
 from cembench.workflows.places import Place
 
 if TYPE_CHECKING:
@@ -429,7 +435,11 @@ def run(
     plugin: Plugins = [],  # noqa: B006
     command: Command = None,
     program: Settings = [],  # noqa: B006
-    repeats: Repeats = DEFAULT_ROUNDS,
+    precision: Precision = None,
+    rounds: FixedRounds = None,
+    max_rounds: MostRounds = USUAL_MOST_ROUNDS,
+    budget: Budget = None,
+    repeat_busy: RepeatBusy = 0,
     seed: Seed = 0,
     timeout: Timeout = 600.0,
     memory: Memory = None,
@@ -457,19 +467,32 @@ def run(
 ) -> None:
     """Measure algorithms on surfaces, each pair in processes of its own.
 
+    Rounds go on until figures are precise (--precision), most where intervals are widest.
     Every finished process is on disk at once; what the folder already holds is not measured again.
     -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
     docs/measuring.md tells what is timed, and what an interval means.
     """
     from cembench.results import run_folder
     from cembench.results.paper.profiles import algorithms_of, paper_parameters, surfaces_of
+    from cembench.results.record_rows import REFERENCE
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)
     policies = _policies(solves)
-    options = Options(timeout, memory_bytes(memory), fresh, rerun_failed, seed)
+    repeats, share = settings_of_rounds(rounds, precision)
+    options = Options(
+        timeout,
+        memory_bytes(memory),
+        fresh,
+        rerun_failed,
+        seed,
+        reference=reference or REFERENCE,
+        most_rounds=max_rounds,
+        budget=budget_seconds(budget, profile),
+        repeat_busy=repeat_busy,
+    )
     declared, named = declared_command(command, program)
     plugin = [*plugin, *declared]
     registry = registry_with(plugin)
@@ -491,7 +514,7 @@ def run(
     reproduced = any(role.paper_row for role in standing.values())
     given = (paper_parameters(wanted) if reproduced else {}) | assignments(parameter)
     for policy in policies:
-        how = MeasurementSettings(policy, _installed(backend), threads, repeats)
+        how = MeasurementSettings(policy, _installed(backend), threads, repeats, share)
         tasks += plan_cells(chosen, found, given, how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
@@ -715,7 +738,7 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
     """Say which cells would be measured, and what that will cost."""
     from cembench.commands.progress import duration
     from cembench.report.render.terminal import plan_table
-    from cembench.running.estimate import estimate
+    from cembench.running.estimate import estimate, planned_seconds
 
     records = store.records() if (store.folder / "records").is_dir() else []
     held = {r.cell.key: r.outcome.status for r in records if not options.measures_again(r)}
@@ -728,7 +751,7 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
         for task in tasks
     ]
     costs = [cost for _, _, cost in lines if cost is not None]
-    seconds = sum(cost.seconds for cost in costs)
+    seconds = planned_seconds(costs, options.budget)
     largest = max((cost.memory_bytes for cost in costs), default=0)
     if as_json:
         cells = [

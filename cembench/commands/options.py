@@ -12,6 +12,8 @@ from typing import Annotated
 import typer
 
 from cembench.core.errors import ParameterError
+from cembench.results.looks import LOOKS, USUAL_PRECISION
+from cembench.results.paper.profiles import Profile
 
 #: A process that has loaded the libraries holds more than a hundred MiB before any call.
 LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
@@ -51,7 +53,48 @@ Faces = Annotated[
     int | None, typer.Option(min=1, max=MOST_FACES, help="Triangles of generated surfaces.")
 ]
 Repeats = Annotated[
-    int, typer.Option(min=1, max=10_000, help="Rounds; fewer than 6 give no interval.")
+    int,
+    typer.Option(
+        "--rounds", "--repeats", min=1, max=10_000, help="Rounds; fewer than 6 give no interval."
+    ),
+]
+FixedRounds = Annotated[
+    int | None,
+    typer.Option(
+        "--rounds",
+        "--repeats",
+        min=1,
+        max=10_000,
+        help="A fixed number of rounds, instead of --precision; fewer than 6 give no interval.",
+    ),
+]
+Precision = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SHARE",
+        help="Measure until 95 % intervals reach so far to either side, as 5% (the default), "
+        "or 0.05.",
+    ),
+]
+MostRounds = Annotated[
+    int,
+    typer.Option("--max-rounds", min=LOOKS[1], max=LOOKS[-1], help="At most, with --precision."),
+]
+Budget = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TIME",
+        help="After that, as 30m, only the first 7 rounds are finished; default: 150s for `quick`, "
+        "1h for `standard`, 4h for `paper`, else 30m.",
+    ),
+]
+RepeatBusy = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        max=10,
+        help="Run a process again, up to so often, beside which the machine was busy.",
+    ),
 ]
 Seed = Annotated[
     int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random order within a round.")
@@ -82,6 +125,76 @@ Verify = Annotated[
     bool,
     typer.Option("--verify", help="Recompute the figures of all maps, not only of a sample."),
 ]
+
+
+#: Seconds after which no cell goes on that has had its first look.
+USUAL_BUDGETS = {Profile.quick: 150.0, Profile.standard: 3600.0, Profile.paper: 4 * 3600.0}
+_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+def precision_share(given: str) -> float:
+    """Return the share that ``--precision`` names.
+
+    Raises
+    ------
+    ParameterError
+        It is not a share, or outside the range.
+
+    """
+    text = given.strip()
+    try:
+        number = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        number = math.nan
+    if not 0.001 <= number <= 0.5:
+        raise ParameterError(
+            f"--precision {given!r} is not allowed; write a share from 0.1% to 50%, as 5% or 0.05."
+        )
+    return number
+
+
+def budget_seconds(given: str | None, profile: Profile | None) -> float:
+    """Return the seconds that ``--budget`` names; those of the profile where it is not given.
+
+    Raises
+    ------
+    ParameterError
+        It is not a time, or outside the range.
+
+    """
+    from cembench.running.local import USUAL_BUDGET
+
+    if given is None:
+        return USUAL_BUDGET if profile is None else USUAL_BUDGETS[profile]
+    text = given.strip().lower()
+    try:
+        seconds = float(text[:-1]) * _UNITS[text[-1:]]
+    except (ValueError, KeyError):
+        seconds = math.nan
+    if not 0 <= seconds <= LONGEST:
+        raise ParameterError(
+            f"--budget {given!r} is not a time; write a number with a unit, as 90s, 30m or 2h."
+        )
+    return seconds
+
+
+def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, float | None]:
+    """Return the number of rounds and the precision of a cell: one of both, 5 % by default.
+
+    Raises
+    ------
+    ParameterError
+        Both are given, or the precision is not allowed.
+
+    """
+    if rounds is not None and precision is not None:
+        raise ParameterError(
+            "--rounds fixes the number of rounds, and --precision goes on until a figure is "
+            "precise: give one of both."
+        )
+    if rounds is not None:
+        return rounds, None
+    return 0, USUAL_PRECISION if precision is None else precision_share(precision)
 
 
 def memory_bytes(given: str | None) -> int:

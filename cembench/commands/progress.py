@@ -34,6 +34,11 @@ class Remaining:
         """So many processes are to be run."""
         self.processes = processes
 
+    def expect_more(self, cell: str, processes: int) -> None:
+        """A cell goes on for so many processes that were not expected."""
+        self.processes += processes
+        self._left[cell] = self._left.get(cell, 0) + processes
+
     def ended(self, cell: str, left: int, seconds: float) -> None:
         """A process of a cell has taken so long; so many of it are left."""
         self.done += 1
@@ -78,6 +83,10 @@ class PlainProgress(Watcher):
         """Know how much there is to do."""
         self.remaining.expect(processes)
 
+    def goes_on(self, task: Task, rounds: int) -> None:
+        """Expect more."""
+        self.remaining.expect_more(task.cell.label, rounds)
+
     def starts(self, task: Task, step: Step) -> None:
         """A line where a new round begins."""
         if step != self._step:
@@ -87,7 +96,7 @@ class PlainProgress(Watcher):
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Learn how long such a process takes."""
-        self.remaining.ended(task.cell.label, rounds_left(task, step), seconds)
+        self.remaining.ended(task.cell.label, rounds_left(step), seconds)
 
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
         """A line for the cell."""
@@ -163,9 +172,9 @@ class LiveProgress(PlainProgress):
         return Group(table, bar, *([Text(self._notice)] if self._notice else []))
 
 
-def rounds_left(task: Task, step: Step) -> int:
-    """How many processes does a cell need after this step, if nothing goes wrong?"""
-    return task.cell.repeats - (step.round or 0)
+def rounds_left(step: Step) -> int:
+    """How many processes does a cell need after this step, as far as that is known?"""
+    return step.rounds - (step.round or 0)
 
 
 def duration(seconds: float) -> str:

@@ -137,13 +137,15 @@ def _show_records(found: list[Record]) -> None:
 def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = False) -> None:
     """What became faster or slower from one run to another?
 
-    The interval holds what each run's rounds show; that the machine was in another state in the
-    other run is not in it. To tell two algorithms apart, measure both in one run.
+    A rank-sum test at the 5 % level of the seconds over those of the reference kernel, which every
+    round times: so the machine's drift from one run to the other is taken out, as far as the kernel
+    feels it. To tell two algorithms apart, measure both in one run.
     """
     from dataclasses import asdict
 
     from cembench.report.render.terminal import changes_table
-    from cembench.results.comparison import compare_runs, machine_differences
+    from cembench.results.many import corrected
+    from cembench.results.runs_compared import compare_runs, machine_differences
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
 
@@ -161,6 +163,7 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
         {d for b, a in pairs for d in machine_differences(earlier.get(b, {}), later.get(a, {}))}
     )
     if as_json:
+        together = corrected([c.comparison for c in changes])
         rows = [
             {
                 "mesh": c.after.cell.mesh,
@@ -169,8 +172,10 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
                 "seconds_before": c.before.outcome.median_seconds,
                 "seconds_after": c.after.outcome.median_seconds,
                 **asdict(c.comparison),
+                "verdict_corrected": both.verdict,
+                "drift": c.drift,
             }
-            for c in changes
+            for c, both in zip(changes, together, strict=True)
         ]
         print_json({"differences": differences, "cells": rows})
     else:
@@ -261,6 +266,9 @@ def _state(store: Store, record: Record | None, cell: Cell) -> CellState:
     rounds = store.rounds_done(cell)
     if rounds is None:
         return CellState("waiting")
+    if cell.precision is not None:
+        more = f"as many as ±{100 * cell.precision:g} % takes"
+        return CellState("in work", f"{rounds} rounds done, of {more}")
     return CellState("in work", f"{rounds} of {cell.repeats} rounds done")
 
 

@@ -1,10 +1,12 @@
 """Which of two algorithms is faster, by how much, and how sure is that?
 
 Compared are ratios of times taken in one round, each in a fresh process, in random order: what
-slows the machine for a while slows both. Had both the same cost, either would be the faster one of
-a round with probability 1/2, so the interval of the median ratio
-(:mod:`cembench.results.intervals`) is exact under any noise, and "faster" is said wrongly in at
-most 5 % of all comparisons.
+slows the machine for a while slows both. Had both the same cost, either would be the slower one of
+a round by the same amount with the same chance, so the logarithm of the ratio scatters evenly about
+0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact under any noise:
+"faster" is said wrongly in at most 5 % of all comparisons, also where the rounds went on until the
+interval was narrow (:mod:`cembench.results.looks`). Of many comparisons in one table see
+:mod:`cembench.results.many`; of two runs :mod:`cembench.results.runs_compared`.
 """
 
 from __future__ import annotations
@@ -15,15 +17,19 @@ from math import exp, log
 from statistics import median
 from typing import Literal
 
-from cembench.results.intervals import Interval, median_interval
-from cembench.results.records import Cell, Record
+from cembench.results.intervals import ERROR, Interval
+from cembench.results.looks import USUAL_PRECISION, share_of
+from cembench.results.records import Cell, Record, Round
+from cembench.results.signed_rank import centre_interval
+from cembench.results.student import paired_p
 
 #: "undecided": the interval holds 1. "too few rounds": there is none. "not side by side": no round
 #: of one sitting measured both.
 Verdict = Literal["faster", "slower", "undecided", "too few rounds", "not side by side"]
 
-#: A cell whose interval is wider than this share of its median gets a warning.
-UNSTABLE_WIDTH = 0.2
+#: A cell whose interval is wider than this share of its figure gets a warning: what reaches the
+#: usual precision to either side is not.
+UNSTABLE_WIDTH = 2 * USUAL_PRECISION
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,9 @@ class Comparison:
     interval: Interval | None
     verdict: Verdict
     rounds: int
+    #: The probability of a difference as clear as this by chance (:mod:`cembench.results.student`),
+    #: looking paid for: what many comparisons are corrected by. 1 without an interval.
+    p: float = 1.0
 
     @property
     def speedup(self) -> float:
@@ -51,9 +60,26 @@ class Comparison:
         return None if i is None else Interval(i.low - 1, i.high - 1)
 
 
+def ratio_interval(ratios: Sequence[float], share: float = 1.0) -> Interval | None:
+    """Return where the centre of positive figures lies, on their logarithms, with their median.
+
+    `share` is the part of the 5 % that this interval may miss; None where there are too few.
+    """
+    found = centre_interval([log(ratio) for ratio in ratios], ERROR * share)
+    if found is None:
+        return None
+    middle = _middle(ratios)
+    return Interval(min(exp(found.low), middle), max(exp(found.high), middle))
+
+
 def seconds_interval(record: Record) -> Interval | None:
-    """Where does the median of the cell's rounds lie, with 95 %? None below six rounds."""
-    return median_interval(record.outcome.seconds)
+    """Where does the centre of the cell's rounds lie, with 95 %? None below six rounds."""
+    return interval_of_rounds(record.cell, record.outcome.rounds)
+
+
+def interval_of_rounds(cell: Cell, rounds: Sequence[Round]) -> Interval | None:
+    """Return the interval of a cell's own seconds after these rounds."""
+    return ratio_interval([r.seconds for r in rounds], share_of(len(rounds), cell))
 
 
 def is_unstable(record: Record) -> bool:
@@ -68,10 +94,18 @@ def paired_ratios(record: Record, reference: Record) -> list[float]:
     Of an external program that is its solve time: what its process costs besides stands beside it,
     and is never compared with seconds of a call. None where a round has no such time.
     """
-    pairs = zip(record.outcome.rounds, reference.outcome.rounds, strict=False)
-    times = [(a.solve_seconds, b.solve_seconds) for a, b in pairs if a.sitting == b.sitting]
+    return ratios_of_rounds(record.outcome.rounds, reference.outcome.rounds)
+
+
+def ratios_of_rounds(ours: Sequence[Round], theirs: Sequence[Round]) -> list[float]:
+    """As :func:`paired_ratios`, of rounds that are not in a record yet."""
+    times = [(a.solve_seconds, b.solve_seconds) for a, b in _pairs(ours, theirs)]
     ratios = [a / b for a, b in times if a is not None and b is not None]
     return ratios if len(ratios) == len(times) else []
+
+
+def _pairs(ours: Sequence[Round], theirs: Sequence[Round]) -> list[tuple[Round, Round]]:
+    return [(a, b) for a, b in zip(ours, theirs, strict=False) if a.sitting == b.sitting]
 
 
 def compare(record: Record, reference: Record) -> Comparison | None:
@@ -85,20 +119,40 @@ def compare(record: Record, reference: Record) -> Comparison | None:
     ratios = paired_ratios(record, reference)
     if not ratios:
         return Comparison(ours / theirs, None, "not side by side", 0)
-    return compare_ratios(ratios)
+    return compare_ratios(ratios, share_of(len(ratios), record.cell, reference.cell))
 
 
-def compare_ratios(ratios: Sequence[float]) -> Comparison:
-    """What do the ratios of paired rounds say?
+def compare_cpu(record: Record, reference: Record) -> Comparison | None:
+    """As :func:`compare`, of the CPU seconds; None where a round of one has none, or shows none.
+
+    The CPU's time of an external program is not only of its solving, so it is not compared.
+    """
+    if record.is_program or reference.is_program:
+        return None
+    pairs = _pairs(record.outcome.rounds, reference.outcome.rounds)
+    times = [(a.cpu_seconds, b.cpu_seconds) for a, b in pairs]
+    ratios = [a / b for a, b in times if a and b and a > 0 and b > 0]
+    if not ratios or len(ratios) < len(times):
+        return None
+    return compare_ratios(ratios, share_of(len(ratios), record.cell, reference.cell))
+
+
+def compare_ratios(ratios: Sequence[float], share: float = 1.0) -> Comparison:
+    """What do the ratios of paired rounds say? `share` as in :func:`ratio_interval`.
 
     The median is taken of logarithms: swapping the two algorithms inverts it.
     """
-    interval = median_interval(ratios)
-    ratio = exp(median(map(log, ratios)))
-    return Comparison(ratio, interval, _verdict(interval), len(ratios))
+    interval = ratio_interval(ratios, share)
+    p = 1.0 if interval is None else min(1.0, paired_p([log(r) for r in ratios]) / share)
+    return Comparison(_middle(ratios), interval, verdict_of(interval), len(ratios), p)
 
 
-def _verdict(interval: Interval | None) -> Verdict:
+def _middle(ratios: Sequence[float]) -> float:
+    return exp(median(map(log, ratios)))
+
+
+def verdict_of(interval: Interval | None) -> Verdict:
+    """What does the interval of a ratio say of the numerator?"""
     if interval is None:
         return "too few rounds"
     if 1 in interval:
@@ -114,55 +168,3 @@ def references(records: Iterable[Record], algorithm: str) -> dict[str, Record]:
 def circumstances(cell: Cell) -> str:
     """What two cells must share for their times to be comparable."""
     return f"{cell.mesh_hash} {cell.solves} {cell.backend} {cell.threads}"
-
-
-@dataclass(frozen=True)
-class Change:
-    """One cell in two runs; the comparison says what the second is, measured against the first."""
-
-    before: Record
-    after: Record
-    comparison: Comparison
-
-
-def compare_runs(before: Sequence[Record], after: Sequence[Record]) -> list[Change]:
-    """What became faster or slower from one run to another?
-
-    Paired are cells of the same algorithm and parameters, surface and circumstances; the code may
-    differ, that is what is asked about. Rounds of two runs are no pairs: the interval is the
-    widest ratio that the intervals of both medians allow, and a drift of the machine from the one
-    run to the other is not in it.
-    """
-    earlier = {_same(record): record for record in before}
-    changes = []
-    for record in after:
-        old = earlier.get(_same(record))
-        if old is None:
-            continue
-        ours, theirs = record.outcome.median_seconds, old.outcome.median_seconds
-        if ours is not None and theirs is not None:
-            changes.append(Change(old, record, _unpaired(record, old, ours / theirs)))
-    return changes
-
-
-def _unpaired(record: Record, reference: Record, ratio: float) -> Comparison:
-    ours, theirs = seconds_interval(record), seconds_interval(reference)
-    rounds = min(len(record.outcome.rounds), len(reference.outcome.rounds))
-    interval = None
-    if ours is not None and theirs is not None:
-        interval = Interval(ours.low / theirs.high, ours.high / theirs.low)
-    return Comparison(ratio, interval, _verdict(interval), rounds)
-
-
-def _same(record: Record) -> str:
-    cell = record.cell
-    return f"{cell.algorithm} {sorted(cell.parameters.items())} {circumstances(cell)}"
-
-
-def machine_differences(before: dict[str, object], after: dict[str, object]) -> list[str]:
-    """Which facts of two environments differ that make their seconds incomparable?"""
-    return [
-        f"{name}: {before.get(name)} / {after.get(name)}"
-        for name in ("cpu", "cores", "memory_bytes", "platform", "python", "libraries", "blas")
-        if before.get(name) != after.get(name)
-    ]

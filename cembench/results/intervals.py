@@ -14,6 +14,8 @@ from math import comb
 
 #: The probability with which an interval encloses the median, at least.
 LEVEL = 0.95
+#: With which it may miss.
+ERROR = 0.05
 
 
 @dataclass(frozen=True)

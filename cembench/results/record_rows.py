@@ -6,12 +6,15 @@ from collections.abc import Sequence
 from typing import Any
 
 from cembench.results.comparison import (
+    Comparison,
     circumstances,
     compare,
+    compare_cpu,
     is_unstable,
     references,
     seconds_interval,
 )
+from cembench.results.many import corrected
 from cembench.results.records import Record
 
 #: Whose times the others' are compared with, as in the paper's Table 2.
@@ -19,23 +22,54 @@ REFERENCE = "cem"
 
 
 def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str, Any]]:
-    """All records of a run as flat rows, each compared with the reference on its surface."""
+    """All records of a run as flat rows, each compared with the reference on its surface.
+
+    `verdict` is of each comparison alone, `verdict_corrected` of all of these rows together (Holm),
+    and `p` is corrected likewise.
+    """
+    compared = against_reference(records, reference)
+    together = iter(corrected([found for _, found in compared if found is not None]))
+    told = []
+    for record, (base, found) in zip(records, compared, strict=True):
+        cpu = compare_cpu(record, base) if base is not None and found is not None else None
+        both = next(together) if found is not None else None
+        told.append(row(record) | _compared(base, found, both, cpu))
+    return told
+
+
+def against_reference(
+    records: Sequence[Record], reference: str = REFERENCE
+) -> list[tuple[Record | None, Comparison | None]]:
+    """For each record its reference and the comparison; None where there is none."""
     known = references(records, reference)
-    return [row(r) | _compared(r, known.get(circumstances(r.cell))) for r in records]
+    told: list[tuple[Record | None, Comparison | None]] = []
+    for record in records:
+        base = known.get(circumstances(record.cell))
+        other = base is not None and base.cell.algorithm != record.cell.algorithm
+        told.append((base, compare(record, base) if other and base is not None else None))
+    return told
 
 
-def _compared(record: Record, reference: Record | None) -> dict[str, Any]:
+def _compared(
+    reference: Record | None,
+    found: Comparison | None,
+    together: Comparison | None,
+    cpu: Comparison | None,
+) -> dict[str, Any]:
     """Speedup of the reference over this record's algorithm (Eq. 33), and the verdict on this."""
-    found = None
-    if reference is not None and reference.cell.algorithm != record.cell.algorithm:
-        found = compare(record, reference)
     interval = found.speedup_interval if found else None
+    cpu_interval = cpu.interval if cpu else None
     return {
         "reference": reference.cell.algorithm if found and reference else None,
         "speedup": found.speedup if found else None,
         "speedup_low": interval.low if interval else None,
         "speedup_high": interval.high if interval else None,
         "verdict": found.verdict if found else None,
+        "verdict_corrected": together.verdict if together else None,
+        "p": together.p if together else None,
+        "cpu_ratio": cpu.ratio if cpu else None,
+        "cpu_ratio_low": cpu_interval.low if cpu_interval else None,
+        "cpu_ratio_high": cpu_interval.high if cpu_interval else None,
     }
 
 
@@ -67,6 +101,8 @@ def row(record: Record) -> dict[str, Any]:
         "seconds_min": min((min(r.calls) for r in outcome.rounds), default=None),
         "seconds_calls": [list(r.calls) for r in outcome.rounds],
         "unstable": is_unstable(record),
+        "cpu_seconds": outcome.cpu_seconds,
+        "busy_rounds": sum(bool(r.neighbours and r.neighbours.busy) for r in outcome.rounds),
         "start_seconds": outcome.start_seconds,
         "own_seconds": outcome.own_seconds,
         "solve_seconds": outcome.solve_seconds if record.is_program else None,
@@ -94,7 +130,9 @@ def row(record: Record) -> dict[str, Any]:
         "backend": cell.backend,
         "threads": cell.threads,
         "mesh_hash": cell.mesh_hash,
-        "repeats": cell.repeats,
+        "repeats": cell.repeats or None,
+        "precision": cell.precision,
+        "rounds": len(outcome.rounds),
         "environment": record.environment,
         "started_at": record.started_at,
         "key": cell.key,

@@ -10,9 +10,17 @@ import json
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from math import inf
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    model_serializer,
+    model_validator,
+)
 
 from cembench.core.names import file_name, printable
 from cembench.core.notices import Notice, notice_of_old
@@ -23,6 +31,9 @@ SCHEMA_VERSION = 1
 #: The fewest rounds whose smallest and largest figure enclose the median in 95 % of all cases: the
 #: chance that all lie on one side of it is 2 / 2^6.
 DEFAULT_ROUNDS = 6
+
+#: With so many cores at work beside it, a process counts as measured on a busy machine.
+BUSY_CORES = 0.25
 
 #: Is a surface a model of the paper, a stand-in for one, or neither?
 MeshOrigin = Literal["model", "stand-in", "surface"]
@@ -75,8 +86,26 @@ class Cell(BaseModel):
     solves: str = "reuse"
     backend: str = "cvxopt"
     threads: Positive = 1
-    #: Rounds, each a fresh process; see docs/measuring.md.
-    repeats: Positive = DEFAULT_ROUNDS
+    #: Rounds, each a fresh process; see docs/measuring.md. 0: as many as `precision` takes.
+    repeats: Count = DEFAULT_ROUNDS
+    #: How far the intervals may reach to either side of a figure, relative to it; None: the number
+    #: of rounds is fixed.
+    precision: Annotated[float, Field(gt=0, lt=1)] | None = None
+
+    @model_validator(mode="after")
+    def _check_rounds(self) -> Self:
+        """Rounds are either fixed or until precise."""
+        if (self.repeats == 0) != (self.precision is not None):
+            raise ValueError("a cell has a number of rounds, or a precision")
+        return self
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Write a cell without a precision, and so its key, as before there were precisions."""
+        content: dict[str, Any] = dump(self)
+        if self.precision is None:
+            content.pop("precision", None)
+        return content
 
     @property
     def key(self) -> str:
@@ -167,6 +196,21 @@ class MeshFacts(BaseModel):
     origin: MeshOrigin = "surface"
 
 
+class Neighbours(BaseModel):
+    """What else the machine did while a process was measured, on the average of that time."""
+
+    #: Cores that other programs kept at work, and cores that the host of a virtual machine took.
+    other_cores: Annotated[float, Field(ge=0, allow_inf_nan=False)]
+    stolen_cores: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.0
+    #: Whether a core was slowed down because it was hot; None where the system does not tell.
+    throttled: bool | None = None
+
+    @property
+    def busy(self) -> bool:
+        """Whether that is enough to be seen in the seconds."""
+        return self.other_cores + self.stolen_cores > BUSY_CORES or bool(self.throttled)
+
+
 class Round(BaseModel):
     """The timed calls of one process: a round has one such process for every cell."""
 
@@ -175,6 +219,10 @@ class Round(BaseModel):
     started_at: str = ""
     #: Wall-clock seconds of each timed call after the warm-up, in order.
     calls: Annotated[tuple[CallSeconds, ...], Field(min_length=1)]
+    #: Wall-clock seconds of the reference kernel, measured once a round beside all of its cells.
+    kernel_seconds: CallSeconds | None = None
+    #: None in records older than this field.
+    neighbours: Neighbours | None = None
     #: Seconds by phase of the call that is the round's figure; they add up to it.
     phases: dict[str, Seconds] = Field(default_factory=dict)
     #: CPU seconds of the process and of all it started, of the call whose seconds are the figure;
@@ -339,6 +387,12 @@ class Outcome(BaseModel):
     def median_seconds(self) -> float | None:
         """The cell's figure: the median over its rounds."""
         return lower_median(self.seconds) if self.rounds else None
+
+    @property
+    def cpu_seconds(self) -> float | None:
+        """The median over the rounds of the CPU seconds; None where one has none."""
+        known = [r.cpu_seconds for r in self.rounds if r.cpu_seconds is not None]
+        return lower_median(known) if known and len(known) == len(self.rounds) else None
 
     @property
     def phases(self) -> dict[str, float]:

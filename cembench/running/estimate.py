@@ -14,6 +14,7 @@ from statistics import mean
 from typing import Literal
 
 from cembench.results import paper
+from cembench.results.looks import LOOKS
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
@@ -32,6 +33,8 @@ CHECK_SECONDS_A_FACE = 2e-6
 #: Bytes of an empty process, and by triangle, where nothing is recorded.
 ROUGH_BYTES = 150e6
 ROUGH_BYTES_A_FACE = 2500.0
+#: Rounds that a cell takes until it is precise, on a machine with little else to do.
+USUAL_ROUNDS = 20
 #: Growth with the number of triangles where records of one size only are there.
 _USUAL_EXPONENT = 1.2
 
@@ -56,6 +59,8 @@ class Estimate:
     seconds: float
     memory_bytes: float
     basis: Basis
+    #: Of the seconds, those that are spent whatever the budget is: until the first look.
+    least_seconds: float = 0.0
 
 
 def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
@@ -81,8 +86,18 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
     start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
     calls = CALLS_A_ROUND if call < LONG_CALL else 1
-    rounds = cell.repeats * (start + calls * call)
-    return Estimate(call, check + rounds, memory, basis)
+    round_ = start + calls * call
+    least = (cell.repeats or LOOKS[0]) * round_
+    rounds = (cell.repeats or USUAL_ROUNDS) * round_
+    return Estimate(call, check + rounds, memory, basis, check + least)
+
+
+def planned_seconds(costs: Sequence[Estimate], budget: float | None) -> float:
+    """Return the seconds of all cells: more rounds than the first are taken within the budget."""
+    everything = sum(cost.seconds for cost in costs)
+    if budget is None:
+        return everything
+    return max(sum(cost.least_seconds for cost in costs), min(everything, budget))
 
 
 def _bytes_at(faces: float, size: float, peak: float) -> float:

@@ -2,10 +2,12 @@
 
 First every cell is checked: one call in a process of its own, whose map is verified and whose
 memory is measured. What ends ok is then timed in rounds. A round has a fresh process for every
-cell, in a random order, so a machine that slows down slows them all. Where that is possible the
-processes of a round are forked from one that has loaded the libraries
-(:mod:`cembench.running.fork_server`), another one each round: what differs from one interpreter to
-the next (addresses, hash seeds) is the same for all cells of a round, and averaged over.
+cell, in a random order, so a machine that slows down slows them all. A cell has a fixed number of
+rounds, or is measured until its intervals are narrow (:mod:`cembench.running.until_precise`), as
+long as time is left. Where that is possible the processes of a round are forked from one that has
+loaded the libraries (:mod:`cembench.running.fork_server`), another one each round: what differs
+from one interpreter to the next (addresses, hash seeds) is the same for all cells of a round, and
+averaged over.
 """
 
 from __future__ import annotations
@@ -18,12 +20,13 @@ import sys
 import tempfile
 import uuid
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import cache
+from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -36,6 +39,9 @@ from cembench.core.errors import RecordError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.backends import default_backend
+from cembench.results.comparison import circumstances
+from cembench.results.looks import USUAL_MOST_ROUNDS, is_look, next_look
+from cembench.results.record_rows import REFERENCE
 from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, Status, not_ok
 from cembench.results.samples import Samples
 from cembench.results.store import Store
@@ -45,16 +51,21 @@ from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.judge import Promise
 from cembench.running.judging import Checked, JudgedCalls, sample
+from cembench.running.kernel import kernel_seconds
 from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, WARM_UP
 from cembench.running.motion import UNMOVED
+from cembench.running.neighbours import counters, neighbours
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
+from cembench.running.until_precise import affordable, cost, lack
 from cembench.running.worker import PROGRAMS, Answer, Job, JobTask
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
 #: Wall-clock seconds that judging a map may take at least.
 JUDGE_SECONDS = 600.0
+#: Seconds after which no cell goes on that has had its first look, unless the user says otherwise.
+USUAL_BUDGET = 1800.0
 #: The largest answer that is read: what a worker keeps takes a few megabytes at most.
 LARGEST_ANSWER_BYTES = 2**24
 
@@ -73,6 +84,14 @@ class Options:
     rerun_failed: bool = False
     #: Of the random order within each round.
     seed: int = 0
+    #: With which algorithm the others are compared: their ratios to it become precise.
+    reference: str = REFERENCE
+    #: Rounds of a cell that is measured until it is precise, at most.
+    most_rounds: int = USUAL_MOST_ROUNDS
+    #: Wall-clock seconds after which no cell goes on that has had its first look; None: no limit.
+    budget: float | None = None
+    #: How often a process is run again beside which the machine was busy; the quietest counts.
+    repeat_busy: int = 0
 
     def measures_again(self, kept: Record) -> bool:
         """Is a cell measured although there is this record of it?"""
@@ -85,10 +104,14 @@ class Step:
 
     #: None: the check.
     round: int | None = None
+    #: How many there are, or those up to the next look, after which there may be more.
     rounds: int = 0
+    may_go_on: bool = False
 
     def __str__(self) -> str:
-        return "check" if self.round is None else f"round {self.round} of {self.rounds}"
+        if self.round is None:
+            return "check"
+        return f"round {self.round} of {'at least ' if self.may_go_on else ''}{self.rounds}"
 
 
 class Watcher:
@@ -99,6 +122,9 @@ class Watcher:
 
     def begins(self, processes: int) -> None:
         """So many processes are to be run."""
+
+    def goes_on(self, task: Task, rounds: int) -> None:
+        """A cell is not precise yet: so many more rounds of it follow."""
 
     def starts(self, task: Task, step: Step) -> None:
         """A process starts."""
@@ -174,18 +200,30 @@ class _Run:
     environment: dict[str, Any]
     sitting: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     records: dict[str, Record] = field(default_factory=dict)
+    since: float = field(default_factory=monotonic)
+    #: What the journals hold, by the cells' labels.
+    checks: dict[str, Outcome] = field(default_factory=dict)
+    rounds: dict[str, dict[int, Round]] = field(default_factory=dict)
 
     def measure(self, tasks: Sequence[Task]) -> None:
         asked = {task.cell.label for task in tasks}
         pending = [task for task in tasks if not self._is_kept(task, asked)]
+        for task in pending:
+            self._load(task)
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         for task in pending:
             self._check(task)
-        for number in range(max((task.cell.repeats for task in pending), default=0)):
+        most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
+        for number in range(most + 1):
+            if is_look(number, self.options.most_rounds):
+                self._look(pending, number)
             open_ = [task for task in pending if self._lacks(task, number)]
+            if not open_:
+                continue
             self.launcher.close()
+            kernel = kernel_seconds()
             for task in in_random_order(open_, self.options.seed, number):
-                self._time(task, number)
+                self._time(task, number, kernel)
 
     def _is_kept(self, task: Task, asked: AbstractSet[str]) -> bool:
         """Is there a record that stands? Samples of what is measured anew are forgotten.
@@ -202,37 +240,84 @@ class _Run:
         self._finish(task, kept, kept=True)
         return True
 
-    def _processes_left(self, task: Task) -> int:
+    def _load(self, task: Task) -> None:
         samples = self._samples(task)
-        done = len(samples.rounds())
-        return (samples.check() is None) + task.cell.repeats - done
+        checked = samples.check()
+        if checked is not None:
+            self.checks[task.cell.label] = checked
+        self.rounds[task.cell.label] = samples.rounds()
+
+    def _processes_left(self, task: Task) -> int:
+        done = len(self.rounds[task.cell.label])
+        return (task.cell.label not in self.checks) + max(0, self._last(task, done) - done)
+
+    def _last(self, task: Task, done: int) -> int:
+        """After which round is a cell over, or looked at next?"""
+        return task.cell.repeats or next_look(done, self.options.most_rounds)
 
     def _check(self, task: Task) -> None:
-        samples = self._samples(task)
-        outcome = samples.check()
+        outcome = self.checks.get(task.cell.label)
         if outcome is None:
-            with _Process(self.watcher, task, Step()):
+            with _Process(self.watcher, task, self._step(task, None)):
                 outcome, uv = self.launcher.check(task)
-            samples.save_check(outcome, uv)
+            self._samples(task).save_check(outcome, uv)
+            self.checks[task.cell.label] = outcome
         if outcome.status != "ok":
             self._save(task, outcome.model_copy(update={"rounds": ()}))
         else:
             self._save_if_complete(task)
 
+    def _step(self, task: Task, number: int | None) -> Step:
+        last = self._last(task, number or 0)
+        may_go_on = task.cell.precision is not None and last < self.options.most_rounds
+        return Step(None if number is None else number + 1, last, may_go_on)
+
     def _lacks(self, task: Task, number: int) -> bool:
         return (
             task.cell.label not in self.records
-            and number < task.cell.repeats
-            and number not in self._samples(task).rounds()
+            and number < (task.cell.repeats or self.options.most_rounds)
+            and number not in self.rounds[task.cell.label]
         )
 
-    def _time(self, task: Task, number: int) -> None:
-        step = Step(number + 1, task.cell.repeats)
+    def _look(self, pending: Sequence[Task], number: int) -> None:
+        """End the cells that are precise, or cannot be measured on; references outlast the rest.
+
+        A cell that has more rounds, from before a kill, went on when this was asked before.
+        """
+        last = number >= self.options.most_rounds
+        open_ = {
+            task.cell.label: task
+            for task in pending
+            if task.cell.label not in self.records
+            and task.cell.precision is not None
+            and (last or len(self.rounds[task.cell.label]) == number)
+        }
+        partners = _partners(open_.values(), self.options.reference)
+        rounds = {label: list(self.rounds[label].values()) for label in open_}
+        lacks = {}
+        for label, task in open_.items():
+            partner = partners.get(label)
+            beside = (open_[partner].cell, rounds[partner]) if partner else None
+            lacks[label] = lack(task.cell, rounds[label], beside)
+        more = next_look(number, self.options.most_rounds) - number
+        costs = {label: more * cost(rounds[label]) for label in open_}
+        go_on = set() if last else affordable(lacks, costs, partners, self._seconds_left())
+        for label in sorted(open_.keys() - go_on, key=lambda label: label in partners.values()):
+            self._save_measured(open_[label])
+        for label in go_on:
+            self.watcher.goes_on(open_[label], more)
+
+    def _seconds_left(self) -> float:
+        if self.options.budget is None:
+            return inf
+        return self.options.budget - (monotonic() - self.since)
+
+    def _time(self, task: Task, number: int, kernel: float) -> None:
+        step = self._step(task, number)
         started = _now()
-        checked = self._samples(task).check()
-        assert checked is not None
+        checked = self.checks[task.cell.label]
         with _Process(self.watcher, task, step):
-            found = self.launcher.time(task, Checked.of(checked))
+            found = self._quietest(task, Checked.of(checked))
         if isinstance(found, Outcome):
             more: dict[str, Any] = {"cause": f"in {step}: {found.cause}"}
             if found.status == "not_comparable":  # the map is valid, and so are its figures
@@ -240,16 +325,43 @@ class _Run:
                 found = checked
             self._save(task, found.model_copy(update=more))
             return
-        origin = {"sitting": self.sitting, "started_at": started}
-        self._samples(task).save_round(number, found.model_copy(update=origin))
+        origin = {"sitting": self.sitting, "started_at": started, "kernel_seconds": kernel}
+        measured = found.model_copy(update=origin)
+        self._samples(task).save_round(number, measured)
+        self.rounds[task.cell.label][number] = measured
         self._save_if_complete(task)
 
+    def _quietest(self, task: Task, checked: Checked) -> Round | Outcome:
+        """Time one process; again where the machine was busy, as often as that is asked for.
+
+        Which one counts is decided by what others did, and never by the seconds.
+        """
+        best: Round | None = None
+        for _ in range(1 + self.options.repeat_busy):
+            before = counters()
+            found = self.launcher.time(task, checked)
+            if isinstance(found, Outcome):
+                return found
+            beside = neighbours(before, counters(), task.cell.threads)
+            found = found.model_copy(update={"neighbours": beside})
+            if best is None or _disturbed(found) < _disturbed(best):
+                best = found
+            if not beside.busy:
+                break
+        assert best is not None
+        return best
+
     def _save_if_complete(self, task: Task) -> None:
-        samples = self._samples(task)
-        checked, rounds = samples.check(), tuple(samples.rounds().values())
-        if checked is not None and len(rounds) >= task.cell.repeats:
-            notes = (*checked.notes, *_notes(checked, rounds))
-            self._save(task, checked.model_copy(update={"rounds": rounds, "notes": notes}))
+        if task.cell.repeats and len(self.rounds[task.cell.label]) >= task.cell.repeats:
+            self._save_measured(task)
+
+    def _save_measured(self, task: Task) -> None:
+        checked = self.checks[task.cell.label]
+        rounds = tuple(
+            self.rounds[task.cell.label][k] for k in sorted(self.rounds[task.cell.label])
+        )
+        notes = (*checked.notes, *_notes(checked, rounds))
+        self._save(task, checked.model_copy(update={"rounds": rounds, "notes": notes}))
 
     def _save(self, task: Task, outcome: Outcome) -> None:
         started = outcome.rounds[0].started_at if outcome.rounds else _now()
@@ -263,6 +375,25 @@ class _Run:
 
     def _samples(self, task: Task) -> Samples:
         return self.store.samples(task.cell, self.environment["id"])
+
+
+def _partners(tasks: Iterable[Task], reference: str) -> dict[str, str]:
+    """Return with which cell of the reference each other one is compared, by their labels."""
+    known = {
+        circumstances(task.cell): task.cell.label
+        for task in tasks
+        if task.cell.algorithm == reference
+    }
+    return {
+        task.cell.label: known[circumstances(task.cell)]
+        for task in tasks
+        if circumstances(task.cell) in known and task.cell.algorithm != reference
+    }
+
+
+def _disturbed(measured: Round) -> float:
+    beside = measured.neighbours
+    return 0.0 if beside is None else beside.other_cores + beside.stolen_cores
 
 
 @dataclass

@@ -51,7 +51,15 @@ class MeasurementSettings:
     solves: str = "reuse"
     backend: str = field(default_factory=default_backend)
     threads: int = 1
+    #: A fixed number of rounds; 0 with a precision.
     repeats: int = DEFAULT_ROUNDS
+    #: How far the intervals may reach to either side of a figure, relative to it.
+    precision: float | None = None
+
+    @classmethod
+    def until_precise(cls, precision: float, **more: Any) -> MeasurementSettings:
+        """Return settings for as many rounds as a precision takes."""
+        return cls(repeats=0, precision=precision, **more)
 
 
 def plan_cells(
@@ -106,6 +114,7 @@ def plan_cells(
                 backend=how.backend,
                 threads=how.threads,
                 repeats=how.repeats,
+                precision=how.precision,
             )
             tasks.append(Task(cell, taker, mesh, facts, tuple(plugins), sources[taker.name]))
     return tasks

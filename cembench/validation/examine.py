@@ -25,6 +25,7 @@ from cembench.validation.quality import (
     comparison_with,
     folds_on,
     quality_findings,
+    together,
     without_map,
 )
 from cembench.validation.scaling import growths, scales, sizes
@@ -192,7 +193,7 @@ def _quality(work: _Work) -> _Found:
         "surfaces": tuple(mesh.name for mesh in meshes),
         "folds_on": tuple(folds_on(ours)),
         "no_map_on": without_map(ours),
-        "against": tuple(comparison_with(records, work.name, name) for name in work.baselines),
+        "against": together([comparison_with(records, work.name, b) for b in work.baselines]),
     }
 
 

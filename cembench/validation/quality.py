@@ -6,7 +6,8 @@ higher where the ratio is more than 1 % off 1; the median ratio has the order in
 
 Speed: a round's figure is the median over the surfaces of the ratio of both algorithms' seconds in
 that round; the interval is over the rounds, so it tells how sure the figure is on these surfaces,
-not how it would be on others.
+not how it would be on others. Verdicts that are listed together, of several surfaces or several
+baselines, are corrected for that (Holm).
 """
 
 from __future__ import annotations
@@ -18,10 +19,11 @@ from statistics import median
 from pydantic import BaseModel, ConfigDict
 
 from cembench.core.notices import NoticeKind, of_kind
+from cembench.results.comparison import Comparison, compare, compare_ratios, paired_ratios
 from cembench.results.comparison import Verdict as SpeedVerdict
-from cembench.results.comparison import compare, compare_ratios, paired_ratios
 from cembench.results.external_words import solve_words
-from cembench.results.intervals import median_interval
+from cembench.results.intervals import Interval, median_interval
+from cembench.results.many import corrected
 from cembench.results.records import FaultKind, Record
 from cembench.validation.finding import ValidationFinding
 
@@ -60,6 +62,8 @@ class Speed(BaseModel):
     high: float | None
     verdict: SpeedVerdict
     rounds: int
+    #: How unlikely a difference as clear as this is by chance; see `results.comparison`.
+    p: float = 1.0
 
 
 class Pair(BaseModel):
@@ -121,7 +125,11 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     # The size of a free image is another's choice where the code is another's.
     free = one.target == "free boundary" and (one.external, other.external) != (None, None)
     relative = one.target != other.target or free
-    pairs = tuple(_pair(mine[name], theirs[name], relative=relative) for name in names)
+    verdicts = _verdicts([(mine[name], theirs[name]) for name in names])
+    pairs = tuple(
+        _pair(mine[name], theirs[name], verdict, relative=relative)
+        for name, verdict in zip(names, verdicts, strict=True)
+    )
     return BaselineComparison(
         baseline=baseline,
         title=theirs[names[0]].title,
@@ -138,6 +146,33 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
         speed=speed_of([(mine[name], theirs[name]) for name in names]),
         solve_time=next((solve_words(r) for r in mine.values() if r.is_program), ""),
     )
+
+
+def together(against: Sequence[BaselineComparison]) -> tuple[BaselineComparison, ...]:
+    """Return comparisons with several baselines whose verdicts on speed hold together (Holm)."""
+    told = iter(corrected([_comparison(a.speed) for a in against if a.speed is not None]))
+    return tuple(a if a.speed is None else _with_verdict(a, next(told).verdict) for a in against)
+
+
+def _with_verdict(against: BaselineComparison, verdict: SpeedVerdict) -> BaselineComparison:
+    assert against.speed is not None
+    return against.model_copy(
+        update={"speed": against.speed.model_copy(update={"verdict": verdict})}
+    )
+
+
+def _comparison(speed: Speed) -> Comparison:
+    interval = None
+    if speed.low is not None and speed.high is not None:
+        interval = Interval(speed.low, speed.high)
+    return Comparison(speed.ratio, interval, speed.verdict, speed.rounds, speed.p)
+
+
+def _verdicts(pairs: Sequence[tuple[Record, Record]]) -> list[SpeedVerdict | None]:
+    """Return who is faster on each surface, in verdicts that hold together; None without times."""
+    found = [compare(ours, theirs) for ours, theirs in pairs]
+    told = iter(corrected([one for one in found if one is not None]))
+    return [None if one is None else next(told).verdict for one in found]
 
 
 def sides(ratios: Sequence[float]) -> PairedComparison:
@@ -162,7 +197,14 @@ def speed_of(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
         return None
     found = compare_ratios(by_round)
     low, high = (found.interval.low, found.interval.high) if found.interval else (None, None)
-    return Speed(ratio=found.ratio, low=low, high=high, verdict=found.verdict, rounds=len(by_round))
+    return Speed(
+        ratio=found.ratio,
+        low=low,
+        high=high,
+        verdict=found.verdict,
+        rounds=len(by_round),
+        p=found.p,
+    )
 
 
 def folds_on(records: Sequence[Record]) -> list[str]:
@@ -212,7 +254,7 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
     ]
 
 
-def _pair(ours: Record, theirs: Record, *, relative: bool) -> Pair:
+def _pair(ours: Record, theirs: Record, verdict: SpeedVerdict | None, *, relative: bool) -> Pair:
     found = compare(ours, theirs)
     return Pair(
         surface=ours.cell.mesh,
@@ -224,7 +266,7 @@ def _pair(ours: Record, theirs: Record, *, relative: bool) -> Pair:
         seconds=ours.outcome.median_seconds if ours.outcome.status == "ok" else None,
         baseline_seconds=theirs.outcome.median_seconds if theirs.outcome.status == "ok" else None,
         seconds_ratio=found.ratio if found else None,
-        speed=found.verdict if found else None,
+        speed=verdict,
         start_seconds=ours.outcome.start_seconds,
         solve_seconds=ours.outcome.solve_seconds if ours.is_program else None,
         records=(ours.cell.key, theirs.cell.key),

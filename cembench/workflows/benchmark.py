@@ -14,9 +14,11 @@ from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Registry, load_registry
-from cembench.results.records import DEFAULT_ROUNDS, Record
+from cembench.results.looks import USUAL_PRECISION
+from cembench.results.record_rows import REFERENCE
+from cembench.results.records import Record
 from cembench.results.store import Store
-from cembench.running.local import DEFAULT_TIMEOUT, Options, Watcher, run_tasks
+from cembench.running.local import DEFAULT_TIMEOUT, USUAL_BUDGET, Options, Watcher, run_tasks
 from cembench.running.plan import MeasurementSettings, PaperRole, paper_roles, plan_cells
 from cembench.workflows.notebook import html_table
 from cembench.workflows.surface_input import SurfaceInput, checked_surface
@@ -116,7 +118,10 @@ def benchmark(
     surfaces: Iterable[SurfaceInput],
     algorithms: Sequence[str] | None = None,
     *,
-    rounds: int = DEFAULT_ROUNDS,
+    precision: float = USUAL_PRECISION,
+    rounds: int | None = None,
+    budget: float | None = USUAL_BUDGET,
+    reference: str = REFERENCE,
     out: str | os.PathLike[str] | None = None,
     parameters: Mapping[str, Any] | None = None,
     solves: Sequence[str] = ("reuse",),
@@ -136,8 +141,15 @@ def benchmark(
         Surfaces that came as arrays are called ``surface-1``, ``surface-2``, ...
     algorithms : sequence of str, optional
         Default: every usual algorithm that takes at least one of the surfaces.
-    rounds : int
-        Fresh processes for every cell; fewer than six give no interval.
+    precision : float
+        Rounds go on until 95 % intervals reach at most so far to either side, relative to the
+        figure: those of a cell's seconds, and of their ratio to the reference's.
+    rounds : int, optional
+        A fixed number of rounds instead; fewer than six give no interval.
+    budget : float, optional
+        Seconds after which only the first seven rounds are finished; None: no limit.
+    reference : str
+        The algorithm whose ratios to the others become precise.
     out : path, optional
         The run's folder; what it already holds is not measured again. Default: a new temporary
         folder, see :attr:`Run.folder`.
@@ -171,8 +183,12 @@ def benchmark(
     given = list(surfaces)
     if not given:
         raise ParameterError("no surface to measure on; give at least one.")
-    if rounds < 1:
+    if rounds is not None and rounds < 1:
         raise ParameterError(f"rounds={rounds!r} is not allowed; it takes at least 1.")
+    if not 0 < precision < 1:
+        raise ParameterError(
+            f"precision={precision!r} is not allowed; it is a share between 0 and 1, as 0.05."
+        )
     chosen = [registry.algorithm(name) for name in algorithms or registry.usual_algorithms]
     kinds = list(dict.fromkeys(a.mesh_type for a in chosen))
     meshes: list[TriangleMesh] = []
@@ -187,10 +203,13 @@ def benchmark(
         chosen = [a for a in chosen if any(isinstance(mesh, a.mesh_type) for mesh in meshes)]
     tasks = []
     for policy in solves:
-        settings = MeasurementSettings(policy, backend or default_backend(), threads, rounds)
+        goal = None if rounds is not None else precision
+        settings = MeasurementSettings(
+            policy, backend or default_backend(), threads, rounds or 0, goal
+        )
         tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
-    options = Options(timeout=timeout, memory_bytes=memory_bytes, seed=seed)
+    options = Options(timeout, memory_bytes, seed=seed, reference=reference, budget=budget)
     run_tasks(tasks, Store(folder), options, watcher)
     return Run(folder)
 

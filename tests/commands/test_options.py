@@ -1,6 +1,7 @@
 """Every option that takes a number, or names something, has a range that is told."""
 
 import inspect
+import json
 
 import pytest
 import typer
@@ -21,6 +22,18 @@ SMALL = ("--surfaces", "flat-disk", "--faces", 100, "-a", "cem", "--dry-run")
         ("--threads", 10**9),
         ("--repeats", 0),
         ("--repeats", 10**9),
+        ("--rounds", 0),
+        ("--precision", "0"),
+        ("--precision", "80%"),
+        ("--precision", "nan"),
+        ("--precision", "much"),
+        ("--max-rounds", 7),
+        ("--max-rounds", 1000),
+        ("--budget", "soon"),
+        ("--budget", "-1m"),
+        ("--budget", "nans"),
+        ("--budget", "1e300h"),
+        ("--repeat-busy", -1),
         ("--seed", -1),
         ("--seed", 10**30),
         ("--timeout", 0),
@@ -53,6 +66,23 @@ def test_what_is_out_of_range_is_refused(cli, option):
     assert (code, out) == (2, "")
     assert str(option[1]).partition("=")[0] in err or option[0] in err
     assert not list(cli.folder.iterdir())
+
+
+def test_rounds_are_fixed_or_until_precise_but_not_both(cli):
+    code, out, err = cli("run", *SMALL, "--rounds", 6, "--precision", "5%")
+    assert (code, out) == (2, "")
+    assert "give one of both" in err
+
+
+@pytest.mark.parametrize(
+    "option",
+    [("--precision", "2.5%"), ("--precision", 0.1), ("--budget", "90s"), ("--budget", "0.5h")],
+)
+def test_a_precision_and_a_time_are_written_in_several_ways(cli, option):
+    code, out, _ = cli("run", *SMALL, *option, "--json")
+    (cell,) = json.loads(out)["cells"]
+    assert code == 0
+    assert cell["estimate"]["least_seconds"] < cell["estimate"]["seconds"]
 
 
 @pytest.mark.parametrize(

@@ -42,6 +42,11 @@ def test_status_counts_and_names_what_is_not_ok(runs):
     assert found["states"] == {"ok": 1, "in work": 1, "waiting": 1}
     assert (found["asked"], found["recorded_besides"], found["measuring"]) == (3, 2, False)
     assert "in work: 1 of 6 rounds done" in runs("status", "two")[1]
+    precise = record_of([], algorithm="fdm", mesh="hat", repeats=0, precision=0.05).cell
+    store.save_plan([precise])
+    store.samples(precise, "e").save_round(0, record_of([1.0]).outcome.rounds[0])
+    told = runs("status", "two")[1]
+    assert "in work: 1 rounds done, of as many as ±5 % takes" in told
 
 
 def test_show_finds_a_cell_by_name_or_key(runs):
@@ -58,7 +63,11 @@ def test_show_finds_a_cell_by_name_or_key(runs):
 def test_compare_tells_what_changed_and_that_the_machines_differ(runs):
     code, out, err = runs("compare", "one", "two")
     assert code == 0
-    assert [line.split()[-1] for line in out.splitlines()[1:]] == ["faster", "undecided"]
+    lines = out.splitlines()
+    assert [line.split()[-1] for line in lines[1:3]] == ["faster", "undecided"]
+    told = " ".join(lines[3:])
+    assert "drifted between the runs is not known" in told
+    assert "Holm, 2 comparisons" in told
     assert max(map(len, out.splitlines())) <= 80
     assert "not measured under the same conditions" in err
     assert "cpu: one / two" in err

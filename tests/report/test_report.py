@@ -2,12 +2,14 @@ import hashlib
 import io
 import json
 import re
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
 from cembench.core.errors import RecordError
 from cembench.report.content.evidence import Evidence
+from cembench.report.content.report import facts
 from cembench.report.document import (
     Claim,
     Gap,
@@ -261,3 +263,15 @@ def test_reproduce_is_a_run_and_its_report(cli, monkeypatch):
     assert max(map(len, out.splitlines()[:-1])) <= 80
     assert out.splitlines()[-1] == f"Report: {cli.folder / 'here/report/index.html'}"
     assert (cli.folder / "here/report/report.tex").is_file()
+
+
+def test_the_head_says_until_when_it_was_measured(evidence):
+    assert "until" not in dict(facts(evidence))["rounds"]
+    records = [
+        r.model_copy(
+            update={"cell": r.cell.model_copy(update={"repeats": 0, "precision": precision})}
+        )
+        for r, precision in zip(evidence.records, [0.05, 0.1] * 100, strict=False)
+    ]
+    told = dict(facts(replace(evidence, records=tuple(records))))["rounds"]
+    assert "until ±5 % or ±10 % was reached" in told

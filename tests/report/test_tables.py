@@ -187,3 +187,23 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
     assert len(table.rows) - table.footer_rows == 3
     _, counted = entry(table, "n, surfaces counted", "LDM", "here")
     assert counted.number == 2
+
+
+def test_how_sure_the_speedups_are_alone_together_and_over_surfaces(evidence):
+    tables = by_name(table_2(evidence))
+    table = tables["sure-speedups"]
+    by_title = {
+        (column.group, column.title): [row[k] for row in table.rows]
+        for k, column in enumerate(table.columns)
+    }
+    names = [value.text for value in by_title["", "algorithm"]]
+    assert "FDM" in names
+    place = names.index("FDM")
+    alone = [by_title["one by one", t][place].number for t in ("CEM faster", "slower", "undecided")]
+    both = [by_title["together", t][place].number for t in ("CEM faster", "slower", "undecided")]
+    surfaces = by_title["", "surfaces"][place].number
+    assert sum(alone) == sum(both) == surfaces >= 2
+    assert both[0] <= alone[0]
+    assert by_title["over surfaces", "sign test"][place].number == 2 * 0.5**surfaces
+    assert by_title["over surfaces", "95 % interval"][place].why == "fewer than 6 surfaces"
+    assert "Holm" in table.caption

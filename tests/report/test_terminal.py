@@ -2,13 +2,20 @@ from io import StringIO
 
 from rich.console import Console
 
-from cembench.report.render.terminal import speedups_table
+from cembench.report.render.terminal import results_table, speedups_table
+from cembench.results.records import Neighbours
 from tests.results.test_comparison import record_of
 
 
 def printed(records):
     console = Console(width=80, record=True, file=StringIO())
     console.print(speedups_table(records, "cem"))
+    return console.export_text()
+
+
+def shown(table):
+    console = Console(width=80, record=True, file=StringIO())
+    console.print(table)
     return console.export_text()
 
 
@@ -39,3 +46,30 @@ def test_with_enough_rounds_every_comparison_has_its_interval_and_verdict():
 
 def test_without_the_reference_there_is_no_table():
     assert speedups_table([record_of([1.0], algorithm="fdm")], "cem") is None
+
+
+def test_verdicts_of_a_table_hold_together_and_what_that_costs_is_said():
+    near = [1.02, 1.05, 1.3, 1.9, 2.5, 1.6]
+    cells = [
+        record_of(times, algorithm=name, mesh=mesh, mesh_hash=mesh)
+        for mesh in ("hat", "foot")
+        for name, times in (("cem", [1.0] * 6), ("fdm", near))
+    ]
+    text = " ".join(printed(cells).split())
+    assert text.count("undecided") == 2
+    assert "(Holm, 2 comparisons)" in text
+    assert "Each alone, 2 more would be called different" in text
+    assert "Holm" not in printed(cells[:2])
+
+
+def test_a_busy_machine_is_told_once():
+    record = record_of([1.0] * 6)
+    quiet, busy = Neighbours(other_cores=0.0), Neighbours(other_cores=1.0)
+    rounds = [
+        one.model_copy(update={"neighbours": busy if k < 2 else quiet})
+        for k, one in enumerate(record.outcome.rounds)
+    ]
+    outcome = record.outcome.model_copy(update={"rounds": tuple(rounds)})
+    text = shown(results_table([record.model_copy(update={"outcome": outcome})]))
+    assert "busy beside 2 of 6 processes" in text
+    assert "busy" not in shown(results_table([record]))

@@ -4,11 +4,10 @@ import pytest
 from cembench.results.comparison import (
     compare,
     compare_ratios,
-    compare_runs,
     is_unstable,
-    machine_differences,
 )
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.runs_compared import compare_runs, machine_differences
 
 
 def record_of(seconds, sittings=None, **cell):
@@ -83,7 +82,7 @@ def test_equal_algorithms_are_told_apart_in_at_most_5_percent(rounds):
     pairs = noisy_seconds(rng, 4000, rounds)
     verdicts = [compare_ratios(ours / theirs).verdict for ours, theirs in pairs.transpose(0, 2, 1)]
     wrong = np.mean([verdict != "undecided" for verdict in verdicts])
-    assert wrong < 0.05, f"{wrong:.1%} of {len(verdicts)}"
+    assert wrong < 0.06, f"{wrong:.1%} of {len(verdicts)}"  # 5 % and three standard deviations
 
 
 def test_a_bootstrap_of_six_rounds_would_be_wrong_more_often_than_it_says():
@@ -104,8 +103,8 @@ def test_a_true_difference_is_found():
 
 
 def test_a_figure_is_unstable_where_its_interval_is_wide():
-    assert is_unstable(record_of([1, 1, 1, 1, 1, 1.3]))
-    assert not is_unstable(record_of([1, 1, 1, 1, 1, 1.1]))
+    assert is_unstable(record_of([1, 1, 1, 1, 1, 1.12]))
+    assert not is_unstable(record_of([1, 1, 1, 1, 1, 1.09]))
     assert not is_unstable(record_of([1, 2]))
 
 
@@ -114,7 +113,9 @@ def test_two_runs_compare_cell_by_cell():
     after = [record_of([1.0] * 6, code_hash="other"), record_of([1.0] * 6, threads=2)]
     (change,) = compare_runs(before, after)
     assert change.comparison.verdict == "faster"
-    assert (change.comparison.interval.low, change.comparison.interval.high) == (1 / 2.2, 0.5)
+    interval = change.comparison.interval
+    assert (interval.low, interval.high) == (pytest.approx(1 / 2.2), pytest.approx(0.5))
+    assert change.drift is None
     (few,) = compare_runs([record_of([1.0])], [record_of([2.0])])
     assert few.comparison.verdict == "too few rounds"
 

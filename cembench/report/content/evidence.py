@@ -232,14 +232,17 @@ class Evidence:
         It is the median ratio within rounds; CEM with its main parameters, the same surface and
         way of solving.
         """
+        base = self.base(record)
+        found = None if base is None else compare(record, base)
+        return None if found is None else found.speedup
+
+    def base(self, record: Record) -> Record | None:
+        """CEM's record that a record's times are compared with; None for CEM itself."""
         reference = self.series_of(REFERENCE)
         base = reference and self._index.get(
             (record.cell.mesh_hash, REFERENCE, reference.variant, record.cell.solves)
         )
-        if not base or base.cell.key == record.cell.key:
-            return None
-        found = compare(record, base)
-        return None if found is None else found.speedup
+        return None if not base or base.cell.key == record.cell.key else base
 
     def name_of(self, surface: MeasuredSurface) -> str:
         """A file name and anchor for a surface, unlike that of any other of the run."""

@@ -98,6 +98,16 @@ def build_report(
     )
 
 
+def _until(evidence: Evidence) -> str:
+    """Until which precision cells were measured, if they were."""
+    goals = sorted({r.cell.precision for r in evidence.records if r.cell.precision is not None})
+    if not goals:
+        return ""
+    wanted = " or ".join(f"±{100 * goal:g} %" for goal in goals)
+    unstable = sum(bool(evidence.row(record)["unstable"]) for record in evidence.records)
+    return f" (until {wanted} was reached, or the time used up; {unstable} unstable cells)"
+
+
 def facts(evidence: Evidence) -> list[tuple[str, str]]:
     """What stands at the head of a report."""
     statuses = Counter(record.outcome.status for record in evidence.records)
@@ -111,7 +121,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
         ("surfaces", ", ".join(f"{count} {_KINDS[o]}" for o, count in origins.items())),
         ("algorithms", ", ".join(series.label for series in evidence.series)),
         ("solves", ", ".join(evidence.policies)),
-        ("rounds", ", ".join(map(str, rounds)) or "none"),
+        ("rounds", (", ".join(map(str, rounds)) or "none") + _until(evidence)),
         ("threads", ", ".join(sorted({str(r.cell.threads) for r in evidence.records}))),
         ("backend", ", ".join(sorted({r.cell.backend for r in evidence.records}))),
     ]

@@ -22,6 +22,7 @@ from cembench.report.content.printed_beside_measured import (
     in_policy,
     policy_suffix,
 )
+from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.records import Record
 
@@ -48,6 +49,7 @@ def table_2(evidence: Evidence) -> list[Table]:
         )
         if evidence.models:
             tables.append(averages_table(evidence, policy))
+        tables += sure_speedups(evidence, policy)
     return tables
 
 

@@ -20,7 +20,6 @@ from cembench.report.surface_facts import SurfaceFacts, row_check
 from cembench.results import paper
 from cembench.results.comparison import (
     UNSTABLE_WIDTH,
-    Change,
     Comparison,
     circumstances,
     compare,
@@ -29,7 +28,9 @@ from cembench.results.comparison import (
     seconds_interval,
 )
 from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.many import corrected
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
+from cembench.results.runs_compared import Change
 from cembench.running.estimate import Estimate
 
 _STYLES = {"ok": "green", "skipped": "yellow"}
@@ -108,6 +109,11 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
     if any(is_unstable(record) for record in records):
         told = f"! unstable: the 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
         remarks.append(Text(told, style="yellow"))
+    noted = [r.neighbours for record in records for r in record.outcome.rounds if r.neighbours]
+    busy = sum(neighbours.busy for neighbours in noted)
+    if busy:
+        told = f"The machine was busy beside {busy} of {len(noted)} processes; close other programs"
+        remarks.append(Text(f"{told}, or add --repeat-busy.", style="yellow"))
     for record in records:
         name = f"{record.cell.mesh} / {record.cell.algorithm}"
         told = seconds_words(record)
@@ -141,17 +147,36 @@ def speedups_table(records: Sequence[Record], reference: str) -> RenderableType 
     if all(found.verdict == "too few rounds" for _, found in compared):
         told = (
             f"How sure these are is not known: that takes {DEFAULT_ROUNDS} rounds "
-            f"(cembench run --repeats {DEFAULT_ROUNDS})."
+            f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
         )
         return Group(heading, _bare_speedups(compared), Text(told, style="dim"))
-    return Group(heading, _sure_speedups(compared, reference))
+    table = _sure_speedups(compared, reference)
+    return Group(heading, table, *_corrected_words([found for _, found in compared]))
+
+
+def _corrected_words(found: Sequence[Comparison]) -> list[Text]:
+    """What the verdicts of a table rest on, and what they would be each alone."""
+    tested = [one for one in found if one.interval is not None]
+    if len(tested) < 2:
+        return []
+    lost = sum(
+        one.verdict != alone.verdict for one, alone in zip(corrected(tested), tested, strict=True)
+    )
+    told = (
+        f"Verdicts hold together with 95 % (Holm, {len(tested)} comparisons); "
+        "intervals are single ones."
+    )
+    if lost:
+        told += f" Each alone, {lost} more would be called different; more rounds decide them."
+    return [Text(told, style="dim")]
 
 
 def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str) -> Table:
     """A line a comparison."""
     several = _several_policies(compared)
     rows = []
-    for record, found in compared:
+    together = corrected([found for _, found in compared])
+    for (record, _), found in zip(compared, together, strict=True):
         i = found.speedup_interval
         sure = "unknown" if i is None else f"{i.low:.2f} to {i.high:.2f}"
         name = _name(record) + (f" ({record.cell.solves})" if several else "")
@@ -188,10 +213,14 @@ def _several_policies(compared: Sequence[tuple[Record, Comparison]]) -> bool:
 
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:
-    """What became faster or slower from one run to another: the ratio of the seconds."""
+    """What became faster or slower from one run to another: the ratio of the seconds.
+
+    The ratio is free of the drift that the reference kernel shows, where both runs timed it.
+    """
     rows = []
-    for change in changes:
-        found, i = change.comparison, change.comparison.interval
+    together = corrected([change.comparison for change in changes])
+    for change, found in zip(changes, together, strict=True):
+        i = found.interval
         rows.append(
             [
                 change.after.cell.mesh,
@@ -203,7 +232,7 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
                 found.verdict,
             ]
         )
-    return grid(
+    table = grid(
         [
             names("surface", 16),
             names("algorithm"),
@@ -212,6 +241,25 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
         ],
         rows,
     )
+    words_below = [Text(_drift_words(changes), style="dim")]
+    return Group(table, *words_below, *_corrected_words([c.comparison for c in changes]))
+
+
+def _drift_words(changes: Sequence[Change]) -> str:
+    """What the machine did between two runs, and whether the ratios are free of it."""
+    known = [change.drift for change in changes if change.drift is not None]
+    if not known:
+        return (
+            "How far the machine drifted between the runs is not known: not both timed the "
+            "reference kernel."
+        )
+    told = "Ratios are over the reference kernel's, which every round times (rank-sum test, 5 %)"
+    told += f": it took {min(known):.2f}"
+    told += f" to {max(known):.2f}" if f"{min(known):.2f}" != f"{max(known):.2f}" else ""
+    told += " times as long in the later run."
+    if len(known) < len(changes):
+        told += f" Not corrected: {len(changes) - len(known)}."
+    return told
 
 
 def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> RenderableType:

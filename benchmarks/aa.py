@@ -1,0 +1,216 @@
+"""How often is an algorithm called faster or slower than itself? On a quiet and on a busy machine.
+
+Runs the harness several times with four algorithms and a twin of each (the same function under
+another name, ``twins.py``) on five small surfaces: ten runs are 200 comparisons, of which at most
+5 % may be called different. Also tells how often two runs agree: whether the intervals of CEM's
+speedups in two runs overlap. Stopped, it goes on where it was when called again::
+
+    python -m benchmarks.aa                      # a machine with nothing else to do
+    python -m benchmarks.aa --busy 1             # beside so many processes that never rest
+    python -m benchmarks.aa --profile quick --runs 2 --budget 150s -o results/aa-quick
+    python -m benchmarks.aa --write-docs         # both, as far as they are there, in the page
+
+What was found is in OUTPUT/quiet.json and OUTPUT/busy.json; the runs themselves are beside.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from itertools import combinations
+from math import exp, log
+from pathlib import Path
+from statistics import median
+from time import monotonic
+from typing import Any
+
+from benchmarks import pages
+from benchmarks.repeatability import TWINS, pairs
+from cembench.core.atomic import write_text
+from cembench.results.comparison import compare
+from cembench.results.intervals import ERROR
+from cembench.results.many import corrected
+from cembench.results.records import Record
+from cembench.results.store import Store
+
+PAGE = pages.ROOT / "docs/measuring.md"
+ALGORITHMS = ("cem", "ldm", "direct-cem", "lscm")
+SURFACES = ("flat-disk", "hemi-ellipsoid", "cone", "spherical-cap", "cylinder-sheet")
+HALVES = {"quiet": "quiet", "busy": "beside a busy neighbour"}
+
+
+def main() -> None:
+    """Run what is missing, and tell what all runs say."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=10)
+    parser.add_argument("--faces", type=int, default=2000, help="triangles of each surface")
+    parser.add_argument("--surfaces", default=",".join(SURFACES))
+    parser.add_argument("--profile", help="instead of these surfaces, as in `cembench run`")
+    parser.add_argument("--algorithms", default=",".join(ALGORITHMS))
+    parser.add_argument("--precision", default="10%")
+    parser.add_argument("--budget", default="70s", help="of each run, see `cembench run`")
+    parser.add_argument("--busy", type=int, default=0, metavar="N", help="start N busy loops")
+    parser.add_argument("-o", "--output", type=Path, default=Path("results/aa"))
+    parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md; no runs")
+    chosen = parser.parse_args()
+    if not chosen.write_docs:
+        half = "busy" if chosen.busy else "quiet"
+        with neighbours(chosen.busy):
+            measure(chosen, half)
+    text = tell(chosen.output)
+    print(text)
+    if chosen.write_docs:
+        pages.fill(PAGE, Path(__file__).stem, text)
+
+
+def measure(chosen: argparse.Namespace, half: str) -> None:
+    """Run the harness as often as is missing; what all runs so far say is kept after each."""
+    started, runs = monotonic(), []
+    for seed in range(chosen.runs):
+        folder = chosen.output / half / f"run-{seed:02d}"
+        ended = subprocess.run(
+            run_command(chosen, folder, seed), check=False, stdout=subprocess.DEVNULL
+        )
+        if ended.returncode not in (0, 1):  # 1: a cell did not end ok, and is left out
+            sys.exit(f"run {seed + 1} ended with code {ended.returncode}")
+        runs.append(Store(folder).records())
+        summary = summarise(runs, chosen.algorithms.split(","))
+        write_text(chosen.output / f"{half}.json", json.dumps(summary, indent=1))
+        minutes = (monotonic() - started) / 60
+        print(f"run {seed + 1} of {chosen.runs} after {minutes:.1f} min", file=sys.stderr)
+
+
+@contextmanager
+def neighbours(number: int) -> Iterator[None]:
+    """Keep so many processes at work meanwhile."""
+    loop = [sys.executable, "-c", "while True: pass"]
+    started = [subprocess.Popen(loop) for _ in range(number)]
+    try:
+        yield
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
+def run_command(chosen: argparse.Namespace, folder: Path, seed: int) -> list[str]:
+    """Return the call of ``cembench run`` for one of the runs; it measures only what is missing."""
+    names = chosen.algorithms.split(",")
+    twins = [f"{name}-twin" for name in names]
+    return [
+        *(sys.executable, "-m", "cembench.commands.cli", "run", "--json"),
+        *("--plugin", str(TWINS), "-a", ",".join([*names, *twins])),
+        *(
+            ("--profile", chosen.profile)
+            if chosen.profile
+            else ("--surfaces", chosen.surfaces, "--faces", str(chosen.faces))
+        ),
+        *("--precision", chosen.precision, "--budget", chosen.budget),
+        *("--seed", str(seed), "-o", str(folder)),
+    ]
+
+
+def summarise(runs: Sequence[Sequence[Record]], names: Sequence[str]) -> dict[str, Any]:
+    """Say what these runs found. Values that JSON can hold."""
+    tables = [
+        [c for name in names for p in pairs(r, f"{name}-twin", name) if (c := compare(*p))]
+        for r in runs
+    ]
+    found = [one for table in tables for one in table if one.interval is not None]
+    different = [one.verdict in ("faster", "slower") for one in found]
+    together = [one.verdict in ("faster", "slower") for table in tables for one in corrected(table)]
+    rounds = [len(record.outcome.rounds) for records in runs for record in records]
+    busy = [
+        bool(r.neighbours and r.neighbours.busy)
+        for records in runs
+        for record in records
+        for r in record.outcome.rounds
+    ]
+    overlapping, compared, apart = _repeated(runs, names)
+    return {
+        "runs": len(runs),
+        "comparisons": len(found),
+        "called_different": sum(different),
+        "interval": clopper_pearson(sum(different), len(found)),
+        "called_different_corrected": sum(together),
+        "median_ratio": exp(median(log(one.ratio) for one in found)) if found else None,
+        "median_rounds": median(rounds) if rounds else None,
+        "busy_share": sum(busy) / len(busy) if busy else None,
+        "speedups_compared": compared,
+        "speedups_overlapping": overlapping,
+        "median_difference": median(apart) if apart else None,
+        "largest_difference": max(apart, default=None),
+    }
+
+
+def _repeated(
+    runs: Sequence[Sequence[Record]], names: Sequence[str]
+) -> tuple[int, int, list[float]]:
+    """Of how many speedups, in each two runs, overlap the intervals? And how far are they apart?"""
+    known = []
+    for records in runs:
+        both = [pair for name in names[1:] for pair in pairs(records, name, names[0])]
+        known.append({(a.cell.mesh_hash, a.cell.algorithm): compare(a, b) for a, b in both})
+    overlapping, compared, apart = 0, 0, []
+    for one, other in combinations(known, 2):
+        for key in one.keys() & other.keys():
+            a, b = one[key], other[key]
+            if a is None or b is None or a.interval is None or b.interval is None:
+                continue
+            compared += 1
+            overlapping += a.interval.low <= b.interval.high and b.interval.low <= a.interval.high
+            apart.append(exp(abs(log(a.ratio / b.ratio))) - 1)
+    return overlapping, compared, apart
+
+
+def clopper_pearson(hits: int, of: int) -> tuple[float, float]:
+    """Return the exact 95 % interval of a share."""
+    from scipy.stats import binomtest
+
+    if not of:
+        return 0.0, 1.0
+    found = binomtest(hits, of).proportion_ci(method="exact")
+    return float(found.low), float(found.high)
+
+
+def tell(output: Path) -> str:
+    """Return the Markdown of both halves, as far as they were measured."""
+    rows = {
+        half: json.loads(path.read_text())
+        for half in HALVES
+        if (path := output / f"{half}.json").is_file()
+    }
+    lines = [
+        "| machine | runs | twins compared | called different | 95 % interval | corrected | "
+        "rounds | busy |",
+        "|---|---:|---:|---:|---:|---:|---:|---:|",
+    ]
+    for half, f in rows.items():
+        n, low, high = f["comparisons"], *f["interval"]
+        lines.append(
+            f"| {HALVES[half]} | {f['runs']} | {n} | {f['called_different']} "
+            f"({f['called_different'] / max(n, 1):.1%}) | {low:.1%} to {high:.1%} "
+            f"| {f['called_different_corrected']} | {f['median_rounds']:g} "
+            f"| {f['busy_share']:.0%} |"
+        )
+    lines += ["", f"Stated is at most {ERROR:.0%}. *rounds*: the median of a cell; *busy*: the "]
+    lines[-1] += "share of processes beside which others took more than a quarter of a core."
+    for half, f in rows.items():
+        if f["speedups_compared"]:
+            share = f["speedups_overlapping"] / f["speedups_compared"]
+            lines += [
+                "",
+                f"Repeated runs, {HALVES[half]}: of {f['speedups_compared']} speedups over CEM, "
+                f"each in two runs, the intervals overlap in {share:.1%}; the ratios differ by "
+                f"{f['median_difference']:.1%} in the median, {f['largest_difference']:.1%} at "
+                "most.",
+            ]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,130 @@
+"""Is the rule that measures until a figure is precise as seldom wrong as it says?
+
+Simulates two algorithms of one cost on machines that are noisy in five ways (``noise.py``), with
+the rule as it is: looks, shares of the 5 %, intervals of the ratio and of both cells' own seconds.
+Tells how often one was called faster or slower, and after how many rounds it was over::
+
+    python -m benchmarks.precision
+    python -m benchmarks.precision --runs 20000 --write-docs
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtr
+
+from benchmarks import noise, pages
+from cembench.results.intervals import ERROR
+from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
+from cembench.results.signed_rank import cut, walsh_averages
+
+PAGE = pages.ROOT / "docs/measuring.md"
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """What became of many runs under one kind of noise: an entry a run."""
+
+    rounds: NDArray[np.int64]
+    #: Was one called faster or slower in the end?
+    wrong: NDArray[np.bool_]
+    #: Did any look on the way show a difference?
+    ever_wrong: NDArray[np.bool_]
+    #: Was it precise in the end?
+    precise: NDArray[np.bool_]
+
+
+def intervals(logs: NDArray[np.float64], error: float) -> tuple[NDArray[np.float64], ...]:
+    """Return the ends of the signed-rank interval of each row (runs, n)."""
+    left_out = cut(logs.shape[1], error)
+    averages = walsh_averages(logs)
+    return averages[:, left_out], averages[:, averages.shape[1] - 1 - left_out]
+
+
+def looks(most: int) -> list[int]:
+    """Return after how many rounds is looked."""
+    return [*(n for n in LOOKS if n < most), most]
+
+
+def simulate(
+    model: str, runs: int, precision: float, most: int = USUAL_MOST_ROUNDS, seed: int = 0
+) -> Simulated:
+    """Measure so many pairs of algorithms of one cost until they are precise, or `most` rounds."""
+    seconds = np.log(noise.pairs(model, np.random.default_rng(seed), runs, most))
+    rounds = np.zeros(runs, dtype=np.int64)
+    wrong, ever, precise = (np.zeros(runs, dtype=bool) for _ in range(3))
+    for n in looks(most):
+        error = ERROR * share(n)
+        ratios = intervals(seconds[:, :n, 0] - seconds[:, :n, 1], error)
+        own = [intervals(seconds[:, :n, k], error) for k in (0, 1)]
+        excluded = (ratios[0] > 0) | (ratios[1] < 0)
+        widths = [np.exp(high - low) - 1 for low, high in (ratios, *own)]
+        narrow = np.max(widths, axis=0) <= 2 * precision
+        ever |= excluded
+        ends = (rounds == 0) & (narrow | (n == most))
+        rounds[ends], wrong[ends], precise[ends] = n, excluded[ends], narrow[ends]
+    return Simulated(rounds, wrong, ever, precise)
+
+
+def family_error(model: str, runs: int, rng: np.random.Generator, comparisons: int = 100) -> float:
+    """Return at most how often a table of so many equal algorithms has a wrong verdict.
+
+    That is the chance that one of them passes Holm's first step at any look, times their number.
+    """
+    most = LOOKS[-2]
+    seconds = np.log(noise.pairs(model, rng, runs, most))
+    logs = seconds[..., 0] - seconds[..., 1]
+    claimed = np.zeros(runs, dtype=bool)
+    for n in looks(most):
+        error = logs[:, :n].std(axis=1, ddof=1) / np.sqrt(n)
+        p = 2 * stdtr(n - 2, -np.abs(logs[:, :n].mean(axis=1)) / error) / share(n)
+        claimed |= p <= ERROR / comparisons
+    return float(claimed.mean() * comparisons)
+
+
+def table(runs: int) -> str:
+    """Return the Markdown of all models at three precisions."""
+    lines = [
+        "| noise | precision | wrong verdicts | at any look | rounds: mean | median | precise |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for model in noise.MODELS:
+        for precision in (0.02, USUAL_PRECISION, 0.1):
+            found = simulate(model, runs, precision)
+            lines.append(
+                f"| {model} | {precision:.0%} | {found.wrong.mean():.1%} "
+                f"| {found.ever_wrong.mean():.1%} | {found.rounds.mean():.1f} "
+                f"| {np.median(found.rounds):.0f} | {found.precise.mean():.0%} |"
+            )
+    lines += [
+        "",
+        "| noise | tables of 100 with a wrong verdict, corrected: at most |",
+        "|---|---:|",
+    ]
+    rng = np.random.default_rng(0)
+    for model in noise.MODELS:
+        chunks = [family_error(model, 50_000, rng) for _ in range(max(1, 40 * runs // 50_000))]
+        lines.append(f"| {model} | {np.mean(chunks):.1%} |")
+    told = f"{runs:,} simulated runs a line, at most {USUAL_MOST_ROUNDS} rounds; "
+    return "\n".join([*lines, "", f"{told}of the second table {40 * runs:,}."])
+
+
+def main() -> None:
+    """Print the table, or put it into the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=4000)
+    parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md")
+    chosen = parser.parse_args()
+    text = table(chosen.runs)
+    print(text)
+    if chosen.write_docs:
+        pages.fill(PAGE, Path(__file__).stem, text)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+"""How sure are the speedups of Table 2, one by one, together, and on other surfaces?"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
+from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
+from cembench.report.document import Column, Table, Value, missing, words
+from cembench.results.comparison import Comparison, compare, paired_ratios
+from cembench.results.many import FEWEST_SURFACES, average_interval, corrected, sign_test
+
+CAPTION = (
+    "Three questions. 'One by one': on how many surfaces does the 95 % interval of the ratio "
+    "within rounds exclude 1? 'Together': on how many can that be said when none of the {n} "
+    "verdicts of this table may be wrong, with 95 % (Holm)? 'Over surfaces': does CEM win on more "
+    "surfaces than chance would let it (two-sided sign test), and what is the geometric mean of "
+    "t / t_CEM, with the 95 % interval over surfaces and rounds (hierarchical bootstrap, seed 0), "
+    "which tells where it would lie on other surfaces like these? A surface counts once, a model "
+    "before what stands for it."
+)
+
+
+@dataclass(frozen=True)
+class _Compared:
+    """An algorithm beside CEM: a comparison and the ratios of the rounds for each surface."""
+
+    series: AlgorithmSeries
+    found: Sequence[Comparison]
+    ratios: Sequence[Sequence[float]]
+
+
+def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
+    """Say how sure the speedups over CEM are; none where no rounds can be compared."""
+    compared = [c for series in evidence.disk_series if (c := _compared(evidence, series, policy))]
+    if not compared:
+        return []
+    together = iter(corrected([one for c in compared for one in c.found]))
+    rows = []
+    for c in compared:
+        both = [next(together) for _ in c.found]
+        rows.append(_row(c, both))
+    number = sum(len(c.found) for c in compared)
+    columns = (
+        Column("algorithm", numeric=False),
+        Column("surfaces"),
+        *(Column(name, "one by one") for name in ("CEM faster", "slower", "undecided")),
+        *(Column(name, "together") for name in ("CEM faster", "slower", "undecided")),
+        *(Column(name, "over surfaces") for name in ("wins", "sign test", "mean", "95 % interval")),
+    )
+    return [
+        Table(
+            name=f"sure-speedups{policy_suffix(policy, evidence)}",
+            title=f"How sure the speedups are{in_policy(evidence, policy)}",
+            columns=columns,
+            rows=tuple(rows),
+            caption=CAPTION.format(n=number),
+        )
+    ]
+
+
+def _compared(evidence: Evidence, series: AlgorithmSeries, policy: str) -> _Compared | None:
+    if series.algorithm == REFERENCE or not series.main:
+        return None
+    found, ratios = [], []
+    for surface in (*evidence.one_each, *evidence.others):
+        record = evidence.find(surface, series, policy)
+        base = evidence.base(record) if record is not None else None
+        one = compare(record, base) if record is not None and base is not None else None
+        if record is None or base is None or one is None or not one.rounds:
+            continue
+        found.append(one)
+        ratios.append(paired_ratios(record, base))
+    return _Compared(series, found, ratios) if found else None
+
+
+def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
+    figures = [one.ratio for one in compared.found]
+    wins, losses = sum(r > 1 for r in figures), sum(r < 1 for r in figures)
+    p, mean = sign_test(wins, losses), float(_geometric(np.array(figures)))
+    interval = average_interval(compared.ratios, _geometric)
+    return (
+        words(compared.series.label),
+        _count(len(figures)),
+        *_verdicts(compared.found),
+        *_verdicts(together),
+        Value(f"{wins} of {wins + losses}", wins, "derived"),
+        Value(f"p = {p:.2g}", p, "derived"),
+        Value(f"{mean:.2f}", mean, "derived"),
+        missing(f"fewer than {FEWEST_SURFACES} surfaces")
+        if interval is None
+        else Value(f"{interval.low:.2f} to {interval.high:.2f}", None, "derived"),
+    )
+
+
+def _verdicts(found: Sequence[Comparison]) -> list[Value]:
+    """Count the surfaces on which CEM is faster, slower, or neither for sure."""
+    counts = Counter(one.verdict for one in found)
+    faster, slower = counts["slower"], counts["faster"]  # a verdict is of the other algorithm
+    return [_count(faster), _count(slower), _count(len(found) - faster - slower)]
+
+
+def _count(number: int) -> Value:
+    return Value(str(number), number, "derived")
+
+
+def _geometric(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
+    mean: NDArray[np.float64] = np.exp(np.log(ratios).mean(axis=-1))
+    return mean

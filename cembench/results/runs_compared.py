@@ -1,0 +1,93 @@
+"""What became faster or slower from one run to another?
+
+Rounds of two runs are no pairs, and the machine may have drifted between them. So every round also
+times a reference kernel that never changes (:mod:`cembench.running.kernel`), and what is compared
+are a cell's seconds over the kernel's of the same round, by the rank-sum test at the 5 % level.
+Where a run has no such times, seconds are compared, and the drift is not in the interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from statistics import median
+
+from cembench.results import rank_sum
+from cembench.results.comparison import Comparison, circumstances, verdict_of
+from cembench.results.intervals import ERROR, Interval
+from cembench.results.looks import share_of
+from cembench.results.records import Record, Round
+from cembench.results.student import unpaired_p
+
+
+@dataclass(frozen=True)
+class Change:
+    """One cell in two runs; the comparison says what the second is, measured against the first."""
+
+    before: Record
+    after: Record
+    comparison: Comparison
+    #: Seconds of the kernel in the second run over those in the first, by which the comparison is
+    #: corrected; None where one of the runs has none.
+    drift: float | None = None
+
+
+def compare_runs(before: Sequence[Record], after: Sequence[Record]) -> list[Change]:
+    """Compare cell by cell, those of the same algorithm, parameters, surface and circumstances.
+
+    The code may differ, that is what is asked about.
+    """
+    earlier = {_same(record): record for record in before}
+    pairs = [(earlier.get(_same(record)), record) for record in after]
+    return [
+        _change(old, record)
+        for old, record in pairs
+        if old is not None and old.outcome.rounds and record.outcome.rounds
+    ]
+
+
+def _change(before: Record, after: Record) -> Change:
+    old, new = before.outcome.rounds, after.outcome.rounds
+    drift = _drift(old, new)
+    ours, theirs = (_logs(rounds, corrected=drift is not None) for rounds in (new, old))
+    ratio = exp(median(ours) - median(theirs))
+    share = min(share_of(len(new), after.cell), share_of(len(old), before.cell))
+    found = rank_sum.shift_interval(ours, theirs, ERROR * share)
+    interval = (
+        None if found is None else Interval(min(exp(found.low), ratio), max(exp(found.high), ratio))
+    )
+    p = 1.0 if interval is None else min(1.0, unpaired_p(ours, theirs) / share)
+    rounds = min(len(new), len(old))
+    return Change(
+        before, after, Comparison(ratio, interval, verdict_of(interval), rounds, p), drift
+    )
+
+
+def _logs(rounds: Sequence[Round], *, corrected: bool) -> list[float]:
+    """Return the logarithms of the seconds, over those of the kernel where that is asked for."""
+    return [log(r.seconds) - (log(r.kernel_seconds or 1.0) if corrected else 0.0) for r in rounds]
+
+
+def _drift(before: Sequence[Round], after: Sequence[Round]) -> float | None:
+    """Return the kernel's seconds after over before; None where a round has none."""
+    old, new = (
+        [r.kernel_seconds for r in rounds if r.kernel_seconds] for rounds in (before, after)
+    )
+    if len(old) < len(before) or len(new) < len(after):
+        return None
+    return exp(median(map(log, new)) - median(map(log, old)))
+
+
+def _same(record: Record) -> str:
+    cell = record.cell
+    return f"{cell.algorithm} {sorted(cell.parameters.items())} {circumstances(cell)}"
+
+
+def machine_differences(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
+    """Which facts of two environments differ that make their seconds incomparable?"""
+    return [
+        f"{name}: {before.get(name)} / {after.get(name)}"
+        for name in ("cpu", "cores", "memory_bytes", "platform", "python", "libraries", "blas")
+        if before.get(name) != after.get(name)
+    ]

@@ -1,0 +1,51 @@
+import json
+import subprocess
+import sys
+
+import pytest
+
+from benchmarks import aa
+from tests.results.test_comparison import record_of
+
+
+def run(twin, other):
+    return [
+        record_of([1.0, 1.1, 0.9, 1.05, 0.95, 1.02], algorithm="cem"),
+        record_of([twin * s for s in (1.0, 1.1, 0.9, 1.05, 0.95, 1.02)], algorithm="cem-twin"),
+        record_of([other * s for s in (1.0, 1.1, 0.9, 1.05, 0.95, 1.02)], algorithm="ldm"),
+    ]
+
+
+def test_what_is_called_different_is_counted_with_its_interval(tmp_path):
+    found = aa.summarise([run(1.0, 3.0), run(1.2, 3.0), run(1.0, 4.0)], ["cem", "ldm"])
+    assert (found["comparisons"], found["called_different"]) == (3, 1)
+    assert found["interval"] == (pytest.approx(0.0084, abs=1e-3), pytest.approx(0.906, abs=1e-3))
+    assert (found["speedups_compared"], found["speedups_overlapping"]) == (3, 1)
+    assert found["largest_difference"] == pytest.approx(1 / 3)
+    (tmp_path / "busy.json").write_text(json.dumps(found))
+    told = aa.tell(tmp_path)
+    assert "| beside a busy neighbour | 3 | 3 | 1 (33.3%) |" in told
+    assert "| quiet |" not in told
+
+
+def test_busy_loops_end_with_the_block():
+    before = subprocess.Popen
+    started = []
+
+    class Noted(before):
+        def __init__(self, *arguments, **more):
+            super().__init__(*arguments, **more)
+            started.append(self)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(subprocess, "Popen", Noted)
+        with pytest.raises(ValueError, match="on purpose"):
+            _fail_beside(2, started)
+    assert all(process.poll() is not None for process in started)
+    assert started[0].args[0] == sys.executable
+
+
+def _fail_beside(number, started):
+    with aa.neighbours(number):
+        assert [process.poll() for process in started] == [None] * number
+        raise ValueError("on purpose")

@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+from scipy.stats import binomtest
+
+from benchmarks import noise, precision
+from cembench.results.comparison import compare_ratios
+from cembench.results.intervals import ERROR
+from cembench.results.looks import share
+from cembench.results.many import average_interval, corrected, holm, sign_test
+
+
+def test_holm_multiplies_by_what_is_left_and_keeps_the_order():
+    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert holm([0.5, 0.9]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+def test_a_verdict_that_many_comparisons_do_not_bear_is_taken_back():
+    sure = compare_ratios([20 + k / 4 for k in range(6)])
+    unsure = compare_ratios([1.02, 1.05, 1.3, 1.9, 2.5, 1.6])
+    few = compare_ratios([2.0])
+    assert [one.verdict for one in corrected([unsure])] == ["slower"]
+    together = corrected([sure, unsure, unsure, few])
+    verdicts = [one.verdict for one in together]
+    assert verdicts == ["slower", "undecided", "undecided", "too few rounds"]
+    assert together[1].interval == unsure.interval
+
+
+def test_of_a_hundred_equal_algorithms_one_is_called_different_in_5_percent_of_tables():
+    rng = np.random.default_rng(1)
+    found = [precision.family_error(model, 40_000, rng) for model in noise.MODELS]
+    assert max(found) <= ERROR + 0.03  # two standard deviations of the rarest event
+
+
+def test_one_of_a_hundred_is_found_where_it_is_clear():
+    rng = np.random.default_rng(1)
+    equal = [compare_ratios(row) for row in rng.lognormal(0, 0.05, (99, 7))]
+    clear = compare_ratios(2.0 * rng.lognormal(0, 0.05, 7), share(7))
+    assert corrected([*equal, clear])[-1].verdict == "slower"
+
+
+@pytest.mark.parametrize(("wins", "losses"), [(20, 0), (9, 3), (3, 9), (1, 0)])
+def test_the_sign_test_is_the_binomial_one(wins, losses):
+    assert sign_test(wins, losses) == pytest.approx(binomtest(wins, wins + losses).pvalue)
+    assert sign_test(0, 0) == 1
+
+
+def geometric(figures):
+    return np.exp(np.log(figures).mean(axis=-1))
+
+
+def test_the_interval_of_an_average_holds_what_surfaces_and_rounds_vary():
+    rng = np.random.default_rng(5)
+    tight = [[3.0 * f for f in rng.lognormal(0, 0.01, 7)] for _ in range(12)]
+    varied = [[s * f for f in rng.lognormal(0, 0.01, 7)] for s in rng.lognormal(1, 0.8, 12)]
+    narrow, wide = (average_interval(some, geometric) for some in (tight, varied))
+    assert 3.0 in narrow
+    assert narrow.high / narrow.low < 1.02
+    assert wide.high / wide.low > 1.5
+    assert average_interval(tight, geometric) == narrow
+    assert average_interval(tight[:5], geometric) is None
+
+
+def test_it_covers_the_average_about_as_often_as_stated():
+    rng = np.random.default_rng(9)
+    held = 0
+    for k in range(60):
+        true = rng.lognormal(1, 0.5, 14)
+        rounds = [list(s * rng.lognormal(0, 0.05, 7)) for s in true]
+        held += np.e in average_interval(rounds, geometric, seed=k)
+    assert held / 60 > 0.8

@@ -1,0 +1,44 @@
+import pytest
+
+from cembench.results.records import Neighbours
+from cembench.running.kernel import kernel_seconds
+from cembench.running.neighbours import Counters, _sum, counters, neighbours
+
+
+def test_what_others_did_is_what_ours_did_not():
+    before = Counters(worked=100.0, stolen=5.0, throttles=3, at=0.0)
+    after = Counters(worked=103.0, stolen=5.2, throttles=4, at=2.0)
+    found = neighbours(before, after, threads=1)
+    assert (found.other_cores, found.stolen_cores, found.throttled) == (0.5, 0.1, True)
+    assert found.busy
+    assert neighbours(before, after, threads=2).other_cores == 0
+
+
+@pytest.mark.parametrize(
+    ("seen", "busy"),
+    [
+        (Neighbours(other_cores=0.2), False),
+        (Neighbours(other_cores=0.2, stolen_cores=0.1), True),
+        (Neighbours(other_cores=0, throttled=False), False),
+        (Neighbours(other_cores=0, throttled=True), True),
+    ],
+)
+def test_a_quarter_of_a_core_is_busy(seen, busy):
+    assert seen.busy is busy
+
+
+def test_the_system_counts_on():
+    first, later = counters(), counters()
+    assert first.worked <= later.worked
+    assert first.at <= later.at
+
+
+def test_counts_of_heat_are_added_where_they_can_be_read(tmp_path):
+    assert _sum([tmp_path / "none"]) is None
+    for name, count in (("a", "2\n"), ("b", "3\n"), ("c", "?")):
+        (tmp_path / name).write_text(count)
+    assert _sum(sorted(tmp_path.iterdir())) == 5
+
+
+def test_the_kernel_takes_time():
+    assert kernel_seconds() > 0

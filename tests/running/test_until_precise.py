@@ -1,0 +1,160 @@
+"""What goes on until it is precise, with invented seconds and no process at all."""
+
+from itertools import count
+from math import inf
+
+import numpy as np
+import pytest
+from cembench.surfaces.flat_disk import flat_disk
+
+from cembench.registry import load_registry
+from cembench.results.comparison import is_unstable, paired_ratios
+from cembench.results.records import Neighbours, Outcome, Round
+from cembench.results.store import Store
+from cembench.running import local
+from cembench.running.local import Options, Watcher, run_tasks
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.until_precise import affordable, cost, lack
+
+
+@pytest.fixture(autouse=True)
+def _a_quick_kernel(monkeypatch):
+    ticks = count(1)
+    monkeypatch.setattr(local, "kernel_seconds", lambda: next(ticks) / 1000)
+
+
+def cells(names=("cem", "lscm", "fdm"), precision=0.05, **how):
+    chosen = [load_registry().algorithm(name) for name in names]
+    settings = MeasurementSettings.until_precise(precision, **how)
+    return plan_cells(chosen, [flat_disk(100)], {}, settings)
+
+
+class Invented:
+    """In place of a launcher: the seconds of an algorithm scatter as much as its entry says."""
+
+    scatter = {"cem": 0.01, "lscm": 0.01, "fdm": 0.15}  # noqa: RUF012
+
+    def __init__(self, *_):
+        self.rng = np.random.default_rng(4)
+        self.busy = False
+
+    def close(self):
+        pass
+
+    def check(self, task):
+        return Outcome(status="ok", uv_hash="h"), None
+
+    def time(self, task, checked):
+        scatter = self.scatter[task.cell.algorithm]
+        return Round(calls=(float(self.rng.lognormal(0, scatter)),), uv_hash="h")
+
+
+class Noting(Watcher):
+    def __init__(self, end_at=None):
+        self.expected, self.steps, self.end_at = 0, [], end_at
+
+    def begins(self, processes):
+        self.expected += processes
+
+    def goes_on(self, task, rounds):
+        self.expected += rounds
+
+    def starts(self, task, step):
+        if self.end_at == len(self.steps):
+            raise KeyboardInterrupt
+        self.steps.append((task.cell.algorithm, step.round))
+
+
+def rounds_of(records):
+    return {record.cell.algorithm: len(record.outcome.rounds) for record in records}
+
+
+def test_what_is_precise_drops_out_and_the_reference_stays_beside_the_rest(tmp_path):
+    noting = Noting()
+    records = run_tasks(cells(), Store(tmp_path), Options(most_rounds=40), noting, Invented)
+    found = rounds_of(records)
+    assert found == {"cem": 40, "lscm": 7, "fdm": 40}
+    by_name = {record.cell.algorithm: record for record in records}
+    assert len(paired_ratios(by_name["fdm"], by_name["cem"])) == 40
+    assert not is_unstable(by_name["lscm"])
+    assert noting.expected == len(noting.steps) == 3 + 87
+    kernels = [r.kernel_seconds for r in by_name["cem"].outcome.rounds]
+    assert kernels == [k / 1000 for k in range(1, 41)]
+    assert [r.kernel_seconds for r in by_name["lscm"].outcome.rounds] == kernels[:7]
+
+
+def test_without_time_there_are_the_rounds_of_the_first_look(tmp_path):
+    records = run_tasks(cells(), Store(tmp_path), Options(budget=0), None, Invented)
+    assert set(rounds_of(records).values()) == {7}
+
+
+@pytest.mark.parametrize("end_at", [2, 12, 24, 26, 33])
+def test_a_run_that_is_ended_goes_on_and_forgets_nothing(tmp_path, end_at):
+    store, options = Store(tmp_path), Options(most_rounds=14)
+    with pytest.raises(KeyboardInterrupt):
+        run_tasks(cells(), store, options, Noting(end_at), Invented)
+    noting = Noting()
+    records = run_tasks(cells(), store, options, noting, Invented)
+    assert rounds_of(records)["fdm"] == rounds_of(records)["cem"] == 14
+    assert len(noting.steps) == 3 + sum(rounds_of(records).values()) - end_at
+    again = Noting()
+    assert run_tasks(cells(), store, options, again, Invented) == records
+    assert not again.steps
+
+
+def test_a_precision_is_part_of_what_a_cell_is_and_a_fixed_number_is_as_before():
+    precise, other = cells()[0].cell, cells(precision=0.1)[0].cell
+    chosen = [load_registry().algorithm("cem")]
+    fixed = plan_cells(chosen, [flat_disk(100)], {}, MeasurementSettings())[0].cell
+    assert len({precise.key, other.key, fixed.key}) == 3
+    assert "precision" not in fixed.model_dump()
+    assert type(precise).model_validate_json(precise.model_dump_json()) == precise
+    with pytest.raises(ValueError, match="a number of rounds, or a precision"):
+        fixed.model_copy(update={}).model_validate(fixed.model_dump() | {"precision": 0.1})
+
+
+def rounds(*seconds):
+    return [Round(calls=(s,), sitting="s") for s in seconds]
+
+
+def test_the_wider_of_both_intervals_counts():
+    cell = cells()[0].cell
+    steady, shaky = rounds(*[1.0] * 7), rounds(1, 1.1, 0.9, 1.2, 1, 1, 1)
+    assert lack(cell, steady) == 0
+    assert lack(cell, shaky) == pytest.approx(0.3 / 2 / 0.05)
+    assert lack(cell, steady, (cell, shaky)) == pytest.approx((1 / 0.9 - 1 / 1.2) / 2 / 0.05)
+    assert lack(cell, rounds(1.0, 1.0)) == inf
+
+
+def test_the_widest_go_on_first_and_pay_for_their_reference():
+    lacks = {"wide": 9.0, "wider": 10.0, "precise": 1.0, "cem": 0.5}
+    costs = {"wide": 10.0, "wider": 10.0, "precise": 1.0, "cem": 5.0}
+    partners = dict.fromkeys(("wide", "wider", "precise"), "cem")
+    chosen = [affordable(lacks, costs, partners, seconds) for seconds in (14, 15, 25, inf)]
+    assert chosen[0] == set()
+    assert chosen[1] == {"wider", "cem"}
+    assert chosen[2] == chosen[3] == {"wide", "wider", "cem"}
+    assert cost(rounds(2.0)) > 4
+
+
+@pytest.mark.parametrize(("again", "processes"), [(0, 7), (1, 14)])
+def test_a_process_beside_which_the_machine_was_busy_is_run_again(
+    tmp_path, monkeypatch, again, processes
+):
+    timed = []
+    beside = iter([Neighbours(other_cores=1.0), Neighbours(other_cores=0.0)] * 20)
+    monkeypatch.setattr(local, "neighbours", lambda *_: next(beside))
+    monkeypatch.setattr(Invented, "time", _noting(Invented.time, timed))
+    options = Options(budget=0, repeat_busy=again)
+    (record,) = run_tasks(cells(["cem"]), Store(tmp_path), options, None, Invented)
+    assert len(timed) == processes
+    busy = [r.neighbours.busy for r in record.outcome.rounds]
+    assert busy == ([False] * 7 if again else [True, False, True, False, True, False, True])
+
+
+def _noting(function, calls):
+    def noted(*arguments):
+        calls.append(arguments)
+        return function(*arguments)
+
+    return noted
