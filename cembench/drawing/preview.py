@@ -42,6 +42,7 @@ def write_preview(
     title: str = "",
     caption: str = "",
     size: tuple[int, int] = SIZE,
+    turned: bool = True,
 ) -> None:
     """Draw a surface and its image under one checkerboard into a PNG file.
 
@@ -59,6 +60,8 @@ def write_preview(
         Words below the picture; broken into two lines where they are long.
     size : tuple of int
         Width and height of the picture in pixels.
+    turned : bool
+        Whether the image is turned so that what is up on the surface is up in it.
 
     Raises
     ------
@@ -68,7 +71,7 @@ def write_preview(
         The file cannot be written, or the picture cannot be drawn.
 
     """
-    png = preview_png(mesh, uv, title=title, caption=caption, size=size)
+    png = preview_png(mesh, uv, title=title, caption=caption, size=size, turned=turned)
     write_bytes(path, png, error=RenderError, parents=False)
 
 
@@ -79,15 +82,18 @@ def preview_png(
     title: str = "",
     caption: str = "",
     size: tuple[int, int] = SIZE,
+    turned: bool = True,
 ) -> bytes:
     """Return the picture of :func:`write_preview` as PNG."""
     _check(mesh, uv, size)
-    uv = upright(mesh, uv)
+    uv = upright(mesh, uv) if turned else uv
     scene = Scene.of(mesh, uv)
     surface, image = _draw(scene, compose.side_of(size))
     outline = image_in_window(uv)[:, :2]
     overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
-    return compose.page(surface, image, overlay, (title, caption, _note(scene)), size)
+    return compose.page(
+        surface, image, overlay, (title, caption, _note(scene, turned=turned)), size
+    )
 
 
 def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> None:
@@ -127,14 +133,13 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
         )
 
 
-def _note(scene: Scene) -> str:
-    turned = "The image is turned so that up on the surface is up in it."
-    if not scene.squares.is_divided:
-        return turned
-    return (
-        f"{turned} Squares that would be large on the surface are divided {FINER} by {FINER}, in "
-        "both panels alike."
+def _note(scene: Scene, *, turned: bool) -> str:
+    up = "The image is turned so that up on the surface is up in it." if turned else ""
+    finer = (
+        f"Squares that would be large on the surface are divided {FINER} by {FINER}, in both "
+        "panels alike."
     )
+    return f"{up} {finer if scene.squares.is_divided else ''}".strip()
 
 
 def _draw(scene: Scene, side: int) -> tuple[Picture, Picture]:

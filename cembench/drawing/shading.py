@@ -121,7 +121,7 @@ def checkerboard(panel: RasterPanel, mesh: TriangleMesh, uv: Complex, surface: R
         FINER**level * SAMPLES
     )
     share = 0.5 + (dark - 0.5) * np.clip((pixels - 1) / (LEGIBLE - 1), 0, 1)
-    return _between(look.LIGHT, look.DARK, share)
+    return _between(look.LIGHT, look.DARK, np.asarray(share, dtype=np.float64))
 
 
 def curvature(panel: RasterPanel, H: Real) -> Real:
