@@ -23,7 +23,9 @@ LONGEST, THUMBNAIL = 1600, 360
 #: Quality of WebP at which a checkerboard's edges are still clean.
 QUALITY = 76
 #: A pixel whose channels are all as bright as this is the white that a picture stands on.
-WHITE = 247
+WHITE = 234
+#: What is smaller than this share of a picture and lies alone on its ground is JPEG's doing.
+SPECK = 2e-4
 #: Bytes up to which a vector graphic is embedded as it is; one of many marks outgrows its pixels.
 VECTOR_BYTES = 55_000
 #: CSS pixels of the units that an SVG's size is given in.
@@ -103,6 +105,9 @@ def on_any_ground(picture: Image.Image) -> Image.Image:
     label, _ = ndimage.label(white)
     rims = np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]])
     ground = white & np.isin(label, np.unique(rims[rims > 0]))
+    island, count = ndimage.label(~ground, structure=np.ones((3, 3)))
+    sizes = np.bincount(island.ravel(), minlength=count + 1)
+    ground |= (sizes < max(SPECK * ground.size, 4))[island]
     near = ndimage.binary_dilation(ground) & ~ground
     opacity = np.where(ground, 0, np.where(near, 128, 255)).astype(np.uint8)
     return Image.fromarray(np.dstack([pixels, opacity]), "RGBA")
