@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,6 +19,7 @@ from rich.text import Text
 from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
+from cembench.commands import map as map_verbs
 from cembench.commands import morph as morph_verbs
 from cembench.commands import peers as peers_verbs
 from cembench.commands import repair as repair_verbs
@@ -31,16 +32,17 @@ from cembench.commands.console import (
     assignments,
     complain,
     err,
-    note,
     out,
     print_json,
-    print_pair,
+    print_notices,
     registry_with,
     split,
 )
-from cembench.commands.ending import Verbs, ending
+from cembench.commands.ending import Verbs, ending, resumable
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
+    Backend,
+    BackendOption,
     Budget,
     Faces,
     FixedRounds,
@@ -52,30 +54,28 @@ from cembench.commands.options import (
     Repair,
     RepeatBusy,
     Seed,
+    Solves,
     Threads,
     Timeout,
     budget_seconds,
+    installed_backend,
     memory_bytes,
     settings_of_rounds,
 )
-from cembench.core.errors import MeshError, ParameterError
+from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.looks import USUAL_MOST_ROUNDS
 from cembench.results.paper.profiles import Profile
-from cembench.workflows.places import Place
 
 if TYPE_CHECKING:
     from cembench.commands.progress import PlainProgress
-    from cembench.core.notices import Notice
-    from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Algorithm, Registry, Surface
     from cembench.report.surface_facts import SurfaceFacts
     from cembench.results.records import Record
     from cembench.results.store import Store
     from cembench.running.local import Options
     from cembench.running.plan import Task
-    from cembench.workflows.map_files import Wishes
 
 app = typer.Typer(
     cls=Verbs,
@@ -110,34 +110,11 @@ def _global_options(
     """Take the options that belong to no verb."""
 
 
-#: What `map` takes where the user names no algorithm: the first that takes the surface.
-USUAL = ("direct-cem", "direct-cem-holes")
-
-
-class Solves(StrEnum):
-    """Keep a factor while its matrix stands, or factor at every solve like MATLAB's backslash."""
-
-    reuse = "reuse"
-    backslash = "backslash"
-
-
-class Backend(StrEnum):
-    """The library that factors."""
-
-    cvxopt = "cvxopt"
-    superlu = "superlu"
-    pardiso = "pardiso"
-
-
 class Kind(StrEnum):
     """What `list` lists."""
 
     algorithms = "algorithms"
     surfaces = "surfaces"
-
-
-SolvesOption = Annotated[Solves, typer.Option(help="Keep factors, or factor at every solve.")]
-BackendOption = Annotated[Backend, typer.Option(help="The library that factors matrices.")]
 
 
 @app.command(
@@ -194,210 +171,7 @@ def list_(
             )
 
 
-@app.command(
-    "map",
-    epilog="Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
-    "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand  ·  "
-    "cembench map scan.obj --repair -o scan_uv.obj  ·  cembench map head.obj --cut -o uv.obj  ·  "
-    "cembench map a.obj b.obj -o maps/",
-)
-def map_(
-    meshes: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="MESH...", help="Surfaces: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`."
-        ),
-    ],
-    *,
-    algorithm: Annotated[
-        str | None,
-        typer.Option(
-            "-a",
-            "--algorithm",
-            help="See `list`; default: direct-cem, or direct-cem-holes for a surface with holes.",
-        ),
-    ] = None,
-    parameter: Parameters = [],  # noqa: B006
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            help="Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. Of several surfaces: a folder, or "
-            "a file with all of them.",
-        ),
-    ] = None,
-    place: Annotated[
-        Place, typer.Option("--uv", help="UVs in the unit square, or as the map is (a disk).")
-    ] = Place.unit,
-    checker: Annotated[
-        bool, typer.Option("--checker", help="Add a checkerboard texture; GLB has it always.")
-    ] = False,
-    bake: Annotated[
-        Path | None,
-        typer.Option(help="A texture made for the OBJ's own UVs: paint it anew for these."),
-    ] = None,
-    samples: Annotated[
-        Path | None,
-        typer.Option("--geometry-image", help="Sample the surface on a grid: NPY, EXR or PNG."),
-    ] = None,
-    remeshed: Annotated[
-        Path | None,
-        typer.Option("--remesh", help="Mesh the surface anew through the map, into this file."),
-    ] = None,
-    side: Annotated[
-        int, typer.Option(min=4, max=8192, help="Samples along a side, for the two above.")
-    ] = 129,
-    page: Annotated[
-        Path | None,
-        typer.Option("--html", help="A page on which to turn surface and map; needs no network."),
-    ] = None,
-    preview: Annotated[
-        bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
-    ] = False,
-    keep_invalid: Annotated[
-        bool,
-        typer.Option(
-            "--keep-invalid", help="Write a map that is not valid too; the exit code stays 1."
-        ),
-    ] = False,
-    force: Annotated[
-        bool,
-        typer.Option(
-            "--force", help="Write over the input, a picture not made here, or FOLDER's files."
-        ),
-    ] = False,
-    mend: Repair = False,
-    cut: Annotated[
-        bool,
-        typer.Option("--cut", help="Cut the surface into a disk first, as `cembench cut` does."),
-    ] = False,
-    plugin: Plugins = [],  # noqa: B006
-    command: Command = None,
-    program: Settings = [],  # noqa: B006
-    solves: SolvesOption = Solves.reuse,
-    backend: BackendOption = Backend(default_backend()),  # noqa: B008
-    threads: Threads = 1,
-    timeout: Timeout = 600.0,
-    memory: Memory = None,
-    as_json: Json = False,
-) -> None:
-    """Map surfaces, check the maps, and write them.
-
-    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
-    hold all digits; PLY and GLB single precision. An OBJ file keeps what else it has: groups,
-    materials, normals, colours, polygons. Of a surface that is --cut, the uncut one is written,
-    with a UV per corner. Several surfaces in one file share the square, each in its own part.
-    """
-    from cembench.core.outputs import refuse_inputs, refuse_present
-    from cembench.drawing.own_pictures import check_replaceable
-    from cembench.report.render.terminal import figures_table
-    from cembench.results.record_rows import row
-    from cembench.running.local import Options, map_once
-    from cembench.running.plan import MeasurementSettings, paper_role_of_file, plan_cells
-    from cembench.running.surface_file import read_surface_file
-    from cembench.workflows import map_files
-    from cembench.workflows.map_places import (
-        check_takes_disks,
-        draw_map,
-        output_files,
-        picture_files,
-    )
-
-    options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
-    declared, named = declared_command(command, program)
-    if named and algorithm:
-        raise ParameterError("-a and --command name two algorithms; map with one after the other.")
-    plugin = [*plugin, *declared]
-    registry = registry_with(plugin)
-    asked_for = named or ([algorithm] if algorithm else USUAL)
-    candidates = [registry.algorithm(name) for name in asked_for]
-    if cut:
-        check_takes_disks(candidates)
-    outputs = output_files(meshes, output)
-    wishes = map_files.Wishes(place, checker, bake)
-    extra = _Extra(samples, remeshed, side, place, page)
-    _check_extras(meshes, outputs, wishes, extra)
-    if any(a.target == "atlas" for a in candidates) and (extra.files or bake or len(meshes) > 1):
-        raise ParameterError(
-            f"{candidates[0].name} makes an atlas: map one surface, without --geometry-image, "
-            "--remesh, --html and --bake, which need one image for each vertex."
-        )
-    known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
-    fetched = {path: fetch_verbs.fetched(registry.dataset(str(path))) for path in known}
-    sources = [fetched.get(path, path) for path in meshes]
-    targets = list(dict.fromkeys(target for target in outputs if target is not None))
-    others = [path for target in targets for path in map_files.beside(target, wishes)]
-    for target in (*targets, *others, *extra.files):
-        refuse_inputs(target, [*sources, *([bake] if bake else [])], force=force)
-    refuse_present(others if output in outputs else [*targets, *others], force=force)
-    together = len(meshes) > 1 and output in outputs
-    found = []
-    for source in sources:
-        with err.status(f"reading {source}", spinner="line"):
-            found.append(read_surface_file(source, candidates, mend=mend, cut=cut))
-    chosen = [next(a for a in candidates if isinstance(file.mesh, a.mesh_type)) for file in found]
-    pictures: list[Path] = []
-    if preview:
-        pictures = picture_files(sources, chosen, [None] * len(outputs) if together else outputs)
-        for picture in pictures if not force else ():
-            check_replaceable(picture)
-    how = MeasurementSettings(solves.value, _installed(backend), threads, repeats=1)
-    tasks = []
-    for file, taken in zip(found, chosen, strict=True):
-        standing = {file.mesh.name: paper_role_of_file(registry, file.path, file.mesh)}
-        given = assignments(parameter)
-        tasks += plan_cells([taken], [file.mesh], given, how, plugin, standing)
-    for folder in {target.parent for target in targets}:
-        folder.mkdir(exist_ok=True)
-    rows, failures = [], []
-    maps: list[Any] = []
-    for k, (file, task) in enumerate(zip(found, tasks, strict=True)):
-        with err.status(f"{task.algorithm.title} on {file.mesh.m:,} triangles", spinner="line"):
-            record, uv = map_once(task, options)
-        ok = record.outcome.status == "ok"
-        written: dict[str, str] = {}
-        if uv is not None and (ok or keep_invalid):
-            where_to = outputs[k]
-            maps.append(uv)
-            if where_to is not None and not together:
-                is_atlas = task.algorithm.target == "atlas"
-                write = map_files.write_corner_map if is_atlas else map_files.write_map
-                _tell(where_to, write(where_to, file, uv, wishes))
-            if where_to is not None:
-                written["output"] = str(where_to)
-            written |= extra.write(file.mesh, uv, record)
-            if preview and task.algorithm.target == "atlas":
-                note("an atlas has no picture: islands lie anywhere in the plane")
-            elif preview:
-                with err.status("drawing", spinner="line"):
-                    written["preview"] = str(pictures[k])
-                    draw_map(file.mesh, uv, pictures[k], record)
-        repaired = {"repair": file.repaired.counts} if file.repaired else {}
-        rows.append(row(record) | repaired | written)
-        if not as_json:
-            _print_notices([file.mesh])
-            out.print(figures_table(record))
-            for what, where in written.items():
-                print_pair(what, where)
-            if uv is not None and not written:
-                more = "" if ok or keep_invalid else " --keep-invalid"
-                hint = f"Nothing was written; add{more} -o FILE.obj to keep the map."
-                out.print(hint, style="dim")
-        if not ok:
-            kept = " (this map was written all the same: --keep-invalid)" if written else ""
-            which = f"{file.path}: " if len(found) > 1 else ""
-            failures.append(f"{which}{record.outcome.status}: {record.outcome.cause}{kept}")
-    if output is not None and together and len(maps) == len(found):
-        _tell(output, map_files.write_atlas(output, found, maps, wishes))
-    elif together:
-        failures.append(f"{output} was not written, because a map is missing in it")
-    if as_json:
-        print_json(rows if len(rows) > 1 else rows[0])
-    for failure in failures:
-        complain(failure)
-    if failures:
-        raise typer.Exit(1)
+app.command("map", epilog=map_verbs.EXAMPLES)(map_verbs.map_)
 
 
 @app.command(
@@ -514,13 +288,13 @@ def run(
     reproduced = any(role.paper_row for role in standing.values())
     given = (paper_parameters(wanted) if reproduced else {}) | assignments(parameter)
     for policy in policies:
-        how = MeasurementSettings(policy, _installed(backend), threads, repeats, share)
+        how = MeasurementSettings(policy, installed_backend(backend), threads, repeats, share)
         tasks += plan_cells(chosen, found, given, how, plugin, standing)
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
         return
     if not as_json:
-        _print_notices(found)
+        print_notices(found)
     records = _measure(tasks, Store(output), options)
     _present(records, as_json=as_json, where=output, reference=reference)
 
@@ -618,86 +392,12 @@ for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
 
 
-@dataclass(frozen=True)
-class _Extra:
-    """What `map` writes of a surface beside its map."""
-
-    samples: Path | None
-    remeshed: Path | None
-    side: int
-    place: Place
-    page: Path | None
-
-    @property
-    def files(self) -> list[Path]:
-        return [path for path in (self.samples, self.remeshed, self.page) if path is not None]
-
-    def write(self, mesh: TriangleMesh, z: Any, record: Record) -> dict[str, str]:
-        from cembench.conformal.resample import regular_remesh
-        from cembench.workflows.geometry_images import write_geometry_image
-        from cembench.workflows.map_files import Wishes, save_map
-
-        if self.samples is not None:
-            write_geometry_image(self.samples, mesh, z, self.side)
-        if self.remeshed is not None:
-            new, new_z = regular_remesh(mesh, z, self.side)
-            _tell(self.remeshed, save_map(self.remeshed, new, new_z, Wishes(self.place)))
-        if self.page is not None:
-            from cembench.report.render.view_page import write_view_page
-            from cembench.workflows.view import map_page
-
-            told = [*map(str, mesh.notices), *map(str, record.outcome.notes)]
-            with err.status("drawing", spinner="line"):
-                page = map_page(mesh, z, record.outcome, record.title, told)
-            write_view_page(self.page, page)
-        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
-        return {what: str(path) for what, path in named.items() if path is not None}
-
-
-def _check_extras(
-    meshes: Sequence[Path], outputs: Sequence[Path | None], wishes: Wishes, extra: _Extra
-) -> None:
-    """Raise what would be raised for a texture or an extra file, before anything is mapped."""
-    from cembench.mesh.files import check_writable_format
-    from cembench.workflows.geometry_images import check_image_format
-    from cembench.workflows.map_files import check_wishes
-
-    check_wishes(meshes, wishes)
-    if wishes.textured and None in outputs:
-        raise ParameterError("--checker and --bake need a file that uses the texture: add -o.")
-    if len(set(outputs)) < len(outputs) and outputs[0] and wishes.place is not Place.unit:
-        raise ParameterError("surfaces that share one file share the unit square: leave --uv away.")
-    if extra.files and len(meshes) > 1:
-        raise ParameterError(
-            "--geometry-image, --remesh and --html take one surface; map them one by one."
-        )
-    if extra.page is not None:
-        require(Extra.REPORT, "map --html", "jinja2", "markupsafe")
-    if extra.page is not None and extra.page.suffix.lower() not in (".html", ".htm"):
-        raise ParameterError(f"{extra.page}: --html writes a page; name it with .html.")
-    if extra.page is not None and not extra.page.parent.is_dir():
-        raise MeshError(f"{extra.page}: there is no folder {extra.page.parent}. Make it first.")
-    if extra.samples is not None:
-        check_image_format(extra.samples)
-    if extra.remeshed is not None:
-        check_writable_format(extra.remeshed, with_uv=True)
-
-
-def _tell(path: Path, notices: Sequence[Notice]) -> None:
-    for notice in notices:
-        note(f"{path}: {notice}")
-
-
 def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
     """Run the tasks with a live table on a terminal, and with a line a cell elsewhere."""
     from cembench.running.local import run_tasks
 
-    try:
-        with _progress(len(tasks)) as progress:
-            return run_tasks(tasks, store, options, progress)
-    except KeyboardInterrupt:
-        err.print("Stopped; the same command resumes.")
-        raise
+    with resumable(), _progress(len(tasks)) as progress:
+        return run_tasks(tasks, store, options, progress)
 
 
 @contextmanager
@@ -784,12 +484,6 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
     )
 
 
-def _print_notices(meshes: Sequence[TriangleMesh]) -> None:
-    for mesh in meshes:
-        for notice in mesh.notices:
-            note(f"{mesh.name}: {notice}")
-
-
 def _policies(given: list[str]) -> list[str]:
     names = list(dict.fromkeys(split(given)))
     for name in names:
@@ -798,13 +492,6 @@ def _policies(given: list[str]) -> list[str]:
                 f"--solves {name!r} is unknown; allowed: reuse, backslash, or both with a comma."
             )
     return names or [Solves.reuse.value]
-
-
-def _installed(backend: Backend) -> str:
-    from cembench.linear_algebra.cholesky import linear_algebra
-
-    with linear_algebra(backend=backend.value):
-        return backend.value
 
 
 def _facts(registry: Registry, *, measure: bool) -> dict[str, SurfaceFacts | None]:

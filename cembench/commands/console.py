@@ -22,6 +22,7 @@ from rich.text import Text
 from cembench.core.errors import ParameterError
 
 if TYPE_CHECKING:
+    from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Registry
 
 #: Control codes become pictures of themselves; tabs and line ends stay.
@@ -92,6 +93,13 @@ def warn(message: str) -> None:
 def note(message: str, style: str = "yellow") -> None:
     """Say on standard error what is good to know."""
     err.print(f"note: {message}", style=style, soft_wrap=True)
+
+
+def print_notices(meshes: Iterable[TriangleMesh]) -> None:
+    """Say on standard error what was noticed of surfaces when they were read."""
+    for mesh in meshes:
+        for notice in mesh.notices:
+            note(f"{mesh.name}: {notice}")
 
 
 def registry_with(plugins: Sequence[str]) -> Registry:

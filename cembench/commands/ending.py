@@ -24,12 +24,14 @@ from typing import Any, NoReturn
 
 from typer.core import TyperGroup
 
-from cembench.commands.console import complain
+from cembench.commands.console import complain, err
 from cembench.core.errors import CembenchError
 
 BAD_USAGE, FAULT, SYSTEM, CLOSED_PIPE = 2, 70, 74, 141
 #: Set to anything, it shows the traceback of a fault on standard error.
 DEBUG = "CEMBENCH_DEBUG"
+#: What Ctrl-C is answered with.
+STOPPED, STOPPED_AND_KEPT = "Stopped.", "Stopped; the same command resumes."
 
 
 class _Passed(BaseException):
@@ -39,6 +41,19 @@ class _Passed(BaseException):
         self.error = error
 
 
+class _Resumable(KeyboardInterrupt):
+    """Ctrl-C where what was done is kept."""
+
+
+@contextmanager
+def resumable() -> Iterator[None]:
+    """Let Ctrl-C out of the enclosed tell that the same command goes on where it was stopped."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        raise _Resumable from error
+
+
 class Verbs(TyperGroup):
     """The verbs; OSError and EOFError out of one of them are no usage errors and no Ctrl-D."""
 
@@ -46,6 +61,9 @@ class Verbs(TyperGroup):
         """Call the verb."""
         try:
             return super().invoke(ctx)
+        except KeyboardInterrupt as error:
+            err.print(STOPPED_AND_KEPT if isinstance(error, _Resumable) else STOPPED)
+            raise
         except (OSError, EOFError) as error:
             raise _Passed(error) from error
 

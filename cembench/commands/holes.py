@@ -60,9 +60,11 @@ def holes(
         if value is not None
     )
     for name, mesh in zip(meshes, surfaces, strict=True):
-        with err.status(f"Koebe's method on {mesh.name}", spinner="line"):
+        with err.status(f"Koebe's method on {mesh.name}", spinner="line") as status:
             command = f"cembench holes {Path(name).name}{options}"
-            rows += examine_holes(mesh, algorithms, outer, sweeps, run, command, complain)
+            rows += examine_holes(
+                mesh, algorithms, outer, sweeps, run, command, complain, status.update
+            )
     files = " ".join(Path(name).name for name in meshes)
     write_holes_table(rows, run, f"cembench holes {files}{options}")
     if as_json:

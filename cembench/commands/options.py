@@ -7,6 +7,7 @@ machine can do, and keep sums, clocks and the system's own limits from overflowi
 from __future__ import annotations
 
 import math
+from enum import StrEnum
 from typing import Annotated
 
 import typer
@@ -223,3 +224,30 @@ def memory_bytes(given: str | None) -> int:
             "half of that to load the libraries) to 1024TiB."
         )
     return size
+
+
+class Solves(StrEnum):
+    """Keep a factor while its matrix stands, or factor at every solve like MATLAB's backslash."""
+
+    reuse = "reuse"
+    backslash = "backslash"
+
+
+class Backend(StrEnum):
+    """The library that factors."""
+
+    cvxopt = "cvxopt"
+    superlu = "superlu"
+    pardiso = "pardiso"
+
+
+SolvesOption = Annotated[Solves, typer.Option(help="Keep factors, or factor at every solve.")]
+BackendOption = Annotated[Backend, typer.Option(help="The library that factors matrices.")]
+
+
+def installed_backend(backend: Backend) -> str:
+    """Return the name of a library that factors; it must be installed."""
+    from cembench.linear_algebra.cholesky import linear_algebra
+
+    with linear_algebra(backend=backend.value):
+        return backend.value

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cembench.commands.console import Json, complain, err, out, print_json, registry_with, split
+from cembench.commands.ending import resumable
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import MOST_FACES, Memory, Plugins, Repeats, Timeout, memory_bytes
 
@@ -80,7 +81,8 @@ def peers(
     how = MeasurementSettings(repeats=repeats)
     tasks = plan_cells(chosen, found, {}, how, plugins, standing)
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
-    with (LiveProgress if err.is_terminal else PlainProgress)(err, len(tasks)) as progress:
+    shown = LiveProgress if err.is_terminal else PlainProgress
+    with resumable(), shown(err, len(tasks)) as progress:
         records = run_tasks(tasks, Store(output), options, progress)
     _, folder = make_report(output, None, f"cembench peers -o {output}")
     if as_json:

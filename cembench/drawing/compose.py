@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import io
 import textwrap
-import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.text import Text
 from numpy.typing import NDArray
+from PIL import Image, ImageColor, ImageDraw, ImageFont
+from PIL.PngImagePlugin import PngInfo
 
 from cembench.drawing.own_pictures import SOFTWARE
 from cembench.drawing.scene import FOLDED
@@ -27,14 +28,13 @@ class Style:
     place: float
     pixels: int
     colour: str
-    weight: str = "normal"
+    bold: bool = False
 
 
-DPI = 100
 #: Pixels between and around the panels, and for the words below them, at the size 1600 x 940.
 GAP, WORDS, DESIGN_WIDTH = 40, 160, 1600
 #: The lines of words, placed by their middles.
-TITLE = Style(0.72, 30, "#1a2733", "bold")
+TITLE = Style(0.72, 30, "#1a2733", bold=True)
 CAPTION = Style(0.42, 23, "#33475a")
 NOTE = Style(0.13, 17, "#7a8894")
 INK = "#22384d"
@@ -43,6 +43,10 @@ RING = 7.0
 #: Words are shrunk to the first share of their size, then broken into two lines and shrunk to the
 #: second, before they are cut.
 EASY, SMALLEST = 0.85, 0.6
+#: Height of a line of words, in sizes of its letters.
+LINE = 1.32
+#: Samples along each side of a pixel for lines; how hard the PNG is compressed.
+SAMPLES, COMPRESSION = 3, 4
 
 
 def gap_of(size: tuple[int, int]) -> int:
@@ -101,84 +105,113 @@ def page(
         Width and height of the page in pixels.
 
     """
-    figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    for picture, (column, row) in zip((surface, image), panels_of(size), strict=True):
-        figure.figimage(picture, column, size[1] - row - len(picture), origin="upper")
-    _add_overlay(figure, overlay, size)
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
-        for text, style in zip(words, (TITLE, CAPTION, NOTE), strict=True):
-            _add_words(figure, text, style, size)
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": SOFTWARE})
+    whole = Image.new("RGB", size, "white")
+    for picture, corner in zip((surface, image), panels_of(size), strict=True):
+        whole.paste(Image.fromarray(picture), corner)
+    _add_overlay(whole, overlay, size)
+    for text, style in zip(words, (TITLE, CAPTION, NOTE), strict=True):
+        _add_words(whole, text, style, size)
+    return png(np.asarray(whole))
+
+
+def png(picture: Picture) -> bytes:
+    """Compose a PNG file that says that it is ours."""
+    about = PngInfo()
+    about.add_text("Software", SOFTWARE)
+    buffer = io.BytesIO()
+    form = {"compress_level": COMPRESSION, "pnginfo": about}
+    Image.fromarray(picture).save(buffer, "PNG", **form)
     return buffer.getvalue()
 
 
-def _add_overlay(figure: Figure, overlay: Overlay, size: tuple[int, int]) -> None:
-    line: float = max(1.6 * size[0] / DESIGN_WIDTH, 0.8) * 72 / DPI
-    for curve in overlay.curves:
-        x, y = _on_page(np.concatenate([curve, curve[:1]]), size)
-        figure.add_artist(Line2D(x, y, color=INK, linewidth=line))
-    x, y = _on_page(overlay.marks, size)
-    rings = Line2D(x, y, linestyle="", marker="o", markersize=RING * line)
-    rings.set(markerfacecolor="none", markeredgecolor=FOLDED, markeredgewidth=line)
-    figure.add_artist(rings)
+def _add_overlay(whole: Image.Image, overlay: Overlay, size: tuple[int, int]) -> None:
+    """Draw curves and rings over the image, in place."""
+    line = max(1.6 * size[0] / DESIGN_WIDTH, 0.8)
+    side, corner = side_of(size), panels_of(size)[1]
+    wide = round(line * SAMPLES)
+
+    def drawn(colour: tuple[int, ...], add: Callable[[ImageDraw.ImageDraw], None]) -> None:
+        mask = Image.new("L", (side * SAMPLES, side * SAMPLES))
+        add(ImageDraw.Draw(mask))
+        whole.paste(colour, (*corner, corner[0] + side, corner[1] + side), mask.reduce(SAMPLES))
+
+    def curves(draw: ImageDraw.ImageDraw) -> None:
+        for curve in overlay.curves:
+            points = _in_panel(np.concatenate([curve, curve[:2]]), side * SAMPLES)
+            draw.line(points, fill=255, width=wide, joint="curve")
+
+    def rings(draw: ImageDraw.ImageDraw) -> None:
+        reach = RING * line * SAMPLES / 2
+        for x, y in _in_panel(overlay.marks, side * SAMPLES):
+            box = (x - reach, y - reach, x + reach, y + reach)
+            draw.ellipse(box, outline=255, width=wide)
+
+    drawn(ImageColor.getrgb(INK), curves)
+    if len(overlay.marks):
+        drawn(tuple(round(255 * part) for part in FOLDED), rings)
 
 
-def _on_page(points: NDArray[np.float64], size: tuple[int, int]) -> NDArray[np.float64]:
-    """Window coordinates (k, 2) of the image in parts of the page, (2, k)."""
-    side, (column, row) = side_of(size), panels_of(size)[1]
-    x = column + (points[:, 0] + 1) / 2 * side
-    y = size[1] - row - (1 - points[:, 1]) / 2 * side
-    return np.stack([x / size[0], y / size[1]])
+def _in_panel(points: NDArray[np.float64], side: int) -> list[tuple[float, float]]:
+    """Move window coordinates (k, 2) to pixels of a panel, rows downwards."""
+    x, y = (points[:, 0] + 1) / 2 * side, (1 - points[:, 1]) / 2 * side
+    return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
-def _add_words(figure: Figure, text: str, style: Style, size: tuple[int, int]) -> None:
+def _add_words(whole: Image.Image, text: str, style: Style, size: tuple[int, int]) -> None:
     """Centre the text in its place below the panels, as large as fits."""
     if not text:
         return
-    place, pixels, colour = style.place, style.pixels, style.colour
     scale = size[0] / DESIGN_WIDTH
     room = size[1] - gap_of(size) - side_of(size)
-    words = figure.text(
-        0.5,
-        place * min(room, WORDS * scale) / size[1],
-        text,
-        fontsize=pixels * scale * 72 / DPI,
-        color=colour,
-        ha="center",
-        va="center",
-        parse_math=False,
-        fontfamily="DejaVu Sans",
-        fontweight=style.weight,
-        linespacing=1.15,
-    )
-    _fit(words, size[0] - 2 * gap_of(size))
+    lines, pixels = _fitted(text, style, style.pixels * scale, size[0] - 2 * gap_of(size))
+    middle = size[1] - style.place * min(room, WORDS * scale)
+    draw, font = ImageDraw.Draw(whole), _font(pixels, bold=style.bold)
+    for k, line in enumerate(lines):
+        y = middle + (k - (len(lines) - 1) / 2) * LINE * pixels
+        draw.text((size[0] / 2, y), line, style.colour, font, anchor="mm")
 
 
-def _fit(words: Text, width: float) -> None:
-    """Shrink a little, else break into two lines and shrink more, else cut: nothing runs out."""
-    text, size = words.get_text(), float(words.get_fontsize())
-    for lines, least in ((1, EASY), (2, SMALLEST)):
-        words.set_text(_broken(text, lines))
-        share = width / _width(words)
-        if share >= least:
-            words.set_fontsize(size * min(1.0, share))
-            return
-    words.set_fontsize(size * SMALLEST)
-    while len(text) > 1 and _width(words) > width:
-        text = text[: int(0.95 * len(text))]
-        words.set_text(_broken(text + " …", 2))
+def _fitted(text: str, style: Style, pixels: float, width: float) -> tuple[list[str], float]:
+    """Shrink a little, else break into two lines and shrink more, else cut: nothing runs out.
+
+    Returns the lines and the size of their letters in pixels.
+    """
+
+    def fits(lines: list[str], least: float) -> float | None:
+        """Return the largest share of the size at which they fit, if it is not below the least."""
+        share = 1.0  # step by step: letters are set on whole pixels, so widths do not just scale
+        while share >= least:
+            font = _font(pixels * share, bold=style.bold)
+            if max(font.getlength(line) for line in lines) <= width:
+                return pixels * share
+            share -= 0.02
+        return None
+
+    for count, least in ((1, EASY), (2, SMALLEST)):
+        lines = _broken(text, count)
+        found = fits(lines, least)
+        if found is not None:
+            return lines, found
+    while len(text) > 1 and fits(_broken(text + " …", 2), SMALLEST) is None:
+        text = text[: int(0.9 * len(text))]
+    return _broken(text + " …", 2), fits(_broken(text + " …", 2), SMALLEST) or pixels * SMALLEST
 
 
-def _width(words: Text) -> float:
-    return float(words.get_window_extent().width)
+@cache
+def _font(pixels: float, *, bold: bool) -> ImageFont.FreeTypeFont:
+    """Load the letters that come with matplotlib, without loading matplotlib."""
+    found = find_spec("matplotlib")
+    assert found is not None
+    assert found.origin is not None
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    fonts = Path(found.origin).parent / "mpl-data" / "fonts" / "ttf"
+    plain = ImageFont.Layout.BASIC  # the other one loads a library for scripts that join letters
+    return ImageFont.truetype(str(fonts / name), max(pixels, 4.0), layout_engine=plain)
 
 
-def _broken(text: str, lines: int) -> str:
+def _broken(text: str, lines: int) -> list[str]:
     """Break into this many lines of about the same length."""
     length = -(-len(text) // lines)
     while len(parts := textwrap.wrap(text, length)) > lines:
         length += 1
-    return "\n".join(parts)
+    return parts or [text]

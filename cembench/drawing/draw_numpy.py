@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
 from cembench.drawing import scene as look
+from cembench.drawing.checkerboard import FINER, MOST_LEVELS
 from cembench.drawing.rasterizer import Raster, rasterize
 from cembench.drawing.scene import Scene, View, doubled_areas
 
@@ -17,6 +20,8 @@ Picture = NDArray[np.uint8]
 SAMPLES = 2
 #: Squares of the board narrower than this many pixels begin to melt into grey-blue.
 LEGIBLE = 2.5
+#: Samples that are coloured together: few enough to stay near the processor.
+PORTION = 1 << 16
 
 
 def draw(scene: Scene, side: int) -> tuple[Picture, Picture]:
@@ -24,11 +29,10 @@ def draw(scene: Scene, side: int) -> tuple[Picture, Picture]:
     return _drawn(scene, scene.surface, side), _drawn(scene, scene.image, side)
 
 
-def averaged(samples: Real) -> Real:
+def averaged(samples: NDArray[Any]) -> NDArray[Any]:
     """Average the samples of each pixel: (SAMPLES s, SAMPLES s, ...) to (s, s, ...)."""
-    steps = range(SAMPLES)
-    total: Real = sum(samples[i::SAMPLES, j::SAMPLES] for i in steps for j in steps)  # type: ignore[assignment]
-    return total / SAMPLES**2
+    rows = np.add.reduce([samples[k::SAMPLES] for k in range(SAMPLES)])  # they lie together
+    return np.asarray(np.add.reduce([rows[:, k::SAMPLES] for k in range(SAMPLES)]) / SAMPLES**2)
 
 
 def shrunk(picture: Real) -> Picture:
@@ -38,13 +42,32 @@ def shrunk(picture: Real) -> Picture:
 
 def _drawn(scene: Scene, view: View, side: int) -> Picture:
     raster = rasterize(view.corners, side * SAMPLES)
-    colour = _board_colour(scene, raster, _square_sides(scene, view, side))
-    folded = scene.folded[raster.face]
-    colour[folded] = look.FOLDED
-    canvas = np.ones((raster.size**2, 3))
-    canvas[raster.pixel] = colour * raster.interpolate(view.brightness)[:, None]
-    _outline(canvas, raster.pixel[folded], raster.size)
-    return shrunk(255 * canvas.reshape(raster.size, raster.size, 3))
+    # What is averaged over a pixel's samples: how much of it is empty, light, dark and folded.
+    parts = np.zeros((4, raster.size**2), dtype=np.float32)
+    parts[0] = 1
+    sides = _square_sides(scene, view, side)
+    corners = np.column_stack([scene.board, view.brightness])
+    seen = [_fill(parts, scene, corners, portion, sides) for portion in raster.portions(PORTION)]
+    _outline(parts, np.concatenate([np.empty(0, np.int64), *seen]), raster.size)
+    shares = [averaged(part.reshape(raster.size, raster.size)) for part in parts]
+    colours = np.array([(1, 1, 1), look.LIGHT, look.DARK, look.FOLDED], dtype=np.float32)
+    return np.round(255 * np.stack(shares, axis=2) @ colours).astype(np.uint8)
+
+
+def _fill(
+    parts: NDArray[np.float32], scene: Scene, corners: Real, raster: Raster, sides: Real
+) -> NDArray[np.int64]:
+    """Share the light of samples among the parts, in place; return the samples that are folded."""
+    found = raster.interpolate(corners)
+    light, folded = found[:, 2], scene.folded[raster.face]
+    dark = _darkness(scene, found[:, :2], sides[raster.face]) * light
+    parts[0, raster.pixel] = 0
+    parts[1, raster.pixel] = light - dark
+    parts[2, raster.pixel] = dark
+    red = raster.pixel[folded]
+    parts[1:3, red] = 0
+    parts[3, red] = light[folded]
+    return red
 
 
 def _square_sides(scene: Scene, view: View, side: int) -> Real:
@@ -54,19 +77,18 @@ def _square_sides(scene: Scene, view: View, side: int) -> Real:
     return np.sqrt(drawn / np.maximum(board, look.TINY))
 
 
-def _board_colour(scene: Scene, raster: Raster, sides: Real) -> Real:
-    """The checkerboard at each pixel; a mean colour where its squares cannot be told apart."""
-    place = np.floor(raster.interpolate(scene.board)).astype(np.int64)
-    dark = (place.sum(axis=1) % 2).astype(np.float64)
-    contrast = np.clip((sides[raster.face] - 1) / (LEGIBLE - 1), 0, 1)
-    share = 0.5 + (dark - 0.5) * contrast
-    return np.array(look.LIGHT) + share[:, None] * (np.array(look.DARK) - np.array(look.LIGHT))
+def _darkness(scene: Scene, places: Real, sides: Real) -> Real:
+    """How dark is the board at places? Half where squares, of sides in pixels, are too small."""
+    dark, level = scene.squares.at(places)
+    smaller = float(FINER) ** -np.arange(MOST_LEVELS + 1)
+    contrast = np.clip((sides * smaller[level] - 1) / (LEGIBLE - 1), 0, 1)
+    return np.asarray(0.5 + (dark - 0.5) * contrast)
 
 
-def _outline(canvas: Real, folded: NDArray[np.int64], size: int) -> None:
+def _outline(parts: NDArray[np.float32], folded: NDArray[np.int64], size: int) -> None:
     """A fold may be smaller than a pixel: give it a rim of its colour, in place."""
     if len(folded):
         seen = np.zeros(size * size, dtype=bool)
         seen[folded] = True
         rim = ndimage.binary_dilation(seen.reshape(size, size), iterations=SAMPLES)
-        canvas[rim.ravel() & ~seen] = look.FOLDED
+        parts[:, rim.ravel() & ~seen] = np.array([0, 0, 0, 1], dtype=np.float32)[:, None]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cembench.core.atomic import write
 from cembench.drawing import draw_numpy
-from cembench.drawing.compose import DPI, INK
+from cembench.drawing.compose import INK
 from cembench.drawing.scene import Scene, image_in_window
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -23,6 +23,7 @@ Complex = NDArray[np.complex128]
 #: Pixels: side of a panel, space around, height of the words under a panel and at the top.
 SIDE, GAP, LABEL, TITLE = 460, 26, 40, 64
 COLUMNS = 4
+DPI = 100
 #: Colour of the boundary that a step opens.
 OPEN = "#c8553d"
 

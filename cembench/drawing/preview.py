@@ -1,28 +1,28 @@
 """A picture in which a person sees at a glance whether a map keeps squares square.
 
 On the left the surface under a checkerboard that was pulled back by the map, on the right the image
-under the same checkerboard. The board has 18 squares across the image; in regions where they would
-be large on the surface every square is divided into 3 x 3, as often as needed, in both panels alike
-(the conformal factor of one map can range over a factor of thousands).
+under the same checkerboard, turned so that what is up on the surface is up in it. The board has 18
+squares across the image; a square that would be large on the surface is divided into 3 x 3, as
+often as needed, in both panels alike (the conformal factor of one map can range over a factor of
+thousands).
 
 A rasterizer in numpy draws, so that no graphics card or display is needed and the same map gives
-the same bytes; matplotlib puts the page together.
+the same bytes; Pillow puts the page together.
 """
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
-from matplotlib.image import imsave
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import ParameterError, RenderError
 from cembench.drawing import compose, draw_numpy
-from cembench.drawing.own_pictures import SOFTWARE
-from cembench.drawing.scene import FINER, Scene, image_in_window
+from cembench.drawing.checkerboard import FINER
+from cembench.drawing.scene import Scene, image_in_window
+from cembench.drawing.view_scene import upright
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Complex = NDArray[np.complex128]
@@ -42,6 +42,7 @@ def write_preview(
     title: str = "",
     caption: str = "",
     size: tuple[int, int] = SIZE,
+    turned: bool = True,
 ) -> None:
     """Draw a surface and its image under one checkerboard into a PNG file.
 
@@ -59,6 +60,8 @@ def write_preview(
         Words below the picture; broken into two lines where they are long.
     size : tuple of int
         Width and height of the picture in pixels.
+    turned : bool
+        Whether the image is turned so that what is up on the surface is up in it.
 
     Raises
     ------
@@ -68,7 +71,7 @@ def write_preview(
         The file cannot be written, or the picture cannot be drawn.
 
     """
-    png = preview_png(mesh, uv, title=title, caption=caption, size=size)
+    png = preview_png(mesh, uv, title=title, caption=caption, size=size, turned=turned)
     write_bytes(path, png, error=RenderError, parents=False)
 
 
@@ -79,14 +82,18 @@ def preview_png(
     title: str = "",
     caption: str = "",
     size: tuple[int, int] = SIZE,
+    turned: bool = True,
 ) -> bytes:
     """Return the picture of :func:`write_preview` as PNG."""
     _check(mesh, uv, size)
+    uv = upright(mesh, uv) if turned else uv
     scene = Scene.of(mesh, uv)
     surface, image = _draw(scene, compose.side_of(size))
     outline = image_in_window(uv)[:, :2]
     overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
-    return compose.page(surface, image, overlay, (title, caption, _note(scene)), size)
+    return compose.page(
+        surface, image, overlay, (title, caption, _note(scene, turned=turned)), size
+    )
 
 
 def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> None:
@@ -96,9 +103,7 @@ def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = 
     """
     _check(mesh, uv, SIZE)
     surface, _ = _draw(Scene.of(mesh, uv), side)
-    file = io.BytesIO()
-    imsave(file, surface, format="png", metadata={"Software": SOFTWARE})
-    write_bytes(path, file.getvalue(), error=RenderError, parents=False)
+    write_bytes(path, compose.png(surface), error=RenderError, parents=False)
 
 
 def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Picture]:
@@ -128,13 +133,13 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
         )
 
 
-def _note(scene: Scene) -> str:
-    if not scene.refined:
-        return ""
-    return (
-        f"Where squares would be large on the surface they are divided {FINER} by {FINER}, "
-        "repeatedly where needed, in both panels alike."
+def _note(scene: Scene, *, turned: bool) -> str:
+    up = "The image is turned so that up on the surface is up in it." if turned else ""
+    finer = (
+        f"Squares that would be large on the surface are divided {FINER} by {FINER}, in both "
+        "panels alike."
     )
+    return f"{up} {finer if scene.squares.is_divided else ''}".strip()
 
 
 def _draw(scene: Scene, side: int) -> tuple[Picture, Picture]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import cast
 
@@ -11,8 +12,9 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Candidates (pixels in a triangle's bounding box) that are looked at together; bounds the memory.
-CHUNK = 2_000_000
+#: Candidates (pixels in a triangle's bounding box) that are looked at together: it bounds the
+#: memory, and what is small stays near the processor.
+CHUNK = 100_000
 #: A pixel this little outside a triangle still counts, so that no cracks show along edges.
 TOLERANCE = 1e-9
 #: Barycentric coordinates of a triangle's first corner.
@@ -48,6 +50,12 @@ class Raster:
         parts = (self.weights[:, c][along] * at_corners[self.face, c] for c in range(3))
         return cast(Real, sum(parts))
 
+    def portions(self, most: int) -> Iterator[Raster]:
+        """Give what is seen in portions of at most so many pixels."""
+        for start in range(0, len(self.pixel), most):
+            held = slice(start, start + most)
+            yield Raster(self.size, self.pixel[held], self.face[held], self.weights[held])
+
 
 def rasterize(corners: Real, size: int) -> Raster:
     """Find the triangle nearest to the viewer at the centre of every pixel.
@@ -71,7 +79,12 @@ def rasterize(corners: Real, size: int) -> Raster:
         nearest = height == depth[pixel]
         face[pixel[nearest]] = owner[nearest]
     pixel = np.flatnonzero(face >= 0)
-    return Raster(size, pixel, face[pixel], triangles.weights(face[pixel], pixel))
+    seen = face[pixel]
+    weights = np.empty((len(pixel), 3))
+    for start in range(0, len(pixel), CHUNK):
+        held = slice(start, start + CHUNK)
+        weights[held] = triangles.weights(seen[held], pixel[held])
+    return Raster(size, pixel, seen, weights)
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.planar import signed_areas
 from cembench.drawing.camera import view_rotation
+from cembench.drawing.checkerboard import FINER, MOST_LEVELS, Checkerboard
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -22,11 +23,8 @@ Complex = NDArray[np.complex128]
 
 #: Squares of the coarsest checkerboard across the image.
 SQUARES = 18
-#: A finer board has squares this many times smaller; odd, so that the corners keep their colour.
-FINER = 3
-#: The board is refined where its squares would have more than this side on the drawn surface.
+#: Squares are divided where they would have more than this side on the drawn surface.
 LARGEST_SQUARE = 0.22
-MOST_LEVELS = 10
 #: How often the sizes of squares are averaged over neighbours, so that refinement has calm borders.
 CALMING = 3
 #: Side of the smallest thing in the image that a person does not overlook.
@@ -66,21 +64,20 @@ class View:
 class Scene:
     """A surface and its image, ready to be drawn side by side under one checkerboard.
 
-    All triangles stand alone, their corners in turn. They are those of the mesh, except that some
-    are cut where the board becomes finer.
+    Triangles stand alone, their corners in turn.
 
     Parameters
     ----------
     space, plane : float64 (3 m, 3)
         Corners on the surface as the viewer sees it, and in the image; window coordinates.
     board : float64 (3 m, 2)
-        Corners on the checkerboard that is drawn in the triangle, refined or not.
+        Corners on the checkerboard.
+    squares : Checkerboard
+        Which of its squares are divided.
     brightness : float64 (3 m,)
         How much light a corner throws back to the viewer, 0 to 1.
     folded : bool (m,)
         Triangles whose image has no positive area.
-    refined : bool ()
-        Whether the board is finer anywhere.
 
     """
 
@@ -89,7 +86,7 @@ class Scene:
     board: Real
     brightness: Real
     folded: NDArray[np.bool_]
-    refined: NDArray[np.bool_]
+    squares: Checkerboard
 
     @classmethod
     def of(cls, mesh: TriangleMesh, uv: Complex, board_uv: Complex | None = None) -> Self:
@@ -102,20 +99,13 @@ class Scene:
         plane = image_in_window(uv)
         ruled = plane if board_uv is None else image_in_window(board_uv)
         board = ruled[:, :2] * (SQUARES / 2 / FILL)
-        fineness = fineness_of(F, space, board)
-        table = np.column_stack([space, plane, board, brightness_of(F, space), fineness])[F]
-        table, origin = _cut_at_whole_numbers(table)
-        level = np.ceil(table[:, :, -1].mean(axis=1)).clip(0)
-        table[:, :, 6:8] *= FINER ** level[:, None, None]
-        corners = table.reshape(-1, table.shape[2])
-        folded = ~(signed_areas(uv, F) > 0)
         return cls(
-            space=corners[:, 0:3],
-            plane=corners[:, 3:6],
-            board=corners[:, 6:8],
-            brightness=corners[:, 8],
-            folded=folded[origin],
-            refined=np.array(level.any()),
+            space=space[F].reshape(-1, 3),
+            plane=plane[F].reshape(-1, 3),
+            board=board[F].reshape(-1, 2),
+            brightness=brightness_of(F, space)[F].ravel(),
+            folded=~(signed_areas(uv, F) > 0),
+            squares=checkerboard_of(F, space, board),
         )
 
     @property
@@ -181,6 +171,13 @@ def brightness_of(F: Ints, points: Real) -> Real:
     return np.clip(SHADOW + LAMPLIGHT * ((1 + facing) / 2) ** FALL_OFF, 0.0, 1.0)
 
 
+def checkerboard_of(F: Ints, space: Real, board: Real) -> Checkerboard:
+    """Divide the board's squares that would be large on the surface, vertices (n, 3) and (n, 2)."""
+    fineness = fineness_of(F, space, board)
+    area = np.linalg.norm(_normals(F, space), axis=1)
+    return Checkerboard.of(board[F].mean(axis=1), fineness[F].mean(axis=1), area)
+
+
 def fineness_of(F: Ints, space: Real, board: Real) -> Real:
     """How often must squares be divided at each vertex so that they are not too large in space?
 
@@ -194,33 +191,3 @@ def fineness_of(F: Ints, space: Real, board: Real) -> Real:
     for _ in range(CALMING):
         log_side = _to_vertices(F, area * log_side[F].mean(axis=1), n) / weight
     return np.clip((log_side - np.log(LARGEST_SQUARE)) / np.log(FINER), -1, MOST_LEVELS)
-
-
-def _cut_at_whole_numbers(table: Real) -> tuple[Real, Ints]:
-    """Cut triangles where the last of their columns passes 0, 1, 2, ...
-
-    Takes corners with all that belongs to them, (m, 3, d); returns the same for the pieces, and
-    which triangle each of them comes from.
-    """
-    steps = np.ceil(table[:, :, -1]).clip(0)
-    several = steps.min(axis=1) != steps.max(axis=1)
-    origin = np.arange(len(table))
-    pieces, of = table[several], origin[several]
-    for threshold in range(MOST_LEVELS):
-        pieces, of = _cut(pieces, of, threshold)
-    return np.concatenate([table[~several], pieces]), np.concatenate([origin[~several], of])
-
-
-def _cut(table: Real, origin: Ints, threshold: float) -> tuple[Real, Ints]:
-    """Cut the triangles that pass the threshold into a corner and two halves of the rest."""
-    above = table[:, :, -1] > threshold
-    count = above.sum(axis=1)
-    passing = (count == 1) | (count == 2)
-    alone = np.argmax(above[passing] == (count[passing] == 1)[:, None], axis=1)
-    turn = (alone[:, None] + np.arange(3)) % 3
-    p, q, r = np.take_along_axis(table[passing], turn[:, :, None], axis=1).transpose(1, 0, 2)
-    x, y = (p + ((threshold - p[:, -1]) / (s[:, -1] - p[:, -1]))[:, None] * (s - p) for s in (q, r))
-    x[:, -1] = y[:, -1] = threshold
-    new = [np.stack(corners, axis=1) for corners in ((p, x, y), (x, q, r), (x, r, y))]
-    origins = [origin[~passing], *[origin[passing]] * 3]
-    return np.concatenate([table[~passing], *new]), np.concatenate(origins)

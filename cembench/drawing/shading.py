@@ -19,6 +19,7 @@ from PIL import Image
 from cembench.conformal.planar import signed_areas
 from cembench.drawing import scene as look
 from cembench.drawing.camera import view_rotation
+from cembench.drawing.checkerboard import FINER
 from cembench.drawing.draw_numpy import LEGIBLE, SAMPLES, shrunk
 from cembench.drawing.rasterizer import Raster, rasterize
 from cembench.mesh.side_lengths import side_lengths
@@ -113,14 +114,15 @@ def checkerboard(panel: RasterPanel, mesh: TriangleMesh, uv: Complex, surface: R
     `surface`.
     """
     board = look.image_in_window(uv)[:, :2] * (look.SQUARES / 2 / look.FILL)
-    fineness = panel.at(look.fineness_of(mesh.F, surface.points, board))
-    finer = look.FINER ** np.ceil(fineness).clip(0)
-    dark = np.floor(panel.at(board) * finer[:, None]).astype(np.int64).sum(axis=1) % 2
+    squares = look.checkerboard_of(mesh.F, surface.points, board)
+    dark, level = squares.at(panel.at(board))
     drawn = np.abs(look.doubled_areas(_samples(panel).reshape(-1, 2)))
     flat = np.abs(look.doubled_areas(board[mesh.F].reshape(-1, 2)))
-    pixels = np.sqrt(drawn / np.maximum(flat, look.TINY))[panel.raster.face] / (finer * SAMPLES)
+    pixels = np.sqrt(drawn / np.maximum(flat, look.TINY))[panel.raster.face] / (
+        FINER**level * SAMPLES
+    )
     share = 0.5 + (dark - 0.5) * np.clip((pixels - 1) / (LEGIBLE - 1), 0, 1)
-    return _between(look.LIGHT, look.DARK, share)
+    return _between(look.LIGHT, look.DARK, np.asarray(share, dtype=np.float64))
 
 
 def curvature(panel: RasterPanel, H: Real) -> Real:

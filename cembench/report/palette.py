@@ -40,20 +40,21 @@ _MORE = tuple(
 )
 #: What is not an algorithm: bounds, fits, the paper's own figures.
 PLAIN = SeriesStyle("#6b7683", ("o", "circle"), (":", "dot"))
-#: Phases of a measured call and other parts of a whole; what is left over.
+#: Phases of a measured call and other parts of a whole, and what is left over: paler than the
+#: colours of algorithms, and none of them, since both stand in one legend.
 PARTS = (
-    "#0072B2",
-    "#E69F00",
-    "#009E73",
-    "#CC79A7",
-    "#56B4E9",
-    "#D55E00",
-    "#F0E442",
-    "#8c564b",
-    "#5f6b9a",
-    "#3b7d7d",
-    "#a0405f",
-    "#7f5f00",
+    "#77aadd",
+    "#ee8866",
+    "#44bb99",
+    "#eedd88",
+    "#ffaabb",
+    "#bbcc33",
+    "#99ddff",
+    "#c2a5cf",
+    "#d9b48f",
+    "#aaaa00",
+    "#8da0cb",
+    "#a9c7b4",
 )
 REST = "#b3b9c0"
 

@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
+from scipy import ndimage
 
 from cembench.core.errors import RenderError
 
@@ -20,6 +22,10 @@ PIXELS = 12_000_000
 LONGEST, THUMBNAIL = 1600, 360
 #: Quality of WebP at which a checkerboard's edges are still clean.
 QUALITY = 76
+#: A pixel whose channels are all as bright as this is the white that a picture stands on.
+WHITE = 234
+#: What is smaller than this share of a picture and lies alone on its ground is JPEG's doing.
+SPECK = 2e-4
 #: Bytes up to which a vector graphic is embedded as it is; one of many marks outgrows its pixels.
 VECTOR_BYTES = 55_000
 #: CSS pixels of the units that an SVG's size is given in.
@@ -78,6 +84,8 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
             picture = opened.convert("RGBA" if "A" in opened.getbands() else "RGB")
     except OSError as error:
         raise unreadable(path, error) from error
+    if not exact and "A" not in picture.getbands():
+        picture = on_any_ground(picture)
     scale = min(1.0, longest / max(picture.size), (cap / (picture.width * picture.height)) ** 0.5)
     if scale < 1:
         smaller = (max(1, round(side * scale)) for side in picture.size)
@@ -85,6 +93,24 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
     file = io.BytesIO()
     picture.save(file, "WEBP", quality=QUALITY, lossless=exact, method=4)
     return Embedded(data_uri(file.getvalue(), "image/webp"), picture.width, picture.height)
+
+
+def on_any_ground(picture: Image.Image) -> Image.Image:
+    """Make the white that a picture stands on transparent, so that it stands on a dark page too.
+
+    White inside, which no way over white joins with the rim, stays.
+    """
+    pixels = np.asarray(picture)
+    white = pixels.min(axis=2) >= WHITE
+    label, _ = ndimage.label(white)
+    rims = np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]])
+    ground = white & np.isin(label, np.unique(rims[rims > 0]))
+    island, count = ndimage.label(~ground, structure=np.ones((3, 3)))
+    sizes = np.bincount(island.ravel(), minlength=count + 1)
+    ground |= (sizes < max(SPECK * ground.size, 4))[island]
+    near = ndimage.binary_dilation(ground) & ~ground
+    opacity = np.where(ground, 0, np.where(near, 128, 255)).astype(np.uint8)
+    return Image.fromarray(np.dstack([pixels, opacity]), "RGBA")
 
 
 def embed_vector(path: Path) -> Embedded | None:

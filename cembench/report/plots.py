@@ -101,6 +101,8 @@ class Plot:
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
 #: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
 DECADES = 300
+#: The most steps between ticks on an axis of whole numbers.
+TICKS = 8
 #: The same bytes at any time: identifiers from a fixed salt, no date. Words in SVG stay words.
 _STYLE: Any = {
     "svg.hashsalt": "cembench",
@@ -246,7 +248,7 @@ def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
             axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
             axis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value)))
             axis.set_minor_formatter(NullFormatter())
-    if not panel.x.log and all(isinstance(x, int) for s in panel.series for x in s.x):
+    if _counts(panel):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     if names:
         upright = len(names) > 4
@@ -292,7 +294,7 @@ def plotly_of(plot: Plot) -> dict[str, Any]:
     shown: set[str] = set()
     for k, panel in enumerate(plot.panels):
         suffix = "" if k == 0 else str(k + 1)
-        layout[f"xaxis{suffix}"] = _plotly_axis(panel.x)
+        layout[f"xaxis{suffix}"] = _plotly_axis(panel.x) | _whole_ticks(panel)
         layout[f"yaxis{suffix}"] = _plotly_axis(panel.y)
         if panel.title:
             layout["annotations"].append(
@@ -326,6 +328,18 @@ def _plotly_axis(axis: Axis) -> dict[str, Any]:
         if None in described["range"]:
             described["autorange"] = "max" if axis.high is None else "min"
     return described
+
+
+def _counts(panel: PlotPanel) -> bool:
+    """Whether a panel is over whole numbers, as of iterations: nothing is at one half."""
+    return not panel.x.log and all(isinstance(x, int) for s in panel.series for x in s.x)
+
+
+def _whole_ticks(panel: PlotPanel) -> dict[str, Any]:
+    numbers = [x for s in panel.series for x in s.x if isinstance(x, int)]
+    if not numbers or not _counts(panel):
+        return {}
+    return {"tick0": 0, "dtick": max(1, -(-(max(numbers) - min(numbers)) // TICKS))}
 
 
 def _plotly_trace(series: PlotSeries) -> dict[str, Any]:

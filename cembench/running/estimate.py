@@ -1,23 +1,24 @@
 """How long will a run take, and how much memory? Said before it starts, from what is known.
 
 A call's seconds are taken from an earlier record of the same cell; else from a power law in the
-number of triangles through the algorithm's records; else, roughly, from the power law through the
-paper's Table 1 (its slowest algorithm for one that the paper does not have).
+number of triangles through the algorithm's records; else, roughly, from what the built-in
+algorithms usually take (:mod:`cembench.running.usual_seconds`); of any other algorithm from the
+slowest of the paper's, which an unknown one seldom exceeds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import exp, log
 from statistics import mean
 from typing import Literal
 
-from cembench.results import paper
 from cembench.results.looks import LOOKS
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
+from cembench.running.usual_seconds import FACES, USUAL
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
@@ -35,6 +36,8 @@ ROUGH_BYTES = 150e6
 ROUGH_BYTES_A_FACE = 2500.0
 #: Rounds that a cell takes until it is precise, on a machine with little else to do.
 USUAL_ROUNDS = 20
+#: What stands for an algorithm of which nothing is known.
+SLOWEST = "qiem"
 #: Growth with the number of triangles where records of one size only are there.
 _USUAL_EXPONENT = 1.2
 
@@ -74,7 +77,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     ]
     same = [k for k in known if k[3].mesh_hash == cell.mesh_hash]
     points = [(size, seconds) for size, seconds, _, _ in same or known if seconds]
-    law = fit_power_law(points) if points else _printed_law(cell.algorithm)
+    law = fit_power_law(points) if points else _usual_law(cell)
     basis: Basis = "recorded" if same else "other sizes" if known else "rough"
     call = law.at(faces)
     peaks = [(size, float(peak)) for size, _, peak, _ in same or known if peak]
@@ -118,20 +121,8 @@ def fit_power_law(points: Sequence[tuple[float, float]]) -> PowerLaw:
     return PowerLaw(exp(mean(y) - slope * mean(x)), slope)
 
 
-def _printed_law(algorithm: str) -> PowerLaw:
-    column = algorithm if algorithm in _timed_columns() else "fdm"
-    return fit_power_law(_printed(column))
-
-
-def _timed_columns() -> set[str]:
-    first: Mapping[str, object] = next(iter(paper.table(1).values()))
-    return set(first) - {"faces", "cem_iterations"}
-
-
-def _printed(column: str) -> list[tuple[float, float]]:
-    points = []
-    for row in paper.table(1).values():
-        faces, seconds = row["faces"], row[column]
-        if faces and seconds:
-            points.append((faces, seconds))
-    return points
+def _usual_law(cell: Cell) -> PowerLaw:
+    """The law of a built-in algorithm, and of the paper's slowest for one that is none."""
+    laws = USUAL.get(cell.algorithm, USUAL[SLOWEST])
+    seconds, exponent = laws[cell.solves != "reuse"]
+    return PowerLaw(seconds / FACES**exponent, exponent)

@@ -12,6 +12,7 @@ from cembench.mesh.defects import located
 from cembench.mesh.files import checked, read_repaired
 from cembench.mesh.reading import read_soup
 from cembench.mesh.repair import Repaired
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm
 from cembench.running.plan import read_mesh_for
@@ -44,6 +45,18 @@ def read_surface_file(
 
     """
     soup, repaired = read_repaired(path) if mend else (read_soup(path), None)
+    return surface_of_soup(path, soup, algorithms, repaired, cut=cut)
+
+
+def surface_of_soup(
+    path: Path,
+    soup: Soup,
+    algorithms: Sequence[Algorithm],
+    repaired: Repaired | None = None,
+    *,
+    cut: bool = False,
+) -> SurfaceFile:
+    """Check what a file holds, as :func:`read_surface_file` does."""
     if not cut:
         return SurfaceFile(path, read_mesh_for(path, algorithms, soup), repaired)
     uncut = checked(soup, TriangleMesh, path)

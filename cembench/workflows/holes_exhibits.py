@@ -38,11 +38,13 @@ def examine_holes(
     run: Path,
     command: str,
     complain: Callable[[str], object],
+    tell: Callable[[str], object] = lambda _: None,
 ) -> list[dict[str, Any]]:
     """Map a surface in every way there is: a row for each, and two exhibits of the first sweep.
 
     `outer` is a vertex of the outer boundary, `sweeps` the most that are tried, `command` what
-    makes the exhibits again. `complain` hears of a method whose steps cannot be taken.
+    makes the exhibits again. `complain` hears of a method whose steps cannot be taken, `tell` of
+    each step before it is taken.
     """
     rows = []
     for algorithm in algorithms:
@@ -50,17 +52,29 @@ def examine_holes(
         counts: list[int | None] = [None]
         if algorithm.steps:
             try:
-                steps = list(algorithm.steps(mesh, sweeps=sweeps, outer=outer))
+                tell(f"{algorithm.title} on {mesh.name}: sweep 1 of {sweeps}")
+                for step in algorithm.steps(mesh, sweeps=sweeps, outer=outer):
+                    steps.append(step)
+                    tell(_next_step(mesh, algorithm, step, sweeps))
                 counts = [*sorted({1, _best_sweep(mesh, steps)})]
             except AlgorithmFailed as error:
                 complain(f"{mesh.name}: {error}")
                 counts = [1]
         for count in counts:
+            swept = f", {count} sweep{'s' if count > 1 else ''}" if count else ""
+            tell(f"{algorithm.title} on {mesh.name}{swept}: mapping, checking")
             row, record, uv = _measured(mesh, algorithm, outer, count)
             rows.append(row)
             if uv is not None and count == 1:
+                tell(f"{algorithm.title} on {mesh.name}: drawing")
                 _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
     return rows
+
+
+def _next_step(mesh: HoledMesh, algorithm: Algorithm, step: MapStep, sweeps: int) -> str:
+    count = len(mesh.loops)
+    done = f"boundary {step.boundary + 1} of {count} is a circle"
+    return f"{algorithm.title} on {mesh.name}: sweep {step.sweep} of {sweeps}, {done}"
 
 
 def _best_sweep(mesh: HoledMesh, steps: list[MapStep]) -> int:

@@ -25,6 +25,7 @@ from cembench.mesh.writers.obj import mtl_bytes, obj_bytes, with_material
 from cembench.mesh.writers.textured import Textured
 from cembench.running.surface_file import SurfaceFile
 from cembench.workflows.places import Place
+from cembench.workflows.shells import Shells
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -141,6 +142,30 @@ def write_map(
         original = with_uv(text, moved, *corners)
     _write(output, textured, texture, wishes, original)
     return _folded_by_rounding(output, z, moved, surface.mesh.F)
+
+
+def write_shells(
+    output: Path, shells: Shells, maps: Sequence[Complex], wishes: Wishes
+) -> tuple[Notice, ...]:
+    """Write a file of several surfaces again, their maps side by side in the unit square.
+
+    As :func:`write_map` otherwise: an OBJ file keeps all that it had.
+    """
+    uv, corners = shells.together(maps)
+    mesh = shells.whole
+    whole = SurfaceFile(shells.path, mesh)
+    textured = Textured(mesh.V, mesh.F, _columns(uv), corners, name=mesh.name)
+    texture = _texture(whole, textured, wishes, output)
+    original = None
+    if output.suffix.lower() == ".obj" == shells.path.suffix.lower():
+        text = shells.path.read_text(encoding="latin-1")  # any bytes, as they are
+        original = with_uv(text, uv, *(() if corners is None else (mesh.F, corners)))
+    _write(output, textured, texture, wishes, original)
+    before = np.zeros(len(uv), dtype=np.complex128)
+    F = mesh.F if corners is None else corners
+    for part, z, faces in zip(shells.parts, maps, shells.faces, strict=True):
+        before[F[faces]] = z[part.mesh.F]
+    return _folded_by_rounding(output, before, uv, F)
 
 
 def write_corner_map(

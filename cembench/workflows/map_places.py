@@ -16,6 +16,7 @@ from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm
 from cembench.results.records import Record
+from cembench.workflows.shells import Shells
 
 
 def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
@@ -90,3 +91,13 @@ def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, reco
     """Draw a surface and its map into a PNG, with the figures that were recorded."""
     title = f"{record.cell.mesh}: {record.title}"
     write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
+
+
+def draw_shells(shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path) -> None:
+    """Draw the surfaces of a file and their maps, side by side as in its UVs, into a PNG."""
+    starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
+    V = np.concatenate([part.mesh.V for part in shells.parts])
+    F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])
+    mesh = TriangleMesh.trusted(V, F, shells.path.stem)
+    title = f"{shells.path.stem}: {len(maps)} surfaces"
+    write_preview(mesh, np.concatenate(shells.packed(maps)), picture, title=title, turned=False)

@@ -9,12 +9,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
 from cembench.core.atomic import write
 from cembench.workflows.theory import Trajectory
 
-#: Colours that differ in lightness too: (23), (30), another algorithm.
-COLOURS = ("#1f5f99", "#c8553d", "#3f7d4e")
+#: Colours that differ in lightness too: (23), (30); other algorithms, which none of the former is.
+COLOURS = ("#1f5f99", "#c8553d")
+OTHERS = ("#3f7d4e", "#8a5a9e", "#b8860b", "#5f6b73", "#0f8b8d", "#a0405f")
+#: An axis of fewer numbers has ticks at 2 and 5 too.
+DECADES = 300
 #: Below this an energy's excess over the lowest is rounding.
 LEAST = 1e-12
 
@@ -59,6 +63,11 @@ def _draw_spectrum(axes: Axes, values: np.ndarray) -> None:
     axes.plot(np.arange(2, len(values) + 1), 1 - values[1:], ".", color=COLOURS[0], markersize=4)
     axes.set(xscale="log", yscale="log", xlabel="number k", ylabel="1 - eigenvalue of K")
     axes.set_title("Eigenvalues of K crowd at 1", fontsize=10)
+    few = len(values) < DECADES
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())  # else words stand over each other
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_energies(
@@ -67,11 +76,14 @@ def _draw_energies(
     curves = {name: path.energies for name, path in trajectories.items()}
     curves |= {name: np.asarray(history) for name, history in others.items()}
     lowest = min(float(curve.min()) for curve in curves.values())
-    for (name, curve), colour in zip(curves.items(), COLOURS * len(curves), strict=False):
+    colours = dict(zip(trajectories, COLOURS, strict=False))
+    colours |= {name: OTHERS[k % len(OTHERS)] for k, name in enumerate(others)}
+    for name, curve in curves.items():
         above = np.maximum(curve - lowest, LEAST)
-        axes.plot(np.arange(len(curve)), above, color=colour, label=name)
+        axes.plot(np.arange(len(curve)), above, color=colours[name], label=name)
     axes.set(yscale="log", xlabel="iteration", ylabel="E_C less the lowest found")
     axes.set_title("Conformal energy", fontsize=10)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(frameon=False, fontsize=9)
 
 
@@ -86,4 +98,5 @@ def _draw_steps(axes: Axes, trajectories: Mapping[str, Trajectory], rate: float)
         axes.plot(k, line, "--", color="#7a8894", linewidth=1, label=label)
     axes.set(yscale="log", xlabel="iteration", ylabel="r.m.s. step of the boundary")
     axes.set_title("The gap of K sets the speed", fontsize=10)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(frameon=False, fontsize=9)

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from cembench.surfaces.holed_disk import holed_disk
 
+from cembench.registry import load_registry
 from cembench.results.exhibits import read_exhibits
+from cembench.workflows.holes_exhibits import examine_holes
 from tests import gallery
 
 
@@ -76,3 +78,14 @@ def test_bad_input_is_named_and_nothing_is_written(arguments, message, cli, ring
         "disk.obj",
         "ring.obj",
     ]
+
+
+def test_it_tells_its_steps_while_it_works(tmp_path):
+    mesh = holed_disk(300, holes=2)
+    algorithms = [load_registry().algorithm("koebe-cem")]
+    heard = []
+    run = (tmp_path / "run", "cembench holes", pytest.fail, heard.append)
+    rows = examine_holes(mesh, algorithms, None, 2, *run)
+    steps = [words for words in heard if "is a circle" in words]
+    assert len(steps) == len(set(steps)) == 2 * len(mesh.loops)
+    assert len(heard) == len(steps) + 1 + len(rows) + 1

@@ -204,3 +204,19 @@ def test_ctrl_c_says_that_the_same_command_resumes(cli, monkeypatch):
     code, _, err = cli("run", "--surfaces", "flat-disk", "--faces", "60", "-a", "cem")
     assert code == 130
     assert "Stopped; the same command resumes." in err
+
+
+def test_ctrl_c_in_a_command_that_keeps_nothing_says_only_that_it_stopped(cli, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    from cembench.surfaces.flat_disk import flat_disk
+
+    from cembench.mesh.files import write_mesh
+
+    monkeypatch.setattr("cembench.workflows.map_surfaces.map_once", interrupted)
+    write_mesh(cli.folder / "disk.obj", flat_disk(60))
+    code, _, err = cli("map", "disk.obj")
+    assert code == 130
+    assert "Stopped." in err
+    assert "resumes" not in err

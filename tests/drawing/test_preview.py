@@ -186,3 +186,14 @@ def test_maps_and_sizes_that_cannot_be_drawn_are_refused(tmp_path):
         write_preview(mesh, uv, tmp_path / "disk.png")
     with pytest.raises(ParameterError, match="size 100 x 100"):
         write_preview(mesh, seen_from_above(mesh), tmp_path / "disk.png", size=(100, 100))
+
+
+def test_the_image_is_turned_upright(tmp_path):
+    """A map that is turned gives the same picture: maps are compared by eye."""
+    mesh = flat_disk()
+    pictures = []
+    for turn in (1, 1j, np.exp(2.5j)):
+        write_preview(mesh, turn * seen_from_above(mesh), tmp_path / "disk.png", size=SMALL)
+        pictures.append(panels(tmp_path / "disk.png", SMALL)[1])
+    assert np.abs(pictures[1] - pictures[0]).mean() < 1
+    assert np.abs(pictures[2] - pictures[0]).mean() < 1

@@ -5,6 +5,7 @@ import pytest
 
 from cembench.drawing import scene as look
 from cembench.drawing.camera import view_rotation
+from cembench.drawing.checkerboard import Checkerboard
 from cembench.drawing.rasterizer import rasterize
 from cembench.drawing.scene import Scene, doubled_areas
 from cembench.mesh.files import read_mesh
@@ -64,14 +65,32 @@ def test_a_finer_board_covers_the_same_surface_with_smaller_squares():
     z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
     uv = (z - 0.7) / (1 - 0.7 * z)  # a Moebius map of the disk: the scale varies by a factor of 32
     scene = Scene.of(mesh, uv)
-    assert scene.refined
-    assert len(scene.folded) > mesh.m
-    for pieces, points in ((scene.space, mesh.V[:, :2]), (scene.plane, np.c_[uv.real, uv.imag])):
-        whole = doubled_areas(points[mesh.F].reshape(-1, 2)).sum()
-        assert doubled_areas(pieces[:, :2]).sum() == pytest.approx(whole * look.FILL**2, rel=1e-9)
-    assert (doubled_areas(scene.plane[:, :2]) > -1e-15).all()
-    side = np.sqrt(doubled_areas(scene.space[:, :2]) / doubled_areas(scene.board))
-    assert np.nanquantile(side, 0.99) < 1.2 * look.LARGEST_SQUARE
+    assert scene.squares.is_divided
+    middles = scene.board.reshape(-1, 3, 2).mean(axis=1)
+    _, level = scene.squares.at(middles)
+    sides = np.sqrt(doubled_areas(scene.space[:, :2]) / doubled_areas(scene.board))
+    assert np.nanquantile(sides / look.FINER**level, 0.99) < 1.7 * look.LARGEST_SQUARE
+    assert level.max() == 1
+
+
+def test_squares_are_divided_whole_or_not_at_all():
+    rng = np.random.default_rng(3)
+    places = rng.uniform(-4.5, 4.5, (40_000, 2))
+    fineness = 3 - 1.2 * np.hypot(*places.T)  # finest in the middle
+    board = Checkerboard.of(places, fineness, np.ones(len(places)))
+    dark, level = board.at(places)
+    assert set(level) == {0, 1, 2, 3}
+    for depth in range(4):
+        square = np.floor(places * 3.0**depth).astype(int)
+        _, which = np.unique(square, axis=0, return_inverse=True)
+        deepest = np.full(which.max() + 1, 0)
+        least = np.full(which.max() + 1, 9)
+        np.maximum.at(deepest, which, level > depth)
+        np.minimum.at(least, which, level > depth)
+        np.testing.assert_array_equal(deepest, least)  # all of it is finer, or nothing
+    np.testing.assert_array_equal(
+        dark, np.floor(places * 3.0 ** level[:, None]).sum(axis=1) % 2 == 1
+    )
 
 
 def test_rasterizer_covers_a_square_without_cracks_and_interpolates_exactly():

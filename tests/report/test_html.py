@@ -12,12 +12,14 @@ from collections import Counter
 from html.parser import HTMLParser
 from pathlib import PurePosixPath
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from cembench.core.errors import RenderError
 from cembench.report import pictures
 from cembench.report.document import Column, Figure, Report, Section, Table, Text, Value
+from cembench.report.pictures import on_any_ground
 from cembench.report.render import html
 from cembench.report.render.html import write_html
 from tests.report.sample_report import HOSTILE, sample_report
@@ -263,3 +265,14 @@ def test_a_plot_without_script_is_its_drawing_if_that_is_small_and_its_pixels_if
     assert (image["width"], image["height"]) == ("96", "48")
     monkeypatch.setattr(pictures, "VECTOR_BYTES", 10)
     assert page_of(report, tmp_path).all("img")[0]["src"].startswith("data:image/webp;base64,")
+
+
+def test_the_white_round_a_picture_becomes_transparent_and_the_white_in_it_stays():
+    pixels = np.full((60, 80, 3), 255, dtype=np.uint8)
+    pixels[10:50, 20:60] = (80, 130, 180)
+    pixels[25:35, 35:45] = 255  # within
+    pixels[5, 5] = 200  # a speck, as JPEG leaves them
+    found = np.asarray(on_any_ground(Image.fromarray(pixels)))
+    assert (found[:8, :, 3] == 0).all()
+    assert (found[12:48, 22:58, 3] == 255).all()
+    assert found.shape == (60, 80, 4)

@@ -1,9 +1,11 @@
 """The page of a report, as Chromium shows it."""
 
 import base64
+import io
 import json
 
 import pytest
+from PIL import Image
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.ui import WebDriverWait
@@ -281,6 +283,41 @@ def test_a_picture_is_enlarged_zoomed_and_compared_in_the_same_window(page):
     viewer.send_keys(Keys.ARROW_RIGHT)
     assert "QIEM" in page.one("#viewer p").text
     assert page.run(transform) == zoomed
+
+
+def test_a_picture_stands_on_the_page_s_own_ground(page, browser):
+    for scheme, dark in (("light", False), ("dark", True)):
+        page.open("#surface-0", scheme=scheme)
+        page.click("#surface-0 .enlarge")
+        page.wait(lambda: page.run("return document.querySelector('#viewer img').complete"))
+        seen = Image.open(io.BytesIO(browser.get_screenshot_as_png())).convert("L")
+        corner = seen.getpixel((5, 5))
+        assert (corner < 60) is dark
+        box = page.run(
+            "const b = document.querySelector('#viewer img').getBoundingClientRect();"
+            "return [b.left, b.top]"
+        )
+        assert abs(seen.getpixel((int(box[0]) + 3, int(box[1]) + 3)) - corner) < 12
+        page.run("document.querySelector('#viewer').close()")
+
+
+def test_a_wide_table_fits_a_desktop_and_keeps_its_first_column_on_a_telephone(page):
+    wide = "return [...document.querySelectorAll('table')].sort((a, b) => b.tBodies[0].rows[0]"
+    wide += ".cells.length - a.tBodies[0].rows[0].cells.length)[0].closest('.scroll')"
+    page.open(size=(1440, 900))
+    assert page.run(f"{wide}.scrollWidth <= {wide.removeprefix('return ')}.clientWidth")
+    page.open(size=PHONE)
+    scroll = page.run(wide)
+    page.run("arguments[0].scrollLeft = 200", scroll)
+    first, second, own = page.run(
+        "const row = arguments[0].querySelector('tbody tr').cells;"
+        "return [row[0], row[1], arguments[0]].map(e => e.getBoundingClientRect()"
+        ").map(b => [b.left, b.width])",
+        scroll,
+    )
+    assert abs(first[0] - own[0]) < 1  # stays where it is, while the others go
+    assert second[0] < first[0] + first[1]
+    assert first[1] < 0.4 * own[1]
 
 
 def test_claims_are_filtered_by_their_verdict(page):

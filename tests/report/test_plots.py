@@ -10,7 +10,7 @@ from cembench.report.content.figures.cost_by_faces import cost_by_faces, fit, pr
 from cembench.report.content.figures.energy_by_iteration import energy_by_iteration
 from cembench.report.content.figures.performance_profile import performance_profile, ratios
 from cembench.report.content.figures.time_by_phase import time_by_phase
-from cembench.report.palette import looks
+from cembench.report.palette import PARTS, looks
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, plotly_of, write_plot
 from tests.report.small_run import meshes, ok, record, write_run
 
@@ -118,3 +118,20 @@ def test_energies_of_algorithms_not_in_the_paper_stand_beside_those_of_cem(tmp_p
     (panel,) = plot.panels
     assert [series.name for series in panel.series] == ["CEM", "Direct CEM"]
     assert panel.series[1].y[-1] < panel.series[0].y[0]
+
+
+def test_no_phase_has_an_algorithm_s_colour():
+    algorithms = {look.colour.lower() for look in looks(list("abcdef")).values()}
+    assert not algorithms & {colour.lower() for colour in PARTS}
+    assert len(set(PARTS)) == len(PARTS)
+
+
+def test_iterations_have_whole_ticks():
+    for last, step in ((2, 1), (8, 1), (40, 5)):
+        curve = PlotSeries("CEM", list(range(last + 1)), [1.0] * (last + 1), "both")
+        panel = PlotPanel(Axis("iteration"), Axis("E_C"), (curve,))
+        axis = plotly_of(Plot("history", "History", (panel,)))["layout"]["xaxis"]
+        assert (axis["tick0"], axis["dtick"]) == (0, step)
+    times = PlotSeries("CEM", [0.5, 1.0], [1.0, 2.0], "both")
+    plot = Plot("times", "Times", (PlotPanel(Axis("seconds"), Axis("E_C"), (times,)),))
+    assert "dtick" not in plotly_of(plot)["layout"]["xaxis"]

@@ -28,7 +28,7 @@ from cembench.report.document import Figure
 from cembench.results.records import Record
 
 #: Pixels of one panel of a picture.
-SIDE = 236
+SIDE = 420
 #: Degrees of a bin of the histograms, and where they end.
 BIN, LAST = 0.1, 10.0
 #: Recomputed angles may differ from the record's mean by this share, from rounding.

@@ -1,0 +1,115 @@
+"""A checkerboard whose squares are divided where they would be large on the surface.
+
+A square is divided whole, 3 by 3, or not at all, so that finer squares never lie as fragments among
+coarser ones. The finer ones are divided again where they are still too large.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+#: A divided square has this many along its side; odd, so that the corners keep their colour.
+FINER = 3
+#: How often a square may be divided.
+MOST_LEVELS = 10
+
+
+@dataclass(frozen=True)
+class Checkerboard:
+    """Which squares are divided: a tree, its roots the squares of side 1.
+
+    Parameters
+    ----------
+    low : int64 (2,)
+        Lower left corner of the lowest square.
+    across : int
+        Squares of side 1 along the board's width; they come row by row.
+    first_part : int64 (k,)
+        Of each square the number of the first of its parts, row by row; -1 for one that is whole.
+
+    """
+
+    low: Ints
+    across: int
+    first_part: Ints
+
+    @classmethod
+    def of(cls, places: Real, fineness: Real, weights: Real) -> Checkerboard:
+        """Divide the squares whose parts would still be large, judging by samples.
+
+        Parameters
+        ----------
+        places : float64 (k, 2)
+            Samples on the board.
+        fineness : float64 (k,)
+            How often squares have to be divided there; not whole numbers.
+        weights : float64 (k,)
+            How much a sample counts: its share of the surface.
+
+        """
+        low = np.floor(places.min(axis=0)).astype(np.int64)
+        across, up = np.floor(places.max(axis=0)).astype(np.int64) - low + 1
+        board = np.full(int(across * up), -1, dtype=np.int64)
+        node = _roots(places, low, int(across))
+        here, start = np.arange(len(places)), 0
+        for level in range(MOST_LEVELS):
+            size = len(board)
+            weight = np.bincount(node[here], weights[here], minlength=size)
+            total = np.bincount(node[here], (weights * fineness)[here], minlength=size)
+            divided = np.flatnonzero((total > level * weight) & (np.arange(size) >= start))
+            if not len(divided):
+                break
+            board[divided] = size + FINER**2 * np.arange(len(divided))
+            board = np.concatenate([board, np.full(FINER**2 * len(divided), -1, dtype=np.int64)])
+            here = here[board[node[here]] >= 0]
+            node[here] = board[node[here]] + _part(places[here], level + 1)
+            start = size
+        return cls(low, int(across), board)
+
+    @property
+    def is_divided(self) -> bool:
+        """Whether any square is."""
+        return bool((self.first_part >= 0).any())
+
+    def at(self, places: Real) -> tuple[NDArray[np.bool_], Ints]:
+        """Return whether the board is dark at places (k, 2), and how often it is divided there.
+
+        Places off the board count as its nearest square.
+        """
+        roots = len(self.first_part)
+        node = np.clip(_roots(places, self.low, self.across), 0, roots - 1)
+        dark = _is_dark(places, 0)
+        level = np.zeros(len(places), dtype=np.int64)
+        here = np.flatnonzero(self.first_part[node] >= 0)
+        while len(here):
+            depth = int(level[here[0]]) + 1
+            level[here] = depth
+            dark[here] = _is_dark(places[here], depth)
+            parts = self.first_part[node[here]] + _part(places[here], depth)
+            node[here] = parts
+            here = here[self.first_part[parts] >= 0]
+        return dark, level
+
+
+def _roots(places: Real, low: Ints, across: int) -> Ints:
+    column = np.floor(places[:, 0]).astype(np.int64) - low[0]
+    row = np.floor(places[:, 1]).astype(np.int64) - low[1]
+    return np.asarray(column.clip(0, across - 1) + across * row)
+
+
+def _part(places: Real, level: int) -> Ints:
+    """Return which of its parent's parts the square of this level is that holds each place."""
+    place = np.floor(places * FINER**level).astype(np.int64) % FINER
+    return np.asarray(place[:, 0] + FINER * place[:, 1])
+
+
+def _is_dark(places: Real, level: int) -> NDArray[np.bool_]:
+    scale = FINER**level
+    whole = np.floor(places[:, 0] * scale) + np.floor(places[:, 1] * scale)
+    return np.asarray(whole.astype(np.int64) & 1 == 1)

@@ -1,0 +1,40 @@
+"""How long do the built-in algorithms usually take? For estimates before anything is recorded.
+
+Seconds of a call on 10,000 triangles and how they grow, for systems whose factors are kept and for
+those factored at every solve. Those of the paper's algorithms are fits through the runs that are
+kept in ``reports/standard`` and ``reports/paper``; the others were measured in one sitting, on
+surfaces of 5,600 to 34,000 triangles, as the processor's time. Another machine is faster or slower
+by some factor: a record of the same algorithm counts before this table.
+"""
+
+from __future__ import annotations
+
+#: Triangles that the seconds are of.
+FACES = 10_000
+
+#: By the algorithm's name: seconds and exponent with kept factors, the same without.
+USUAL: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
+    "abf++": ((0.15, 1.06), (0.19, 1.14)),
+    "abf-linear": ((0.11, 1.25), (0.12, 1.11)),
+    "angenent-haker": ((0.023, 1.0), (0.033, 1.0)),
+    "bff": ((0.046, 1.0), (0.095, 1.4)),
+    "bff-free": ((0.033, 1.0), (0.067, 1.4)),
+    "cem": ((0.029, 0.93), (0.10, 0.84)),
+    "cetm": ((0.088, 1.3), (0.11, 1.4)),
+    "cetm-flips": ((0.30, 1.22), (0.32, 1.18)),
+    "cetm-free": ((0.060, 1.32), (0.090, 1.17)),
+    "circle-packing": ((0.52, 1.29), (0.52, 1.29)),
+    "direct-cem": ((0.05, 0.95), (0.12, 1.2)),
+    "direct-cem-holes": ((0.25, 1.0), (1.0, 1.0)),
+    "fdm": ((0.19, 1.08), (0.22, 1.08)),
+    "gu-yau": ((0.46, 1.4), (0.48, 1.4)),
+    "harmonic-circle": ((0.0135, 0.98), (0.0145, 1.03)),
+    "harmonic-filled": ((0.069, 1.0), (0.080, 1.0)),
+    "harmonic-tutte": ((0.014, 1.0), (0.014, 1.0)),
+    "koebe-cem": ((0.36, 1.06), (1.4, 1.2)),
+    "ldm": ((0.071, 1.08), (0.073, 1.13)),
+    "lscm": ((0.023, 1.06), (0.024, 1.14)),
+    "mean-value": ((0.026, 1.1), (0.026, 1.1)),
+    "qiem": ((0.27, 1.19), (0.47, 1.27)),
+    "scp": ((0.05, 0.95), (0.12, 1.2)),
+}

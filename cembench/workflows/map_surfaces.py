@@ -1,0 +1,204 @@
+"""Map the surfaces of files one after another, and write each as soon as it is there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.core.notices import Notice
+from cembench.registry import Algorithm, Registry
+from cembench.results.records import Record
+from cembench.running.local import Options, map_once
+from cembench.running.plan import MeasurementSettings, Task, paper_role_of_file, plan_cells
+from cembench.running.surface_file import SurfaceFile
+from cembench.workflows.map_extras import Extras, write_extras
+from cembench.workflows.map_files import (
+    Wishes,
+    write_atlas,
+    write_corner_map,
+    write_map,
+    write_shells,
+)
+from cembench.workflows.map_places import draw_map, draw_shells
+from cembench.workflows.shells import Shells
+
+Complex = NDArray[np.complex128]
+#: Shows words while something is done.
+Busy = Callable[[str], AbstractContextManager[object]]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A surface and the call that maps it."""
+
+    surface: SurfaceFile
+    task: Task
+
+
+@dataclass(frozen=True)
+class FileJobs:
+    """What is done with one file.
+
+    Parameters
+    ----------
+    shells : Shells
+        Its surfaces.
+    jobs : tuple of Job
+        One for each.
+    output : Path, optional
+        Where they go with their maps.
+    picture : Path, optional
+        Where a picture of them goes.
+
+    """
+
+    shells: Shells
+    jobs: tuple[Job, ...]
+    output: Path | None = None
+    picture: Path | None = None
+
+
+@dataclass(frozen=True)
+class Mapped:
+    """A surface that was mapped, and what was written of it."""
+
+    surface: SurfaceFile
+    record: Record
+    uv: Complex | None
+    #: Names of what was written, with the files.
+    written: Mapping[str, str]
+    #: What is to be known of a file that was written.
+    told: tuple[tuple[Path, Notice], ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether the map is valid."""
+        return self.record.outcome.status == "ok"
+
+
+def jobs_of(
+    shells: Shells,
+    registry: Registry,
+    candidates: Sequence[Algorithm],
+    parameters: Mapping[str, str],
+    how: MeasurementSettings,
+    plugins: Sequence[str],
+) -> tuple[Job, ...]:
+    """Choose for each surface the first algorithm that takes it."""
+    found = []
+    for surface in shells.parts:
+        mesh = surface.mesh
+        taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
+        standing = {mesh.name: paper_role_of_file(registry, surface.path, mesh)}
+        tasks = plan_cells([taken], [mesh], dict(parameters), how, list(plugins), standing)
+        found.append(Job(surface, tasks[0]))
+    return tuple(found)
+
+
+def map_surfaces(
+    files: Sequence[FileJobs],
+    options: Options,
+    wishes: Wishes,
+    extras: Extras,
+    busy: Busy,
+    *,
+    keep_invalid: bool = False,
+) -> Iterator[Mapped]:
+    """Map the surfaces in turn and write what is wanted of each; give each when it is done.
+
+    The file of several surfaces is written with its last one; so is its picture. It is not, where a
+    map is missing in it: :func:`incomplete` tells.
+
+    Raises
+    ------
+    MeshError, ParameterError, RenderError
+        A file cannot be written.
+
+    """
+    for file in files:
+        maps: list[Complex] = []
+        for k, job in enumerate(file.jobs):
+            found = _mapped(file, job, options, wishes, extras, busy, keep_invalid=keep_invalid)
+            if found.uv is not None and (found.ok or keep_invalid):
+                maps.append(found.uv)
+            is_last = k == len(file.jobs) - 1
+            if k and is_last and len(maps) == len(file.jobs):
+                told = _write_shells(file, maps, wishes, busy)
+                found = Mapped(found.surface, found.record, found.uv, found.written, told)
+            yield found
+
+
+def incomplete(
+    files: Sequence[FileJobs], found: Sequence[Mapped], *, keep_invalid: bool = False
+) -> list[Path]:
+    """Return the files that were not written, because a map is missing in them."""
+    missing, start = [], 0
+    for file in files:
+        own = found[start : start + len(file.jobs)]
+        start += len(file.jobs)
+        lacks = any(m.uv is None or not (m.ok or keep_invalid) for m in own)
+        if len(own) > 1 and file.output is not None and lacks:
+            missing.append(file.output)
+    return missing
+
+
+def write_together(output: Path, found: Sequence[Mapped], wishes: Wishes) -> tuple[Notice, ...]:
+    """Write all surfaces into one file; all must have a map."""
+    maps = [mapped.uv for mapped in found if mapped.uv is not None]
+    return write_atlas(output, [mapped.surface for mapped in found], maps, wishes)
+
+
+def _mapped(
+    file: FileJobs,
+    job: Job,
+    options: Options,
+    wishes: Wishes,
+    extras: Extras,
+    busy: Busy,
+    *,
+    keep_invalid: bool,
+) -> Mapped:
+    mesh, title = job.surface.mesh, job.task.algorithm.title
+    with busy(f"{title} on {mesh.name}, {mesh.m:,} triangles"):
+        record, uv = map_once(job.task, options)
+    if uv is None or not (record.outcome.status == "ok" or keep_invalid):
+        return Mapped(job.surface, record, uv, {})
+    is_atlas = job.task.algorithm.target == "atlas"
+    written: dict[str, str] = {}
+    told: list[tuple[Path, Notice]] = []
+    alone = len(file.jobs) == 1
+    if file.output is not None:
+        written["output"] = str(file.output)
+        if alone:
+            write: Any = write_corner_map if is_atlas else write_map
+            notices = write(file.output, job.surface, uv, wishes)
+            told += [(file.output, notice) for notice in notices]
+    if extras.files:
+        with busy("writing"):
+            notices = write_extras(extras, mesh, uv, record)
+        told += [(extras.remeshed or job.surface.path, notice) for notice in notices]
+        written |= {what: str(path) for what, path in extras.named.items()}
+    if file.picture is not None and not is_atlas:
+        written["preview"] = str(file.picture)
+        if alone:
+            with busy("drawing"):
+                draw_map(mesh, uv, file.picture, record)
+    return Mapped(job.surface, record, uv, written, tuple(told))
+
+
+def _write_shells(
+    file: FileJobs, maps: Sequence[Complex], wishes: Wishes, busy: Busy
+) -> tuple[tuple[Path, Notice], ...]:
+    told: tuple[Notice, ...] = ()
+    if file.output is not None:
+        told = write_shells(file.output, file.shells, maps, wishes)
+    if file.picture is not None:
+        with busy("drawing"):
+            draw_shells(file.shells, maps, file.picture)
+    return tuple((file.output or file.shells.path, notice) for notice in told)

@@ -1,0 +1,151 @@
+"""A file of several surfaces: its shells are mapped one by one and share the unit square."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.conformal.laplacian import corner_products
+from cembench.core.errors import MeshError
+from cembench.mesh.defects import Defect, UnusableMeshError
+from cembench.mesh.reading import read_soup
+from cembench.mesh.soup import Soup
+from cembench.mesh.topology import components
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.unit_square import packed
+from cembench.registry import Algorithm
+from cembench.running.surface_file import SurfaceFile, read_surface_file, surface_of_soup
+
+Ints = NDArray[np.int64]
+Complex = NDArray[np.complex128]
+
+#: The most surfaces that a file may hold to be mapped one by one; what falls into more pieces is a
+#: soup of triangles that wants to be welded.
+MOST = 100
+#: Defects that each surface of a file may have or not; others are mended in the file first.
+_OF_SHELLS = {Defect.components, Defect.closed, Defect.holes, Defect.no_hole, Defect.handles}
+
+
+@dataclass(frozen=True)
+class Shells:
+    """The surfaces of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    V, F : float64 (n, 3), int64 (m, 3)
+        All of it; polygons cut into triangles.
+    parts : tuple of SurfaceFile
+        The shells, one where the file is one surface.
+    vertices : tuple of int64 (n_i,)
+        Which vertices of the whole those of each shell are.
+    faces : tuple of int64 (m_i,)
+        Which triangles of the whole those of each shell are.
+
+    """
+
+    path: Path
+    V: NDArray[np.float64]
+    F: Ints
+    parts: tuple[SurfaceFile, ...]
+    vertices: tuple[Ints, ...] = ()
+    faces: tuple[Ints, ...] = ()
+
+    @property
+    def whole(self) -> TriangleMesh:
+        """All of it as one mesh, which nothing but a writer or a picture takes."""
+        return TriangleMesh.trusted(self.V, self.F, self.path.stem)
+
+    def packed(self, maps: Sequence[Complex]) -> list[Complex]:
+        """Put the shells' maps side by side into the unit square; larger surfaces get more."""
+        areas = [float(corner_products(p.mesh.V, p.mesh.F)[1].sum()) for p in self.parts]
+        return packed(maps, areas)
+
+    def together(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
+        """Put the shells' maps side by side into the unit square.
+
+        Returns
+        -------
+        uv : complex128 (k,)
+            Number i is the image of vertex i; behind them come those that only a cut needs.
+        corners : int64 (m, 3), optional
+            Which of them each corner has, where surfaces were cut.
+
+        """
+        uv, copies = np.zeros(len(self.V), np.complex128), []
+        corners, size = self.F.copy(), len(self.V)
+        for part, z, own, faces in zip(
+            self.parts, self.packed(maps), self.vertices, self.faces, strict=True
+        ):
+            uv[own] = z[: len(own)]
+            copies.append(z[len(own) :])
+            number = np.concatenate([own, size + np.arange(len(copies[-1]))])
+            corners[faces] = number[part.mesh.F]
+            size += len(copies[-1])
+        is_cut = any(part.cut for part in self.parts)
+        return np.concatenate([uv, *copies]), corners if is_cut else None
+
+
+def read_shells(
+    path: Path, algorithms: Sequence[Algorithm], *, mend: bool = False, cut: bool = False
+) -> Shells:
+    """Read the surfaces of a file, each as the kind that the algorithms take.
+
+    Triangles that hang together, if only at a vertex, are one surface. What is mended is one: its
+    largest.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or one of its surfaces is not of that kind.
+
+    """
+    if mend:
+        return _alone(read_surface_file(path, algorithms, mend=True, cut=cut))
+    soup = read_soup(path)
+    try:
+        return _alone(surface_of_soup(path, soup, algorithms, cut=cut))
+    except UnusableMeshError as error:
+        if {problem.defect for problem in error.problems} - _OF_SHELLS:
+            raise
+        found = _split(soup)
+        if not 2 <= len(found) <= MOST:
+            raise
+    F = soup.triangles
+    parts, vertices, faces = [], [], []
+    for k, (own, held) in enumerate(found):
+        number = np.full(len(soup.V), -1)
+        number[own] = np.arange(len(own))
+        name = f"{soup.name} {k + 1}"
+        corners = number[F[held]]
+        shell = Soup(soup.V[own], corners.ravel(), np.full(len(held), 3), name, soup.notices)
+        try:
+            parts.append(surface_of_soup(path, shell, algorithms, cut=cut))
+        except MeshError as error:
+            raise MeshError(
+                f"surface {k + 1} of the {len(found)} in this file, with vertex {own[0]} and "
+                f"{len(held)} triangles (numbers that follow count within it): {error}"
+            ) from None
+        vertices.append(own)
+        faces.append(held)
+    return Shells(path, soup.V, F, tuple(parts), tuple(vertices), tuple(faces))
+
+
+def _alone(file: SurfaceFile) -> Shells:
+    mesh = file.uncut or file.mesh
+    return Shells(file.path, mesh.V, mesh.F, (file,))
+
+
+def _split(soup: Soup) -> list[tuple[Ints, Ints]]:
+    """Return the vertices and triangles of each surface; none if a vertex is in no triangle."""
+    F = soup.triangles
+    count, label = components(F, len(soup.V))
+    of_faces = label[F[:, 0]]
+    if len(np.unique(of_faces)) < count:
+        return []
+    return [(np.flatnonzero(label == k), np.flatnonzero(of_faces == k)) for k in range(count)]
