@@ -23,6 +23,8 @@ Indices = NDArray[np.int64]
 SURELY = -1e-10
 #: Rounds of flips of edges that share no triangle.
 MOST_ROUNDS = 20_000
+#: Small meshes of needles, whose angles have lost their digits, flip for ever: they get fewer.
+LEAST_ROUNDS, ROUNDS_AN_EDGE = 1000, 10
 
 
 @dataclass
@@ -87,7 +89,8 @@ class Triangulation:
         """
         apart = Independence(len(self.F))
         candidates = np.flatnonzero(np.arange(len(self.twin)) < self.twin)
-        for _ in range(MOST_ROUNDS):
+        most = min(MOST_ROUNDS, LEAST_ROUNDS + ROUNDS_AN_EDGE * len(candidates))
+        for _ in range(most):
             h = candidates
             h = h[h // 3 != self.twin[h] // 3]
             cosines = self._cosine(h, u) + self._cosine(self.twin[h], u)
@@ -101,7 +104,7 @@ class Triangulation:
             around = (3 * touched[:, None] + np.arange(3)).ravel()
             candidates = np.unique(np.concatenate([self._moved[rest], around]))
             candidates = np.unique(np.minimum(candidates, self.twin[candidates]))
-        raise AlgorithmFailed(f"edges are still being flipped after {MOST_ROUNDS} rounds")
+        raise AlgorithmFailed(f"edges are still being flipped after {most} rounds")
 
     def _cosine(self, h: Indices, u: Real) -> Real:
         """The cosine of the angle opposite to half-edges, as if their triangles were flat."""

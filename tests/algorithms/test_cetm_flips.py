@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from cembench.algorithms.cetm.disk import cetm
@@ -7,12 +9,13 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from scipy.special import beta, hyp2f1
 
-from cembench import AlgorithmFailed
+from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.doubling import doubled
 from cembench.conformal.laplacian import laplacian_of_weights
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.files import read_mesh
 from cembench.mesh.intrinsic import Triangulation
+from fuzz.hard_meshes import hard_mesh
 from tests.hard_surfaces import hard_surface
 from tests.real_meshes import DISKS, real_mesh
 
@@ -129,3 +132,13 @@ def test_a_flat_disk_comes_out_nearly_as_it_is():
 def test_too_few_steps_are_a_failure():
     with pytest.raises(AlgorithmFailed, match="after 1 Newton steps"):
         cetm_flips(hemi_ellipsoid(300), max_iterations=1)
+
+
+@pytest.mark.parametrize("number", [1, 2])
+def test_needles_whose_flips_go_round_in_circles_are_refused_in_a_moment(number):
+    """64 and 96 triangles: their angles have lost the digits that tell which diagonal is right."""
+    _, V, F = hard_mesh(20261122, number)
+    mesh = DiskMesh.from_arrays(V, F)
+    with pytest.raises(AlgorithmFailed, match=r"still being flipped after (\d+) rounds") as raised:
+        cetm_flips(mesh)
+    assert int(re.findall(r"\d+", str(raised.value))[0]) < 1000 + 50 * mesh.m
