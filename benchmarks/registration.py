@@ -48,6 +48,8 @@ PAIRS = ROOT / "docs/registration.csv"
 #: Triangles of the first and of the second face of a pair.
 FACES = (8_000, 9_000)
 COUNTS = (0, 3, 6, 20)
+#: An error is kept with so many digits behind the point.
+DIGITS = 4
 KINDS = {
     "identity": "other people",
     "expression": "other expressions",
@@ -108,9 +110,9 @@ def errors_of_pair(
     unit = np.linalg.norm(np.subtract(*other.whole[[LANDMARKS[name] for name in EYES]]))
 
     def error(points: np.ndarray) -> float:
-        return float(
-            100 * np.average(np.linalg.norm(points - truth, axis=1), weights=weights) / unit
-        )
+        away = np.linalg.norm(points - truth, axis=1)
+        share = float(100 * np.average(away, weights=weights) / unit)
+        return round(share, DIGITS)  # as the CSV has it, so that the page can be made from it
 
     def carried(uv: np.ndarray, z: np.ndarray) -> float:
         at = locate(uv, other.mesh.F, other.mesh.boundary, z[seen])
@@ -333,7 +335,7 @@ def csv_of(rows: Sequence[Row]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("pair", "kind", "method", "landmarks", "error_percent"))
     for row in rows:
-        error = "" if row.error is None else f"{row.error:.4f}"
+        error = "" if row.error is None else f"{row.error:.{DIGITS}f}"
         writer.writerow((row.pair, row.kind, row.method, row.landmarks, error))
     return text.getvalue()
 

@@ -78,8 +78,10 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
 
     Examples
     --------
-    >>> list(surfaces_of_folder(Path("examples/external")))
-    []
+    >>> import cembench
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> [found.name for found in surfaces_of_folder(Path())]
+    ['flat']
 
     """
     if not folder.is_dir():
