@@ -680,7 +680,7 @@ class Launcher:
             return None
         path = self._write(job.model_copy(update={"parent": server.pid}))
         try:
-            return run_limited(server.forking(path), limits, log)
+            return run_limited(server.forking(path), limits, log, alone=True)
         except ServerGoneError:
             _judges.cache_clear()
             server.close()

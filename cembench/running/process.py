@@ -116,10 +116,11 @@ def spawning(command: Sequence[str], environment: Mapping[str, str]) -> Start:
     return start
 
 
-def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
+def run_limited(start: Start, limits: Limits, log: Path, *, alone: bool = False) -> ProcessEnd:
     """Let a process run until it ends or reaches a limit; then end all that it has started.
 
-    `log` is a file for its output; however much that is, little is kept.
+    `log` is a file for its output; however much that is, little is kept. A process that is known to
+    start no other is `alone`: nobody looks for what it left.
     """
     mark = uuid.uuid4().hex
     limit, seen, said = None, 0, b""
@@ -143,7 +144,7 @@ def run_limited(start: Start, limits: Limits, log: Path) -> ProcessEnd:
             if limit:
                 break
     finally:
-        code, left = _end_all(process, tree, mark)
+        code, left = _end_all(process, tree, "" if alone else mark)
     with suppress(OSError), log.open("rb") as file:  # the process may have removed it
         said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
     words = said.decode(errors="replace").strip()
@@ -225,7 +226,8 @@ def _end_all(
     """
     code, left = process.poll(), set()
     for _ in range(2):
-        others = [one for one in {*tree.values(), *_marked(mark)} if one.pid != process.pid]
+        marked = _marked(mark) if mark else []
+        others = [one for one in {*tree.values(), *marked} if one.pid != process.pid]
         left |= {one.pid for one in others if _lives(one)}
         if os.name == "posix":
             with suppress(ProcessLookupError):

@@ -25,6 +25,7 @@ from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
 from cembench.report.content.other_targets import other_targets
+from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.content.table_1 import table_1
 from cembench.report.content.table_2 import table_2
@@ -237,6 +238,9 @@ def _beyond(evidence: Evidence, folder: Path) -> Section:
         [performance_profile(evidence), accuracy_against_time(evidence), time_by_phase(evidence)],
         folder,
     )
+    if not evidence.models:  # else it stands below Table 2
+        for policy in evidence.policies:
+            items += sure_speedups(evidence, policy)
     if policies.has_both(evidence):
         items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
         items += _drawn([policies.policies_plot(evidence)], folder)

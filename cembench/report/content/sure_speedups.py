@@ -49,8 +49,8 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
     columns = (
         Column("algorithm", numeric=False),
         Column("surfaces"),
-        *(Column(name, "one by one") for name in ("CEM faster", "slower", "undecided")),
-        *(Column(name, "together") for name in ("CEM faster", "slower", "undecided")),
+        *(Column(name, "one by one") for name in ("CEM faster", "CEM slower", "undecided")),
+        *(Column(name, "together") for name in ("CEM faster", "CEM slower", "undecided")),
         *(Column(name, "over surfaces") for name in ("wins", "sign test", "mean", "95 % interval")),
     )
     return [
