@@ -95,7 +95,7 @@ def test_a_program_that_is_not_there_is_skipped_with_what_brings_it(cli, face):
 def test_tables_and_rows_mark_the_program_and_tell_its_times(cli, monkeypatch):
     monkeypatch.setattr("cembench.running.local.Launcher", LauncherWithoutForks)
     words = ("run", "--surfaces", "flat-disk", "--faces", 100, "--repeats", 1, "-a", "direct-cem")
-    words += ("--command", command("good"), "--program", r"seconds=solve: (\S+) s")
+    words += ("--command", command("normalised"), "--program", r"seconds=solve: (\S+) s")
     words += ("--program", "name=mine", "--reference", "direct-cem")
     code, out, err = cli(*words)
     assert code == 0, err
@@ -109,7 +109,7 @@ def test_tables_and_rows_mark_the_program_and_tell_its_times(cli, monkeypatch):
     assert (row["external"], row["own_seconds"], row["solve_seconds"]) == ("program", 0.125, 0.125)
     assert row["title"] == "mine (external program)"
     assert min(row["seconds"], row["start_seconds"], row["input_bytes"]) > 0
-    assert row["external_name"].endswith("misbehaves.py good {input} {output}")
+    assert row["external_name"].endswith("misbehaves.py normalised {input} {output}")
     assert row["speedup"] == pytest.approx(0.125 / ours["seconds"] - 1)
 
 

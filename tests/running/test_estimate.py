@@ -1,7 +1,7 @@
 import pytest
 
 from cembench.registry import load_registry
-from cembench.running.estimate import estimate, fit_power_law
+from cembench.running.estimate import FORK_SECONDS, estimate, fit_power_law
 from cembench.running.usual_seconds import USUAL
 from tests.results.test_comparison import record_of
 
@@ -38,7 +38,8 @@ def test_the_same_cell_counts_before_other_sizes_and_those_before_what_is_usual(
 
 def test_repeats_cost():
     few, many = (record_of([1.0], repeats=n).cell for n in (1, 10))
-    assert estimate(many, 1000, []).seconds > 4 * estimate(few, 1000, []).seconds
+    more = estimate(many, 1000, []).seconds - estimate(few, 1000, []).seconds
+    assert more > 9 * FORK_SECONDS
 
 
 def test_an_empty_process_does_not_grow_with_the_triangles():

@@ -72,7 +72,9 @@ def test_a_fault_in_a_forked_process_is_a_status_and_the_next_is_measured(
 @pytest.mark.parametrize("name", ["daemonises", "detaches-twice"])
 def test_what_a_forked_process_leaves_is_ended(launcher, name, tmp_path, monkeypatch):
     monkeypatch.setenv("FAULTY_CHILDREN", str(tmp_path / "children"))
-    assert isinstance(timed(launcher, name), Round)
+    found = timed(launcher, name)
+    # A child may still be starting beside the next call, and then that is what is told.
+    assert isinstance(found, Round) or found.status == "not_comparable", found
     children = (tmp_path / "children").read_text().split()
     assert len(children) > 1  # a warm-up, and a call
     for child in map(int, children):

@@ -22,4 +22,4 @@ def test_readme_s_solver_maps_everything_and_is_not_called_conformal(tmp_path):
     wrong = {finding.name for finding in findings if not finding.ok}
     # Valid on all surfaces; but arc length along the boundary is not what a conformal map does to
     # it, and that is what a finer mesh cannot mend.
-    assert wrong == {"E_C under refinement", "angle error under refinement"}
+    assert wrong == {"E_C under refinement", "angle error under refinement", "modulus"}
