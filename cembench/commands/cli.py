@@ -285,7 +285,7 @@ def run(
     with err.status("reading surfaces", spinner="line"):
         found, standing = gather_surfaces(registry, chosen, files, generated, faces, mend=mend)
     tasks = []
-    reproduced = any(role.paper_row for role in standing.values())
+    reproduced = any(role.origin == "model" for role in standing.values())
     given = (paper_parameters(wanted) if reproduced else {}) | assignments(parameter)
     for policy in policies:
         how = MeasurementSettings(policy, installed_backend(backend), threads, repeats, share)
@@ -316,7 +316,7 @@ def reproduce(
     from cembench.core import folders
     from cembench.registry import load_registry
     from cembench.results import run_folder
-    from cembench.results.paper.profiles import paper_parameters, surfaces_of
+    from cembench.results.paper.profiles import surfaces_of
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.local import Options
@@ -334,8 +334,7 @@ def reproduce(
             surfaces.append(generate_surface(registry, name))
     chosen = [registry.algorithm(name) for name in registry.usual_algorithms]
     standing = paper_roles(registry, names)
-    given = paper_parameters(registry.usual_algorithms)
-    tasks = plan_cells(chosen, surfaces, given, MeasurementSettings(repeats=1), standing=standing)
+    tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), standing=standing)
     records = _measure(tasks, Store(output), options)
     command = f"cembench reproduce -o {output}"
     report, folder = report_verbs.make_report(output, None, command)

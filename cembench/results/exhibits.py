@@ -7,9 +7,9 @@ into the run's folder, ``exhibits/NAME/``, and the report shows what lies there.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from cembench.core.atomic import read_model, unwritable, write_model
 from cembench.core.errors import RecordError
@@ -42,6 +42,12 @@ class ExhibitTable(BaseModel):
     columns: tuple[str, ...]
     rows: tuple[tuple[str | float | int | None, ...], ...]
     notes: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _rows_fit(self) -> Self:
+        if any(len(row) != len(self.columns) for row in self.rows):
+            raise ValueError(f"a row has not {len(self.columns)} values, as there are columns")
+        return self
 
 
 class Exhibit(BaseModel):

@@ -1,9 +1,11 @@
 import pytest
+from pydantic import ValidationError
 
 from cembench.core.errors import RecordError
 from cembench.results.exhibits import (
     Exhibit,
     ExhibitPicture,
+    ExhibitTable,
     exhibit_folder,
     read_exhibits,
     write_exhibit,
@@ -42,3 +44,8 @@ def test_a_damaged_description_is_named(tmp_path):
     (exhibit_folder(tmp_path, "koebe") / "exhibit.json").write_text("{")
     with pytest.raises(RecordError, match=r"exhibit\.json"):
         read_exhibits(tmp_path)
+
+
+def test_a_row_has_a_value_for_each_column():
+    with pytest.raises(ValidationError, match="a row has not 2 values"):
+        ExhibitTable(title="steps", columns=("step", "off"), rows=((1, 0.1), (None,)))
