@@ -24,7 +24,7 @@ from urllib.parse import quote
 
 from platformdirs import user_cache_dir
 
-from cembench.core.atomic import write, write_bytes
+from cembench.core.atomic import is_draft, write, write_bytes
 from cembench.core.errors import CembenchError, DatasetError, MeshError, RecordError
 from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
@@ -235,11 +235,24 @@ def _of_same_content(dataset: Dataset, have: Sequence[Path]) -> Path | None:
         return None
     for folder in (dataset.path.parent, *have):
         for path in sorted(folder.rglob("*")) if folder.is_dir() else ():
-            if not path.is_file() or (dataset.size and path.stat().st_size != dataset.size):
-                continue
-            if _sha256(path) == dataset.sha256:
+            if _holds(path, dataset):
                 return path
     return None
+
+
+def _holds(path: Path, dataset: Dataset) -> bool:
+    """Whether this is a file with the dataset's content; one that cannot be read is not.
+
+    Drafts are left out: another download renames or clears them at any moment.
+    """
+    if is_draft(path):
+        return False
+    try:
+        if not path.is_file() or (dataset.size and path.stat().st_size != dataset.size):
+            return False
+        return _sha256(path) == dataset.sha256
+    except OSError:
+        return False
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from cembench.surfaces.datasets import ICT_FACE, REAL_MESHES
 from cembench.surfaces.ict_model import read_small
 
 from cembench import registry
+from cembench.mesh import datasets as wholeness
 from cembench.mesh.datasets import Dataset, fetch, fetch_all, is_fetched, surface_file
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -149,6 +150,32 @@ def test_bad_files_are_told_the_rest_is_done_and_the_next_call_resumes(cli, serv
     assert code == 0
     assert "48 files, 44 already here" in err
     assert set(asked) == {f"mesh0{k}.obj" for k in range(1, 5)}
+
+
+def test_drafts_and_files_that_vanish_while_they_are_looked_at_are_no_obstacle(
+    served, monkeypatch, tmp_path
+):
+    """Other downloads rename their drafts in the same folder at any moment."""
+    datasets, _, asked, _ = served
+    wanted = datasets[0]
+    folder = tmp_path / "mine"
+    gone = folder / "a.obj"
+    draft = folder / f".draft-{'0' * 12}-1-{'0' * 32}.obj"
+    folder.mkdir()
+    gone.write_bytes(content(0))
+    draft.write_bytes(content(0))
+    read = wholeness._sha256
+
+    def vanishing(path):
+        assert path != draft
+        if path == gone:
+            gone.unlink()
+        return read(path)
+
+    monkeypatch.setattr(wholeness, "_sha256", vanishing)
+    assert fetch(wanted, have=[folder]).read_bytes() == content(0)
+    assert not gone.exists()
+    assert asked[wanted.file] == 1
 
 
 def test_a_slow_file_does_not_hold_up_the_others(served):
