@@ -25,6 +25,7 @@ from cembench.commands import peers as peers_verbs
 from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
+from cembench.commands import sets as set_verbs
 from cembench.commands import theory as theory_verbs
 from cembench.commands import validate as validate_verbs
 from cembench.commands.console import (
@@ -46,6 +47,7 @@ from cembench.commands.options import (
     Budget,
     Faces,
     FixedRounds,
+    Jobs,
     Memory,
     MostRounds,
     Parameters,
@@ -61,6 +63,7 @@ from cembench.commands.options import (
     installed_backend,
     memory_bytes,
     settings_of_rounds,
+    usual_jobs,
 )
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
@@ -177,7 +180,8 @@ app.command("map", epilog=map_verbs.EXAMPLES)(map_verbs.map_)
 @app.command(
     epilog="Examples:  cembench run --profile quick --dry-run  ·  "
     "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
-    "cembench run --surfaces spherical-cap -o results/cap --json",
+    "cembench run --surfaces spherical-cap -o results/cap --json  ·  "
+    "cembench run --set real-disks -a all --limit 20",
 )
 def run(
     *,
@@ -196,12 +200,24 @@ def run(
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
     ] = [],  # noqa: B006
     faces: Faces = None,
+    sets: Annotated[
+        list[str],
+        typer.Option(
+            "--set",
+            help="Many surfaces: real-disks, real-holes, closed, stress, ict-faces, "
+            "ict-faces-holes, thingi10k, a folder, or an archive. One round, unless --rounds or "
+            "--precision says more. Repeatable.",
+        ),
+    ] = [],  # noqa: B006
+    limit: Annotated[
+        int | None, typer.Option(min=1, max=1_000_000, help="So many surfaces of each --set.")
+    ] = None,
     algorithms: Annotated[
         list[str],
         typer.Option(
             "-a",
             "--algorithms",
-            help="Comma-separated; default: the usual ones (see `cembench list`), and the "
+            help="Comma-separated, or all; default: the usual ones (see `cembench list`), and the "
             "paper's four for `--profile quick`.",
         ),
     ] = [],  # noqa: B006
@@ -214,6 +230,7 @@ def run(
     max_rounds: MostRounds = USUAL_MOST_ROUNDS,
     budget: Budget = None,
     repeat_busy: RepeatBusy = 0,
+    jobs: Jobs = None,
     seed: Seed = 0,
     timeout: Timeout = 600.0,
     memory: Memory = None,
@@ -255,7 +272,8 @@ def run(
 
     run_folder.check(output)
     policies = _policies(solves)
-    repeats, share = settings_of_rounds(rounds, precision)
+    one_round = bool(sets) and rounds is None and precision is None
+    repeats, share = settings_of_rounds(1 if one_round else rounds, precision)
     options = Options(
         timeout,
         memory_bytes(memory),
@@ -266,24 +284,33 @@ def run(
         most_rounds=max_rounds,
         budget=budget_seconds(budget, profile),
         repeat_busy=repeat_busy,
+        jobs=jobs or (usual_jobs() if sets else 1),
     )
     declared, named = declared_command(command, program)
     plugin = [*plugin, *declared]
     registry = registry_with(plugin)
     usual = algorithms_of(profile, registry) if profile else registry.usual_algorithms
-    wanted = dict.fromkeys([*(split(algorithms) or usual), *named])
+    asked = split(algorithms)
+    if asked == ["all"]:
+        asked = list(registry.algorithms)
+    wanted = dict.fromkeys([*(asked or usual), *named])
     chosen = [registry.algorithm(name) for name in wanted]
     _check_reference(reference, chosen)
     files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
     files += [fetch_verbs.fetched(registry.dataset(name)) for name in split(dataset)]
     generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
-    if not files and not generated:
+    if not files and not generated and not sets:
         raise ParameterError(
             "nothing to run on: name a --profile, or at least one --mesh FILE, --dataset NAME (see "
-            "`cembench fetch`) or --surfaces NAME (see `cembench list surfaces`)."
+            "`cembench fetch`), --set NAME or --surfaces NAME (see `cembench list surfaces`)."
         )
+    if limit is not None and not sets:
+        raise ParameterError("--limit is of --set: name one, or leave it out.")
     with err.status("reading surfaces", spinner="line"):
         found, standing = gather_surfaces(registry, chosen, files, generated, faces, mend=mend)
+    many = set_verbs.gather(sets, registry, chosen, limit) if sets else None
+    if many is not None:
+        found, standing = [*found, *many.meshes], {**standing, **many.roles}
     tasks = []
     reproduced = any(role.origin == "model" for role in standing.values())
     given = (paper_parameters(wanted) if reproduced else {}) | assignments(parameter)
@@ -293,7 +320,9 @@ def run(
     if dry_run:
         _present_plan(tasks, Store(output), options, as_json=as_json)
         return
-    if not as_json:
+    if many is not None:
+        set_verbs.lay_into(output, many, sets)
+    elif not as_json:
         print_notices(found)
     records = _measure(tasks, Store(output), options)
     _present(records, as_json=as_json, where=output, reference=reference)
@@ -418,11 +447,16 @@ def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None
 
 def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
     from cembench.report.render.terminal import results_table, speedups_table
+    from cembench.report.render.terminal_many import MANY, many_table
     from cembench.results.record_rows import REFERENCE, rows
 
     reference = reference or REFERENCE
     if as_json:
         print_json(rows(records, reference))
+    elif len({record.cell.mesh_hash for record in records}) > MANY:
+        out.print(many_table(records))
+        out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
+        out.print(f"Pictures and profiles: cembench report {where}", soft_wrap=True)
     else:
         out.print(results_table(records))
         speedups = speedups_table(records, reference)

@@ -81,7 +81,7 @@ def _fetch_all(
     if len(wanted) > 1 and not quiet:
         err.print(_intent(len({d.path for d in wanted}), list(missing.values())), style="dim")
     found: dict[str, dict[str, Any]] = {}
-    with _bars(list(missing.values())) as progress:
+    with bars(list(missing.values())) as progress:
         for one in datasets.fetch_all(
             wanted, jobs=jobs, timeout=timeout, have=have, progress=progress
         ):
@@ -125,7 +125,7 @@ def fetched(dataset: Dataset, *, timeout: float = 60.0) -> Path:
     """
     from cembench.mesh import datasets
 
-    with _bars([dataset]) as progress:
+    with bars([dataset]) as progress:
         datasets.fetch(dataset, timeout=timeout, progress=progress(dataset))
     return datasets.surface_file(dataset)
 
@@ -183,7 +183,7 @@ class _Bar:
 
 
 @contextmanager
-def _bars(datasets: list[Dataset]) -> Iterator[Callable[[Dataset], Progress | None]]:
+def bars(datasets: list[Dataset]) -> Iterator[Callable[[Dataset], Progress | None]]:
     """On a terminal a bar for each file that is being fetched, and nothing elsewhere."""
     if not err.is_terminal:
         yield lambda dataset: None

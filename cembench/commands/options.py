@@ -7,6 +7,7 @@ machine can do, and keep sums, clocks and the system's own limits from overflowi
 from __future__ import annotations
 
 import math
+import os
 from enum import StrEnum
 from typing import Annotated
 
@@ -95,6 +96,15 @@ RepeatBusy = Annotated[
         min=0,
         max=10,
         help="Run a process again, up to so often, beside which the machine was busy.",
+    ),
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=256,
+        help="Checks that run side by side; timed rounds never do. Default: 1, and for --set as "
+        "many as there are cores.",
     ),
 ]
 Seed = Annotated[
@@ -196,6 +206,11 @@ def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, 
     if rounds is not None:
         return rounds, None
     return 0, USUAL_PRECISION if precision is None else precision_share(precision)
+
+
+def usual_jobs() -> int:
+    """Return how many checks run side by side where nothing is timed: one a core."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory_bytes(given: str | None) -> int:

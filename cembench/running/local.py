@@ -18,18 +18,19 @@ import random
 import shutil
 import sys
 import tempfile
+import threading
 import uuid
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
 from math import inf
 from pathlib import Path
 from time import monotonic
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +58,7 @@ from cembench.running.motion import UNMOVED
 from cembench.running.neighbours import counters, neighbours
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
+from cembench.running.side_by_side import check_side_by_side
 from cembench.running.until_precise import affordable, cost, lack
 from cembench.running.worker import PROGRAMS, Answer, Job, JobTask
 
@@ -92,6 +94,8 @@ class Options:
     budget: float | None = None
     #: How often a process is run again beside which the machine was busy; the quietest counts.
     repeat_busy: int = 0
+    #: So many checks run side by side, each with its share of the memory. What is timed runs alone.
+    jobs: int = 1
 
     def measures_again(self, kept: Record) -> bool:
         """Is a cell measured although there is this record of it?"""
@@ -211,8 +215,7 @@ class _Run:
         for task in pending:
             self._load(task)
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
-        for task in pending:
-            self._check(task)
+        self._check_all(pending)
         most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
@@ -255,13 +258,33 @@ class _Run:
         """After which round is a cell over, or looked at next?"""
         return task.cell.repeats or next_look(done, self.options.most_rounds)
 
-    def _check(self, task: Task) -> None:
-        outcome = self.checks.get(task.cell.label)
-        if outcome is None:
-            with _Process(self.watcher, task, self._step(task, None)):
-                outcome, uv = self.launcher.check(task)
-            self._samples(task).save_check(outcome, uv)
-            self.checks[task.cell.label] = outcome
+    def _check_all(self, pending: Sequence[Task]) -> None:
+        """Check what is not checked yet, one after another or side by side."""
+        new = [task for task in pending if task.cell.label not in self.checks]
+        for task in pending:
+            if task.cell.label in self.checks:
+                self._go_on_from_check(task)
+        if self.options.jobs < 2 or len(new) < 2:
+            for task in new:
+                with self._checking(task):
+                    outcome, uv = self.launcher.check(task)
+                self._keep_check(task, outcome, uv)
+            return
+        launchers = self.launcher.for_checks(self.options.jobs)
+        for task, (outcome, uv), launcher in check_side_by_side(new, launchers, self._checking):
+            self.launcher.take_over(launcher, task)
+            self._keep_check(task, outcome, uv)
+
+    def _checking(self, task: Task) -> _Process:
+        return _Process(self.watcher, task, self._step(task, None))
+
+    def _keep_check(self, task: Task, outcome: Outcome, uv: NDArray[np.complex128] | None) -> None:
+        self._samples(task).save_check(outcome, uv)
+        self.checks[task.cell.label] = outcome
+        self._go_on_from_check(task)
+
+    def _go_on_from_check(self, task: Task) -> None:
+        outcome = self.checks[task.cell.label]
         if outcome.status != "ok":
             self._save(task, outcome.model_copy(update={"rounds": ()}))
         else:
@@ -473,6 +496,34 @@ class Launcher:
     _checked_seconds: dict[str, float] = field(default_factory=dict)
     #: Whether two fresh processes gave the same map of the same surface.
     _repeats: dict[str, bool | None] = field(default_factory=dict)
+    #: Which server of judges is asked: one that nobody asks at the same time.
+    number: int = 0
+    _stopped: threading.Event = field(default_factory=threading.Event)
+
+    def for_checks(self, jobs: int) -> list[Self]:
+        """Return so many others like this one, which may check at the same time.
+
+        Called in the thread in which the program ends: servers end with the thread that made them.
+        """
+        share = self.options.memory_bytes and self.options.memory_bytes // jobs
+        options = replace(self.options, memory_bytes=share)
+        for number in range(1, jobs + 1):
+            _judges(number)
+        return [
+            type(self)(self.scratch / f"checks-{number}", options, self.forks, number=number)
+            for number in range(1, jobs + 1)
+        ]
+
+    def take_over(self, other: Self, task: Task) -> None:
+        """Know of a task's check what another launcher knows of it."""
+        label = task.cell.label
+        if label in other._last:
+            self._last[label] = other._last[label]
+            self._checked_seconds[label] = other._checked_seconds[label]
+
+    def stop(self) -> None:
+        """End the process that runs, and every other right after its start."""
+        self._stopped.set()
 
     def close(self) -> None:
         """End the server, if there is one."""
@@ -653,7 +704,8 @@ class Launcher:
 
     def _started(self, job: Job, limits: Limits, log: Path) -> ProcessEnd:
         command = [sys.executable, "-m", "cembench.running.worker", str(self._write(job))]
-        return run_limited(spawning(command, with_threads(job.cell.threads)), limits, log)
+        start = spawning(command, with_threads(job.cell.threads))
+        return run_limited(start, limits, log, stopped=self._stopped.is_set)
 
     def _forked(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
         """How a process ended that the server forked; None where it forks none."""
@@ -675,12 +727,13 @@ class Launcher:
 
     def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
         """How a process ended that the server of judges forked; None where it forks none."""
-        server = _judges()
+        server = _judges(self.number)
         if server is None:
             return None
         path = self._write(job.model_copy(update={"parent": server.pid}))
         try:
-            return run_limited(server.forking(path), limits, log, alone=True)
+            forking = server.forking(path)
+            return run_limited(forking, limits, log, alone=True, stopped=self._stopped.is_set)
         except ServerGoneError:
             _judges.cache_clear()
             server.close()
@@ -709,8 +762,8 @@ def _never(job: Job, limits: Limits, log: Path) -> None:
 
 
 @cache
-def _judges() -> ForkServer | None:
-    """The one server of this process that judges are forked from; it ends with this process."""
+def _judges(number: int) -> ForkServer | None:
+    """The server that the judges of this number are forked from; it ends with this process."""
     if not can_fork(1):
         return None
     try:

@@ -116,11 +116,18 @@ def spawning(command: Sequence[str], environment: Mapping[str, str]) -> Start:
     return start
 
 
-def run_limited(start: Start, limits: Limits, log: Path, *, alone: bool = False) -> ProcessEnd:
+def run_limited(
+    start: Start,
+    limits: Limits,
+    log: Path,
+    *,
+    alone: bool = False,
+    stopped: Callable[[], bool] = lambda: False,
+) -> ProcessEnd:
     """Let a process run until it ends or reaches a limit; then end all that it has started.
 
     `log` is a file for its output; however much that is, little is kept. A process that is known to
-    start no other is `alone`: nobody looks for what it left.
+    start no other is `alone`: nobody looks for what it left. It is ended too when it is `stopped`.
     """
     mark = uuid.uuid4().hex
     limit, seen, said = None, 0, b""
@@ -141,7 +148,7 @@ def run_limited(start: Start, limits: Limits, log: Path, *, alone: bool = False)
                 limit = "memory"
             elif monotonic() >= deadline:
                 limit = "time"
-            if limit:
+            if limit or stopped():
                 break
     finally:
         code, left = _end_all(process, tree, "" if alone else mark)

@@ -108,8 +108,10 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
 def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
     rows = []
     for against in compared:
-        energy = "E_C by area" if against.relative else "E_C"
-        for what, found in ((energy, against.energy), ("mean angle error", against.angle)):
+        for what, found in (
+            (against.energy_name, against.energy),
+            ("mean angle error", against.angle),
+        ):
             rows.append(_sides_row(f"{what} / {against.title}", found))
         speed = against.speed
         if speed is not None:
@@ -159,7 +161,7 @@ def _ratio(value: float | None) -> Value:
 
 
 def _pairs_table(against: BaselineComparison, title: str, records: dict[str, Record]) -> Table:
-    groups = (("E_C by area" if against.relative else "E_C"), "mean angle error, °", "seconds")
+    groups = (against.energy_name, "mean angle error, °", "seconds")
     columns = [Column("surface", numeric=False), Column("faces")]
     for group in groups:
         columns += [Column(title, group), Column(against.title, group), Column("ratio", group)]

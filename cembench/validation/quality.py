@@ -31,6 +31,7 @@ from cembench.validation.finding import ValidationFinding
 TIE = 0.01
 #: Energies below this share of the image's area are rounding, and equal.
 _NO_ENERGY = 1e-9
+_GAUGE = "common_gauge_energy"
 
 
 class PairedComparison(BaseModel):
@@ -98,6 +99,8 @@ class BaselineComparison(BaseModel):
     title: str
     #: Targets differ, or the image's size is free, so energies were divided by its area.
     relative: bool
+    #: Energies are those of the maps in the common gauge: two disks whose records have them.
+    common_gauge: bool = False
     pairs: tuple[Pair, ...]
     energy: PairedComparison
     angle: PairedComparison
@@ -105,6 +108,13 @@ class BaselineComparison(BaseModel):
     speed: Speed | None
     #: Where the solver's time is from that the ratios are of, for an external program.
     solve_time: str = ""
+
+    @property
+    def energy_name(self) -> str:
+        """What the energies are called that were compared."""
+        if self.common_gauge:
+            return "E_C in the common gauge"
+        return "E_C by area" if self.relative else "E_C"
 
 
 def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> BaselineComparison:
@@ -125,15 +135,17 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     # The size of a free image is another's choice where the code is another's.
     free = one.target == "free boundary" and (one.external, other.external) != (None, None)
     relative = one.target != other.target or free
+    gauge = not relative and all(_has_gauge(r) for n in names for r in (mine[n], theirs[n]))
     verdicts = _verdicts([(mine[name], theirs[name]) for name in names])
     pairs = tuple(
-        _pair(mine[name], theirs[name], verdict, relative=relative)
+        _pair(mine[name], theirs[name], verdict, relative=relative, gauge=gauge)
         for name, verdict in zip(names, verdicts, strict=True)
     )
     return BaselineComparison(
         baseline=baseline,
         title=theirs[names[0]].title,
         relative=relative,
+        common_gauge=gauge,
         pairs=pairs,
         energy=sides(
             [
@@ -254,13 +266,15 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
     ]
 
 
-def _pair(ours: Record, theirs: Record, verdict: SpeedVerdict | None, *, relative: bool) -> Pair:
+def _pair(
+    ours: Record, theirs: Record, verdict: SpeedVerdict | None, *, relative: bool, gauge: bool
+) -> Pair:
     found = compare(ours, theirs)
     return Pair(
         surface=ours.cell.mesh,
         faces=ours.mesh.faces,
-        energy=_energy(ours, relative=relative),
-        baseline_energy=_energy(theirs, relative=relative),
+        energy=_energy(ours, relative=relative, gauge=gauge),
+        baseline_energy=_energy(theirs, relative=relative, gauge=gauge),
         angle=_valid(ours).get("angle_error_mean_deg"),
         baseline_angle=_valid(theirs).get("angle_error_mean_deg"),
         seconds=ours.outcome.median_seconds if ours.outcome.status == "ok" else None,
@@ -277,7 +291,15 @@ def _valid(record: Record) -> Mapping[str, float | int | None]:
     return record.outcome.metrics if record.outcome.status == "ok" else {}
 
 
-def _energy(record: Record, *, relative: bool) -> float | None:
+def _has_gauge(record: Record) -> bool:
+    """Whether its map has an energy in the common gauge; one that is not valid has nothing."""
+    found = _valid(record)
+    return record.target == "disk" and (not found or found.get(_GAUGE) is not None)
+
+
+def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:
+    if gauge:
+        return _valid(record).get(_GAUGE)
     energy, area = (_valid(record).get(name) for name in ("conformal_energy", "image_area"))
     if energy is None or not area:
         return None

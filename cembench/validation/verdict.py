@@ -112,7 +112,7 @@ def _invalid(faults: Sequence[ValidationFinding]) -> str:
 
 def _energy_words(against: BaselineComparison) -> str:
     found, title = against.energy, against.title
-    energy = "E_C by area" if against.relative else "E_C"
+    energy = against.energy_name
     if not found.surfaces:
         return f"{energy} not compared with {title}: no surface that both map"
     if found.equal == found.surfaces:

@@ -87,11 +87,11 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
     if not folder.is_dir():
         raise ParameterError(f"{folder} is not a folder; name one that holds mesh files.")
     found = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
-    names = _Names()
+    names = Names()
     for path in _first(found, limit):
         inside = path.relative_to(folder)
         name = names.of(inside.with_suffix("").as_posix().replace("/", "-"))
-        yield _provided(name, str(path), partial(read_mesh, path, TriangleMesh))
+        yield provided(name, str(path), partial(read_mesh, path, TriangleMesh))
 
 
 def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Provided]:
@@ -107,7 +107,7 @@ def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Pro
         It is not an archive, or is damaged.
 
     """
-    names = _Names()
+    names = Names()
     with tempfile.TemporaryDirectory() as folder:
         try:
             with closing(_members(path)) as members:
@@ -180,10 +180,10 @@ def surfaces_of_thingi10k(
                 raise MeshError(f"{place}: {error}") from None
             return TriangleMesh.from_arrays(V, F, name=name)
 
-        yield _provided(name, f"Thingi10K {entry['file_id']}", load, str(entry["license"]))
+        yield provided(name, f"Thingi10K {entry['file_id']}", load, str(entry["license"]))
 
 
-def _provided(
+def provided(
     name: str, source: str, load: Callable[[], TriangleMesh], licence: str = ""
 ) -> Provided:
     """Load a surface and make it ready for maps, or say why that cannot be done."""
@@ -205,7 +205,7 @@ def _as(kind: type[TriangleMesh], mesh: TriangleMesh, name: str) -> TriangleMesh
     return kind.from_arrays(mesh.V, mesh.F, name=name)
 
 
-class _Names:
+class Names:
     """Names that differ: the second "face" is "face-2"."""
 
     def __init__(self) -> None:
@@ -258,7 +258,7 @@ def _members(path: Path) -> Generator[_Member, None, None]:
                 yield _Member(inside, member.size, taken)
 
 
-def _unpacked(member: _Member, names: _Names, folder: Path, archive: Path) -> Provided:
+def _unpacked(member: _Member, names: Names, folder: Path, archive: Path) -> Provided:
     name = names.of(member.path.stem)
     source = f"{archive}: {member.path}"
     if member.size > LARGEST_MEMBER:
@@ -277,7 +277,7 @@ def _unpacked(member: _Member, names: _Names, folder: Path, archive: Path) -> Pr
             return Provided(name, source, error=f"it cannot be unpacked: {error}")
         file.flush()
         place = Path(file.name)
-        found = _provided(name, source, lambda: read_mesh(place, TriangleMesh).renamed(name))
+        found = provided(name, source, lambda: read_mesh(place, TriangleMesh).renamed(name))
         return Provided(
             name, source, found.mesh, found.error.replace(str(place), source), cut=found.cut
         )

@@ -3,10 +3,19 @@ import pytest
 
 from cembench.results.comparison import (
     compare,
+    compare_cpu,
     compare_ratios,
     is_unstable,
 )
-from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.records import (
+    DEFAULT_ROUNDS,
+    Cell,
+    External,
+    MeshFacts,
+    Outcome,
+    Record,
+    Round,
+)
 from cembench.results.runs_compared import compare_runs, machine_differences
 
 
@@ -124,3 +133,40 @@ def test_machines_differ_in_what_changes_seconds():
     one = {"cpu": "x", "cores": 2, "git": "a"}
     assert machine_differences(one, one | {"git": "b"}) == []
     assert machine_differences(one, one | {"cpu": "y"}) == ["cpu: x / y"]
+
+
+def with_cpu(record, seconds):
+    """The record with these CPU seconds in its rounds."""
+    rounds = tuple(
+        r.model_copy(update={"cpu_seconds": s})
+        for r, s in zip(record.outcome.rounds, seconds, strict=True)
+    )
+    return record.model_copy(
+        update={"outcome": record.outcome.model_copy(update={"rounds": rounds})}
+    )
+
+
+def test_cpu_seconds_are_compared_within_rounds_whatever_the_wall_clock_says():
+    drift = [1.0, 2.0, 4.0, 1.0, 3.0, 1.0]
+    ours = with_cpu(record_of([1.0] * 6), [3 * d for d in drift])
+    theirs = with_cpu(record_of([9.0] * 6), drift)
+    found = compare_cpu(ours, theirs)
+    assert found.ratio == pytest.approx(3)
+    assert (found.verdict, found.rounds) == ("slower", 6)
+    assert compare(ours, theirs).verdict == "faster"
+
+
+@pytest.mark.parametrize("lost", [None, 0.0])
+def test_cpu_seconds_are_not_compared_where_a_round_shows_none(lost):
+    ours = with_cpu(record_of([1.0] * 6), [1.0] * 5 + [lost])
+    theirs = with_cpu(record_of([1.0] * 6), [1.0] * 6)
+    assert compare_cpu(ours, theirs) is None
+    assert compare_cpu(theirs, ours) is None
+
+
+def test_cpu_seconds_of_a_program_are_not_compared():
+    ours, theirs = (with_cpu(record_of([1.0] * 6), [1.0] * 6) for _ in range(2))
+    program = ours.model_copy(update={"external": External(kind="program", name="x")})
+    assert compare_cpu(program, theirs) is None
+    assert compare_cpu(theirs, program) is None
+    assert compare_cpu(ours, theirs).ratio == 1

@@ -133,3 +133,28 @@ def test_other_bits_in_a_later_round_are_a_fault():
 def test_nothing_in_common_is_an_error():
     with pytest.raises(ValueError, match="no surface has records of both 'ours' and 'cem'"):
         comparison_with([record("ours", "a"), record("cem", "b")], "ours", "cem")
+
+
+def in_gauge(algorithm, mesh, energy, gauge):
+    """A record whose map has another energy in the common gauge; None: it has none there."""
+    found = record(algorithm, mesh, energy)
+    metrics = found.outcome.metrics | ({} if gauge is None else {"common_gauge_energy": gauge})
+    return found.model_copy(
+        update={"outcome": found.outcome.model_copy(update={"metrics": metrics})}
+    )
+
+
+def test_two_disks_are_compared_in_the_common_gauge():
+    records = [in_gauge("ours", "a", 0.02, 0.01), in_gauge("cem", "a", 0.01, 0.02)]
+    found = comparison_with(records, "ours", "cem")
+    assert found.common_gauge
+    assert found.energy_name == "E_C in the common gauge"
+    assert found.energy.ratio == pytest.approx(0.5)
+
+
+def test_records_without_that_gauge_are_compared_as_they_are():
+    records = [in_gauge("ours", "a", 0.02, None), in_gauge("cem", "a", 0.01, 0.02)]
+    found = comparison_with(records, "ours", "cem")
+    assert not found.common_gauge
+    assert found.energy_name == "E_C"
+    assert found.energy.ratio == pytest.approx(2)

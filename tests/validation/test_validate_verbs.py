@@ -27,7 +27,9 @@ def test_a_right_solver_is_valid_and_its_page_is_written(here):
     code, out, err = here("right", *TINY, "-o", "there", "--against", "cem,lscm")
     assert code == 0
     said = " ".join(out.split())
-    assert "Right: valid; E_C equal to CEM's within 1 % on all 2 surfaces" in said
+    assert (
+        "Right: valid; E_C in the common gauge equal to CEM's within 1 % on all 2 surfaces" in said
+    )
     assert "contract ..." in err
     assert max(map(len, out.splitlines())) <= 80
     page = (here.folder / "there/index.html").read_text()
@@ -129,7 +131,7 @@ def test_in_processes_of_its_own(cli, name):
     code, out, _ = cli("validate", f"{FILE}:{name}", *few, "--json")
     said = json.loads(out)["verdict"]
     expected = {
-        "right": "valid; E_C equal to CEM",
+        "right": "valid; E_C in the common gauge equal to CEM",
         "not-conformal": "invalid: E_C under refinement: on hemi-ellipsoid",
         "hangs": "invalid: returns a map: timeout on uneven hemi-ellipsoid: not finished after 20",
     }

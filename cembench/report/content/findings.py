@@ -60,15 +60,15 @@ def findings(
         if compared is not None:
             figures.append(_times(first, second, compared))
         sure = compared is not None and compared.verdict == "slower"
+        names = f"{first.series.label} and {second.series.label}"
         fastest = (
             f"{first.series.label} is the fastest"
             if sure
-            else f"{first.series.label} and {second.series.label} are the fastest, and which of "
-            "them is faster cannot be said"
+            else f"{names} are the fastest (which of the two, these rounds do not tell)"
         )
         rest = len(standings) - len(good)
         less = f" ({rest} with larger angle errors left out)" if rest else ""
-        sentence = f"On {on} {fastest} of {len(good)} algorithms with equally good angles{less}"
+        sentence = f"On {on}, of {len(good)} algorithms with equally good angles{less}, {fastest}"
         sentence += f"; {best.series.label} has the smallest angle errors."
     elif len(standings) > 1:
         sentence = (

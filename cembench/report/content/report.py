@@ -11,7 +11,7 @@ from cembench import __version__
 from cembench.report.content import policies
 from cembench.report.content.beside_others import beside_others
 from cembench.report.content.claims import claims
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
 from cembench.report.content.failures import not_ok
 from cembench.report.content.figures.accuracy_against_time import accuracy_against_time
@@ -24,6 +24,8 @@ from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
+from cembench.report.content.many.section import is_many, many_section
+from cembench.report.content.many.worst import hardest
 from cembench.report.content.other_targets import other_targets
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
@@ -31,7 +33,7 @@ from cembench.report.content.table_1 import table_1
 from cembench.report.content.table_2 import table_2
 from cembench.report.content.table_3 import table_3
 from cembench.report.content.table_4 import table_4
-from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Text
+from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
 from cembench.results.records import MeshOrigin
 
@@ -52,6 +54,8 @@ PICTURES = (
 PAPER = "Conformal surface parameterizations: the paper's tables and figures, measured"
 #: The plot at the head: how good maps are against what they cost.
 FIRST_PLOT = "accuracy-against-time"
+#: The plot that a report about many surfaces shows with its profiles of accuracy.
+PROFILE = "performance-profile"
 
 #: What is said of surfaces by their origin.
 _KINDS: Mapping[MeshOrigin, str] = {
@@ -65,17 +69,22 @@ def build_report(
     evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
 ) -> Report:
     """Compute everything that a report of this run holds, and draw its figures into `folder`."""
-    n = len(evidence.surfaces) + 2
+    many = is_many(evidence)
+    shown = hardest(evidence, evidence.policies[0]) if many else evidence.surfaces
+    n = len(shown) + 2
     inspections: dict[str, Inspection] = {}
-    for k, surface in enumerate(evidence.surfaces):
+    for k, surface in enumerate(shown):
         progress(f"surface {surface.title}", k, n)
         inspections[surface.mesh_hash] = inspect_surface(evidence, surface, folder)
     progress("tables, plots and claims", n - 2, n)
-    of_paper = bool(evidence.models)
+    of_paper = not many and bool(evidence.models)
     tested = claims(evidence, inspections) if of_paper else []
-    beyond = _beyond(evidence, folder)
-    sections = [_summary(evidence)]
-    if of_paper:
+    beyond = _beyond(evidence, folder, by_surface=not many)
+    sections = [] if many else [_summary(evidence, of_paper=of_paper)]
+    if many:
+        sections.append(many_section(evidence, shown, inspections, folder))
+        sections.append(_costs(evidence, folder, beyond))
+    elif of_paper:
         sections += [
             _tables(evidence),
             Section("claims", "Claims of the paper", tuple(tested)),
@@ -86,7 +95,9 @@ def build_report(
         sections.append(_own(evidence, inspections, folder, beyond))
     sections += exhibit_sections(evidence, folder)
     progress("pages of the surfaces", n - 1, n)
-    sections.append(_pages(evidence, inspections, folder))
+    if many:
+        sections.append(Section("not-ok", "Cells without a valid map", (not_ok(evidence),)))
+    sections.append(_pages(evidence, shown, inspections, folder))
     progress("done", n, n)
     found = findings(evidence, inspections, tested)
     return Report(
@@ -152,8 +163,8 @@ def _machine(about: Mapping[str, object]) -> str:
     )
 
 
-def _summary(evidence: Evidence) -> Section:
-    if not evidence.models:
+def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
+    if not of_paper:
         return Section("summary", "What this is", (not_ok(evidence),))
     marks = "; ".join(
         f"{words}{f' ({mark})' if mark else ''}" for words, mark in ORIGINS.values() if words
@@ -164,7 +175,7 @@ def _summary(evidence: Evidence) -> Section:
             f"{marks}. A dagger marks a misprint, an exclamation mark an unstable time."
         )
     ]
-    if evidence.models and not any(s.origin == "model" for s in evidence.models):
+    if not any(s.origin == "model" for s in evidence.models):
         items.append(
             Text(
                 "No model of the paper is in this run. Its rows are measured on stand-ins with the "
@@ -233,7 +244,7 @@ def _pictures(
     ]
 
 
-def _beyond(evidence: Evidence, folder: Path) -> Section:
+def _beyond(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
     items: list[Item] = _drawn(
         [performance_profile(evidence), accuracy_against_time(evidence), time_by_phase(evidence)],
         folder,
@@ -246,12 +257,8 @@ def _beyond(evidence: Evidence, folder: Path) -> Section:
         items += _drawn([policies.policies_plot(evidence)], folder)
     else:
         items.append(policies.both_gap(evidence))
-    others = other_targets(evidence)
-    if others:
-        items.append(others)
-    beside = beside_others(evidence)
-    if beside:
-        items.append(beside)
+    if by_surface:
+        items += [table for make in (other_targets, beside_others) if (table := make(evidence))]
     return Section("beyond", "Beyond the paper", tuple(items))
 
 
@@ -278,15 +285,29 @@ def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Sec
     return Section("results", "Results", tuple(items))
 
 
+def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
+    """What maps cost, over all surfaces; the profiles of time stand with those of accuracy."""
+    kept = [item for item in beyond.items if isinstance(item, Table | Figure)]
+    items: list[Item] = [item for item in kept if item.name != PROFILE]
+    items += _drawn([cost_by_faces(evidence)], folder)
+    items.append(exponents_table(evidence))
+    return Section("costs", "What maps cost", tuple(items))
+
+
 def _first_plot(section: Section) -> Figure | None:
     """The plot for the head of the report; it stands in this section."""
     figures = [item for item in section.items if isinstance(item, Figure)]
     return next((f for f in figures if f.name == FIRST_PLOT), figures[0] if figures else None)
 
 
-def _pages(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
+def _pages(
+    evidence: Evidence,
+    shown: Sequence[MeasuredSurface],
+    inspections: Inspections,
+    folder: Path,
+) -> Section:
     pages = []
-    for surface in evidence.surfaces:
+    for surface in shown:
         page, plot = surface_page(evidence, surface, inspections[surface.mesh_hash])
         items = (*page.items, *_drawn([plot], folder))
         pages.append(Section(page.name, page.title, items, page.sections, page.page))

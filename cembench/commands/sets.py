@@ -1,0 +1,61 @@
+"""Runs over sets of surfaces: what `run --set` reads, says and keeps."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cembench.commands.console import err, note
+from cembench.core.errors import ParameterError
+
+if TYPE_CHECKING:
+    from cembench.registry import Algorithm, Registry
+    from cembench.workflows.providers import Provided
+    from cembench.workflows.sets import Gathered
+
+#: So many surfaces that cannot be measured are named on the terminal.
+NAMED = 5
+
+
+def gather(
+    sets: Sequence[str], registry: Registry, chosen: Sequence[Algorithm], limit: int | None
+) -> Gathered:
+    """Fetch and read the surfaces of the sets, and tell what cannot be measured.
+
+    Raises
+    ------
+    ParameterError
+        There is no such set, or it gives no surface that can be measured.
+
+    """
+    from cembench.commands.fetch import bars
+    from cembench.workflows.sets import gathered, surfaces_of_set
+
+    given: list[Provided] = []
+    with bars([]) as progress:
+        for name in dict.fromkeys(sets):
+            err.print(f"reading the surfaces of {name}", style="dim", soft_wrap=True)
+            given += surfaces_of_set(name, registry, limit=limit, progress=progress)
+    found = gathered(given, registry, chosen)
+    for one in found.refused[:NAMED]:
+        note(f"{one.name} is left out: {one.error}")
+    more = len(found.refused) - NAMED
+    if more > 0:
+        note(f"{more} more are left out; the report names them")
+    if not found.surfaces:
+        raise ParameterError(
+            f"--set {', '.join(sets)} gives no surface that the chosen algorithms take; "
+            "`cembench fetch --group disks` shows whether files can be fetched."
+        )
+    return found
+
+
+def lay_into(run: Path, found: Gathered, sets: Sequence[str]) -> None:
+    """Keep beside a run's cells what its sets gave, for the report."""
+    from cembench.results.exhibits import write_exhibit
+    from cembench.workflows.sets import exhibit_of
+
+    write_exhibit(run, exhibit_of(found, sets, shlex.join(["cembench", *sys.argv[1:]])))

@@ -1,0 +1,84 @@
+"""Which algorithm beats which, on how many surfaces, and is that more than chance?"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+from math import inf, isclose
+
+from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
+from cembench.report.content.many.accuracy_profiles import figure
+from cembench.report.content.printed_beside_measured import policy_suffix
+from cembench.report.document import Column, Table, Value, missing, words
+from cembench.results.intervals import ERROR
+from cembench.results.many import holm, sign_test
+
+#: Figures that differ by less than this share are equal.
+SAME = 1e-6
+
+Score = Callable[[MeasuredSurface, AlgorithmSeries], float | None]
+
+
+def pairwise_wins(evidence: Evidence, policy: str) -> list[Table]:
+    """A table of angles and one of seconds for the maps to the disk, where there are several."""
+
+    def angle(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
+        return figure(evidence, surface, series, policy, "angle_error_mean_deg")
+
+    def seconds(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
+        record = evidence.find(surface, series, policy)
+        if record is None:
+            return None
+        found = record.outcome.median_seconds
+        return inf if record.outcome.status != "ok" or found is None else found
+
+    suffix = policy_suffix(policy, evidence)
+    made = (
+        _table(evidence, f"wins-angles{suffix}", "Who has the smaller angle errors", angle),
+        _table(evidence, f"wins-seconds{suffix}", "Who is faster", seconds),
+    )
+    return [table for table in made if table is not None]
+
+
+def _table(evidence: Evidence, name: str, title: str, score: Score) -> Table | None:
+    series = [s for s in evidence.disk_series if s.main]
+    if len(series) < 2:
+        return None
+    scores = {s.label: [score(surface, s) for surface in evidence.surfaces] for s in series}
+    pairs = list(combinations([s.label for s in series], 2))
+    wins = {(a, b): _wins(scores[a], scores[b]) for a, b in pairs}
+    chances = holm([sign_test(*wins[pair]) for pair in pairs])
+    entries: dict[tuple[str, str], Value] = {}
+    for (a, b), chance in zip(pairs, chances, strict=True):
+        won, lost = wins[a, b]
+        entries[a, b], entries[b, a] = _entry(won, lost, chance), _entry(lost, won, chance)
+    rows = [
+        (words(a.label), *(entries.get((a.label, b.label), words("")) for b in series))
+        for a in series
+    ]
+    return Table(
+        name,
+        title,
+        (Column("better", numeric=False), *(Column(s.label, "than") for s in series)),
+        tuple(rows),
+        "On how many surfaces the algorithm of the line beats that of the column, of those that "
+        "both were tried on; equal figures are left out. What did not end ok loses to what did. "
+        f"A star: more, or fewer, than chance would let it be, with {100 * (1 - ERROR):.0f} % for "
+        f"all {len(pairs)} pairs of this table together (two-sided sign tests, Holm). Surfaces are "
+        "counted, not by how much.",
+    )
+
+
+def _wins(first: list[float | None], second: list[float | None]) -> tuple[int, int]:
+    """Return on how many surfaces the first, and the second, has the smaller figure."""
+    both = [(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None]
+    differ = [(a, b) for a, b in both if not (a == b or isclose(a, b, rel_tol=SAME))]
+    won = sum(a < b for a, b in differ)
+    return won, len(differ) - won
+
+
+def _entry(won: int, lost: int, chance: float) -> Value:
+    if not won + lost:
+        return missing("no surface on which they differ")
+    star = " *" if chance <= ERROR else ""
+    return Value(f"{won} of {won + lost}{star}", won / (won + lost), "derived")

@@ -1,0 +1,49 @@
+"""The section of a report about a run over many surfaces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.figures.performance_profile import performance_profile
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.many.accuracy_profiles import accuracy_profiles
+from cembench.report.content.many.difficulty import difficulties, errors_by_difficulty
+from cembench.report.content.many.pairwise_wins import pairwise_wins
+from cembench.report.content.many.success import success_table
+from cembench.report.content.many.worst import hardest_gallery, hardest_table, spread_table
+from cembench.report.document import Item, Section, Text
+from cembench.report.plots import write_plot
+from cembench.report.render.terminal_many import MANY
+
+
+def is_many(evidence: Evidence) -> bool:
+    """Whether a run has so many surfaces that hardly anybody looks at each."""
+    return len(evidence.surfaces) > MANY
+
+
+def many_section(
+    evidence: Evidence,
+    shown: tuple[MeasuredSurface, ...],
+    inspections: Mapping[str, Inspection],
+    folder: Path,
+) -> Section:
+    """Success rates, profiles, who beats whom, the hardest surfaces, and what makes them hard."""
+    policy = evidence.policies[0]
+    items: list[Item] = []
+    if len(evidence.policies) > 1:
+        items.append(Text(f"Where nothing else is said, systems were solved by {policy}."))
+    items += [success_table(evidence, policy), spread_table(evidence, policy)]
+    plots = (
+        accuracy_profiles(evidence, policy),
+        performance_profile(evidence),
+        errors_by_difficulty(evidence, policy, difficulties(evidence, policy)),
+    )
+    items += [write_plot(plot, folder) for plot in plots if plot]
+    items += pairwise_wins(evidence, policy)
+    items.append(hardest_table(evidence, policy, shown))
+    gallery = hardest_gallery(evidence, policy, shown, inspections)
+    if gallery:
+        items.append(gallery)
+    return Section("many", f"Over {len(evidence.surfaces)} surfaces", tuple(items))

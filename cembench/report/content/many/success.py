@@ -1,0 +1,91 @@
+"""How often does an algorithm end with a valid map, and what keeps it from that?"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from cembench.report.content.evidence import AlgorithmSeries, Evidence
+from cembench.report.document import Column, Table, Value, words
+from cembench.results.intervals import LEVEL
+from cembench.results.records import Record, Status
+
+#: Columns in this order, as far as the run has such cells.
+_STATUSES: tuple[Status, ...] = (
+    "invalid",
+    "failed",
+    "timeout",
+    "out_of_memory",
+    "not_comparable",
+    "skipped",
+)
+#: So many kinds of faults are named.
+_NAMED = 3
+
+
+def success_table(evidence: Evidence, policy: str) -> Table:
+    """A line an algorithm: of how many surfaces it has a valid map, and what else came out."""
+    held = {s.label: records_of(evidence, s, policy) for s in evidence.series}
+    there = {r.outcome.status for records in held.values() for r in records}
+    statuses = [status for status in _STATUSES if status in there]
+    columns = (
+        Column("algorithm", numeric=False),
+        Column("target", numeric=False),
+        Column("surfaces"),
+        Column("ok"),
+        Column("share", unit="%"),
+        Column("95 % interval", unit="%"),
+        *(Column(status.replace("_", " ")) for status in statuses),
+        Column("faults", numeric=False),
+    )
+    rows = [_row(s, held[s.label], statuses) for s in evidence.series if held[s.label]]
+    return Table(
+        "success",
+        "Success rates",
+        columns,
+        tuple(rows),
+        "Of the surfaces that an algorithm takes and was tried on: valid maps, and how the others "
+        "ended. The interval (Wilson) is over surfaces: where the share would lie on other "
+        "surfaces like these. A cell can have several faults.",
+    )
+
+
+def records_of(evidence: Evidence, series: AlgorithmSeries, policy: str) -> list[Record]:
+    """Return a series' records, one a surface that it was tried on."""
+    found = (evidence.find(surface, series, policy) for surface in evidence.surfaces)
+    return [record for record in found if record is not None]
+
+
+def _row(
+    series: AlgorithmSeries, records: list[Record], statuses: list[Status]
+) -> tuple[Value, ...]:
+    counts = Counter(record.outcome.status for record in records)
+    ok, n = counts["ok"], len(records)
+    low, high = share_interval(ok, n)
+    faults = Counter(kind for r in records for kind in {f.kind for f in r.outcome.faults})
+    told = ", ".join(f"{kind.replace('_', ' ')} {k}" for kind, k in faults.most_common(_NAMED))
+    return (
+        words(series.label),
+        words(series.target),
+        _count(n),
+        _count(ok),
+        Value(f"{100 * ok / n:.1f}", 100 * ok / n, "derived"),
+        Value(f"{100 * low:.1f} to {100 * high:.1f}", None, "derived"),
+        *(_count(counts[status]) for status in statuses),
+        words(told or "none"),
+    )
+
+
+def share_interval(successes: int, n: int) -> tuple[float, float]:
+    """Return the Wilson interval of a share: between which shares the true one lies, with 95 %.
+
+    >>> [round(end, 3) for end in share_interval(10, 10)]
+    [0.722, 1.0]
+    """
+    from scipy.stats import binomtest  # slow to import
+
+    found = binomtest(successes, n).proportion_ci(LEVEL, method="wilson")
+    return float(found.low), float(found.high)
+
+
+def _count(number: int) -> Value:
+    return Value(str(number), number, "derived")

@@ -1,0 +1,128 @@
+"""How bad is the worst? The worst map of each algorithm, and the surfaces that are hardest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+
+import numpy as np
+
+from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.many.accuracy_profiles import figure
+from cembench.report.content.many.difficulty import best_record
+from cembench.report.content.many.success import records_of
+from cembench.report.document import Column, Gallery, Table, Value, missing, words
+
+#: So many surfaces are shown.
+HARDEST = 10
+_ANGLE = "angle_error_mean_deg"
+
+
+def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
+    """Return the surfaces whose best map has the largest angle errors, the worst first.
+
+    Those that nobody mapped come before them.
+    """
+
+    def error(surface: MeasuredSurface) -> float:
+        best = best_record(evidence, surface, policy)
+        found = None if best is None else best.outcome.metrics.get(_ANGLE)
+        return inf if found is None else float(found)
+
+    return tuple(sorted(evidence.surfaces, key=error, reverse=True)[:HARDEST])
+
+
+def spread_table(evidence: Evidence, policy: str) -> Table:
+    """A line an algorithm: the middle, the 90th percentile and the worst of its angle errors."""
+    rows = []
+    for series in evidence.series:
+        found = [
+            (float(error), record)
+            for record in records_of(evidence, series, policy)
+            if record.outcome.status == "ok"
+            and (error := record.outcome.metrics.get(_ANGLE)) is not None
+        ]
+        if not found:
+            continue
+        errors = [error for error, _ in found]
+        worst, where = max(found, key=lambda pair: pair[0])
+        figures = (np.median(errors), np.percentile(errors, 90))
+        rows.append(
+            (
+                words(series.label),
+                Value(str(len(found)), len(found), "derived"),
+                *(Value(f"{value:.2f}", float(value), "derived") for value in figures),
+                Value(f"{worst:.2f}", worst, "derived", where.cell.key),
+                words(where.cell.mesh),
+            )
+        )
+    columns = (
+        Column("algorithm", numeric=False),
+        Column("maps"),
+        *(Column(name, "mean angle error", "degrees") for name in ("median", "90 %", "worst")),
+        Column("on", "mean angle error", numeric=False),
+    )
+    return Table(
+        "spread",
+        "Angle errors over the surfaces",
+        columns,
+        tuple(rows),
+        "Of valid maps alone: compare the counts before the errors.",
+    )
+
+
+def hardest_table(evidence: Evidence, policy: str, surfaces: tuple[MeasuredSurface, ...]) -> Table:
+    """A line a surface, a column an algorithm: the mean angle error, or how the cell ended."""
+    tried = [s for s in evidence.series if s.main and records_of(evidence, s, policy)]
+    rows = []
+    for surface in surfaces:
+        cells = []
+        for series in tried:
+            record = evidence.find(surface, series, policy)
+            error = figure(evidence, surface, series, policy, _ANGLE)
+            if record is None:
+                cells.append(missing("not tried"))
+            elif error is None or error == inf:
+                cells.append(Value(record.outcome.status, why=evidence.why_not(record)))
+            else:
+                cells.append(Value(f"{error:.2f}", error, surface.origin, record.cell.key))
+        rows.append(
+            (words(surface.title), Value(f"{surface.faces:,}", surface.faces, "derived"), *cells)
+        )
+    return Table(
+        "hardest",
+        f"The {len(surfaces)} hardest surfaces",
+        (
+            Column("surface", numeric=False),
+            Column("triangles"),
+            *(Column(s.label, "mean angle error", "degrees") for s in tried),
+        ),
+        tuple(rows),
+        "Those on which the best map has the largest angle errors; surfaces that nothing mapped "
+        "come first.",
+    )
+
+
+def hardest_gallery(
+    evidence: Evidence,
+    policy: str,
+    surfaces: tuple[MeasuredSurface, ...],
+    inspections: Mapping[str, Inspection],
+) -> Gallery | None:
+    """The best map of each of them; None where the run kept no surface."""
+    figures = []
+    for surface in surfaces:
+        seen = inspections.get(surface.mesh_hash)
+        best = best_record(evidence, surface, policy)
+        labels = [s.label for s in evidence.series if best and evidence.find(surface, s) is best]
+        drawn = [seen.checkerboards[name] for name in labels if seen and name in seen.checkerboards]
+        figures += drawn[:1]
+    if not figures:
+        return None
+    return Gallery(
+        "hardest-maps",
+        "The hardest surfaces, each with its best map",
+        tuple(figures),
+        "The surface and its image under one checkerboard; folded triangles are red.",
+    )

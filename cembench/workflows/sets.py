@@ -1,0 +1,255 @@
+"""Sets of surfaces, for runs over many: named ones, a folder, an archive.
+
+What a set cannot give (a file that cannot be fetched, a surface that is no disk) is given too, with
+the reason: without it a share of successes would have the wrong denominator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+
+from cembench.core.errors import ParameterError
+from cembench.mesh.datasets import Dataset, Progress, fetch_all, surface_file
+from cembench.mesh.files import read_mesh
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import Algorithm, Registry
+from cembench.results.exhibits import Exhibit, ExhibitTable
+from cembench.running.plan import PaperRole
+from cembench.workflows.providers import (
+    Names,
+    Provided,
+    provided,
+    surfaces_of_archive,
+    surfaces_of_folder,
+    surfaces_of_thingi10k,
+)
+
+#: So many surfaces of a set that has no end are taken, unless the user says otherwise.
+USUAL_LIMIT = 100
+#: The exhibit of a run that says what its sets gave.
+EXHIBIT = "surface-set"
+#: The surface family of the face model, by its registered name.
+FACE = "ict-face"
+
+ShowProgress = Callable[[Dataset], Progress | None]
+
+
+def _quietly(dataset: Dataset) -> None:
+    """Show nothing of a download."""
+
+
+@dataclass(frozen=True)
+class SurfaceSet:
+    """A named set: datasets of some groups, or samples of the face model, or Thingi10K.
+
+    Parameters
+    ----------
+    title : str
+        What is in it.
+    groups : tuple of str
+        Groups of datasets.
+    part : str
+        The part of the face model that is sampled; "" for none.
+
+    """
+
+    title: str
+    groups: tuple[str, ...] = ()
+    part: str = ""
+
+
+#: All named sets.
+SETS: Mapping[str, SurfaceSet] = MappingProxyType(
+    {
+        "real-disks": SurfaceSet("real disks, models of the paper too", ("paper", "disks")),
+        "real-holes": SurfaceSet("real surfaces with holes", ("holes",)),
+        "closed": SurfaceSet("real closed surfaces of genus 0, cut open", ("closed",)),
+        "stress": SurfaceSet("surfaces that are hard to map, or damaged", ("stress",)),
+        "ict-faces": SurfaceSet("faces of the ICT model, random expressions", part="disk"),
+        "ict-faces-holes": SurfaceSet("the same, with eyes and mouth as holes", part="face"),
+        "thingi10k": SurfaceSet("models for 3D printing, closed ones of genus 0 cut open"),
+    }
+)  # fmt: skip
+
+
+def surfaces_of_set(
+    name: str,
+    registry: Registry,
+    *,
+    limit: int | None = None,
+    progress: ShowProgress = _quietly,
+) -> Iterator[Provided]:
+    """Give the surfaces of a set, ready for maps, each with its name and source.
+
+    Parameters
+    ----------
+    name : str
+        A name in :data:`SETS`, or the path of a folder or of an archive with mesh files.
+    registry : Registry
+        Where datasets and surface families are known.
+    limit : int, optional
+        So many surfaces at most; default: all, and :data:`USUAL_LIMIT` of a set that has no end.
+    progress : function of a dataset
+        What is told how the download of one gets on.
+
+    Raises
+    ------
+    ParameterError
+        There is no such set, folder or archive.
+    DatasetError, MissingExtra
+        The face model cannot be had.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> from cembench.registry import load_registry
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> [one.name for one in surfaces_of_set(".", load_registry())]
+    ['flat']
+
+    """
+    if name not in SETS:
+        return _of_path(name, limit)
+    chosen = SETS[name]
+    if chosen.groups:
+        return _of_datasets(
+            [d for group in chosen.groups for d in registry.group(group)][:limit], progress
+        )
+    if chosen.part:
+        return _of_face_model(registry, chosen.part, limit or USUAL_LIMIT)
+    return surfaces_of_thingi10k(limit=limit or USUAL_LIMIT)
+
+
+def _of_path(name: str, limit: int | None) -> Iterator[Provided]:
+    place = Path(name)
+    if place.is_dir():
+        return surfaces_of_folder(place, limit=limit)
+    if place.is_file():
+        return surfaces_of_archive(place, limit=limit)
+    raise ParameterError(
+        f"there is no set {name!r}, and no folder or archive of that name; sets: {', '.join(SETS)}."
+    )
+
+
+def _of_datasets(datasets: Sequence[Dataset], progress: ShowProgress) -> Iterator[Provided]:
+    found = {one.dataset.name: one for one in fetch_all(datasets, progress=progress)}
+    for dataset in datasets:
+        one = found[dataset.name]
+        if one.error is not None:
+            why = str(one.error)
+            yield Provided(dataset.name, dataset.source_url, error=why, licence=dataset.licence)
+        else:
+            load = partial(_read, dataset)
+            yield provided(dataset.name, dataset.source_url, load, dataset.licence)
+
+
+def _read(dataset: Dataset) -> TriangleMesh:
+    return read_mesh(surface_file(dataset), TriangleMesh)
+
+
+def _of_face_model(registry: Registry, part: str, limit: int) -> Iterator[Provided]:
+    family = registry.surface(FACE)
+    for seed in range(limit):
+        given = family.arguments({"seed": seed, "expression": "random", "part": part})
+        mesh: TriangleMesh = family.function(**given)
+        yield Provided(
+            f"{FACE}-{part}-{seed}", f"{family.source}; seed {seed}", mesh, licence="MIT"
+        )
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """What the sets of a run gave.
+
+    Parameters
+    ----------
+    surfaces : tuple of Provided
+        Those that can be measured; their names differ.
+    refused : tuple of Provided
+        The others, each with the reason.
+    roles : mapping
+        The row of the paper's Table 1, by the surface's name, for those that are its models.
+
+    """
+
+    surfaces: tuple[Provided, ...]
+    refused: tuple[Provided, ...]
+    roles: Mapping[str, PaperRole]
+
+    @property
+    def meshes(self) -> list[TriangleMesh]:
+        """The surfaces that can be measured, under their names."""
+        return [one.mesh.renamed(one.name) for one in self.surfaces if one.mesh is not None]
+
+
+def gathered(
+    given: Iterable[Provided], registry: Registry, algorithms: Sequence[Algorithm]
+) -> Gathered:
+    """Sort what sets gave into what these algorithms can be measured on, and the rest.
+
+    A surface that is given twice, with the same vertices and triangles, counts once.
+    """
+    names, seen = Names(), set[str]()
+    kinds = tuple({a.mesh_type for a in algorithms})
+    rows = {d.mesh_hash: d.paper_row for d in registry.datasets.values() if d.paper_row}
+    named = {d.name: d.paper_row for d in registry.datasets.values() if d.paper_row}
+    surfaces, refused, roles = [], [], {}
+    for one in given:
+        if one.mesh is None:
+            refused.append(one)
+        elif not isinstance(one.mesh, kinds):
+            kind = type(one.mesh).__name__
+            why = f"it is a {kind}, which none of the chosen algorithms takes"
+            refused.append(replace(one, mesh=None, error=why))
+        elif one.mesh.hash not in seen:
+            seen.add(one.mesh.hash)
+            kept = replace(one, name=names.of(one.name))
+            surfaces.append(kept)
+            row = rows.get(one.mesh.hash) or named.get(one.name, "")
+            if row:
+                roles[kept.name] = PaperRole(row, "model")
+    return Gathered(tuple(surfaces), tuple(refused), MappingProxyType(roles))
+
+
+def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
+    """Describe what the sets of a run gave, for its report."""
+    count = len(found.surfaces) + len(found.refused)
+    cut = sum(one.cut for one in found.surfaces)
+    text = (
+        f"{', '.join(sets)}: {count} surfaces were given, {len(found.surfaces)} of them can be "
+        f"mapped{f', {cut} after they were cut open' if cut else ''}. Shares of success are of "
+        "those that can be mapped."
+    )
+    tables = [
+        ExhibitTable(
+            title="Surfaces of this run",
+            columns=("surface", "vertices", "triangles", "boundaries", "from", "licence"),
+            rows=tuple(
+                (one.name, one.mesh.n, one.mesh.m, len(one.mesh.loops), one.source, one.licence)
+                for one in found.surfaces
+                if one.mesh is not None
+            ),
+        )
+    ]
+    if found.refused:
+        rows = tuple((one.name, one.error, one.source) for one in found.refused)
+        columns = ("surface", "why not", "from")
+        tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
+    return Exhibit(
+        name=EXHIBIT,
+        title="The surfaces",
+        text=text,
+        command=command,
+        origin="surface",
+        tables=tuple(tables),
+        facts={
+            "sets": list(sets),
+            "given": count,
+            "measured": len(found.surfaces),
+            "refused": {one.name: one.error for one in found.refused},
+        },
+    )

@@ -1,0 +1,49 @@
+"""The companion of Table 1: factorisations and solves, counted."""
+
+import pytest
+
+from cembench.report.content.evidence import Evidence
+from cembench.report.content.linear_algebra_work import work_tables
+from cembench.results.records import LinearAlgebraWork
+
+#: Factorisations, right-hand sides and numbers in the factor.
+COUNTS = {"cem": (1, 10.0, 2_000_000), "qiem": (8, 30.0, 2_000_000), "ldm": (2, 5.0, 0)}
+
+
+@pytest.fixture
+def counted(evidence):
+    """The small run with counts for three algorithms on all surfaces but the flat disk."""
+
+    def with_work(record):
+        found = COUNTS.get(record.cell.algorithm)
+        if found is None or not record.mesh.paper_row:
+            return record
+        numeric, solved, entries = found
+        work = LinearAlgebraWork(
+            symbolic=1, numeric=numeric, right_hand_sides=solved, entries=entries
+        )
+        return record.model_copy(
+            update={"outcome": record.outcome.model_copy(update={"work": work})}
+        )
+
+    return Evidence(evidence.store, tuple(map(with_work, evidence.records)), ())
+
+
+def test_counts_stand_by_surface_and_ratios_to_cem_below(counted):
+    table = next(t for t in work_tables(counted) if t.name == "linear-algebra-work-reuse")
+    place = {(c.group, c.title): k for k, c in enumerate(table.columns)}
+    rows = {row[0].text: row for row in table.rows}
+    assert rows["Liu's Neutral Face"][place["QIEM", "factored"]].number == 8
+    assert rows["Liu's Neutral Face"][place["QIEM", "factor, M"]].number == 2
+    assert rows["Liu's Neutral Face"][place["LDM", "factor, M"]].why == "the library does not tell"
+    assert rows["flat-disk"][place["CEM", "factored"]].why == "not counted"
+    mean, count = table.rows[-2:]
+    assert [mean[place["QIEM", title]].number for title in ("factored", "solved")] == [8, 3]
+    assert mean[place["LDM", "solved"]].number == pytest.approx(0.5)
+    assert mean[place["LSCM", "factored"]].why == "nothing to compare"
+    assert count[place["CEM", "factored"]].number == 2
+    assert table.footer_rows == 2
+
+
+def test_there_is_no_table_where_nothing_was_counted(evidence):
+    assert work_tables(evidence) == []
