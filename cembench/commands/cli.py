@@ -306,6 +306,11 @@ def run(
         )
     if limit is not None and not sets:
         raise ParameterError("--limit is of --set: name one, or leave it out.")
+    if mend and sets:
+        raise ParameterError(
+            "--repair is of --mesh and --mesh-dir: mend the files of a set with `cembench repair`, "
+            "or leave it out."
+        )
     with err.status("reading surfaces", spinner="line"):
         found, standing = gather_surfaces(registry, chosen, files, generated, faces, mend=mend)
     many = set_verbs.gather(sets, registry, chosen, limit) if sets else None

@@ -41,7 +41,7 @@ def gather(
             given += surfaces_of_set(name, registry, limit=limit, progress=progress)
     found = gathered(given, registry, chosen)
     for one in found.refused[:NAMED]:
-        note(f"{one.name} is left out: {one.error}")
+        note(f"{one.name} is left out: {_in_one_line(one.error)}")
     more = len(found.refused) - NAMED
     if more > 0:
         note(f"{more} more are left out; the report names them")
@@ -51,6 +51,12 @@ def gather(
             "`cembench fetch --group disks` shows whether files can be fetched."
         )
     return found
+
+
+def _in_one_line(error: str) -> str:
+    """Return the first of what may be several problems, one a line."""
+    first, *more = error.splitlines() or [""]
+    return f"{first} {more[0].strip()}{' ...' if len(more) > 1 else ''}" if more else first
 
 
 def lay_into(run: Path, found: Gathered, sets: Sequence[str]) -> None:

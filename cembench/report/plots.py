@@ -101,6 +101,9 @@ class Plot:
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
 #: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
 DECADES = 300
+#: From here on a tick of a logarithmic axis is written as a power of ten.
+LARGE = 10_000_000
+_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: The most steps between ticks on an axis of whole numbers.
 TICKS = 8
 #: The same bytes at any time: identifiers from a fixed salt, no date. Words in SVG stay words.
@@ -258,6 +261,10 @@ def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
 
 def _tick(value: float) -> str:
     """A power of ten, or 2 or 5 times one, as a person writes it."""
+    if value >= LARGE:
+        exponent = int(np.log10(value) + 1e-9)
+        factor = round(value / 10.0**exponent)
+        return f"{f'{factor}×' if factor > 1 else ''}10{str(exponent).translate(_RAISED)}"
     return f"{value:,.0f}" if value >= 1 else f"{value:.8f}".rstrip("0")
 
 

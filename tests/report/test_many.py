@@ -10,6 +10,7 @@ from cembench.report.content import inspection
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.many.accuracy_profiles import accuracy_profiles
 from cembench.report.content.many.difficulty import boundary_crowding, difficulties
+from cembench.report.content.many.found import many_findings
 from cembench.report.content.many.pairwise_wins import _wins, pairwise_wins
 from cembench.report.content.many.success import share_interval, success_table
 from cembench.report.content.many.worst import HARDEST, hardest, spread_table
@@ -162,6 +163,18 @@ def test_the_report_has_a_page_for_the_hardest_alone(run, tmp_path, monkeypatch)
     for words in ("Success rates", "Performance profiles of accuracy", "Who is faster", "hardest"):
         assert words in text
     assert (tmp_path / "report" / "tables" / "success.csv").is_file()
+
+
+def test_what_is_found_counts_all_surfaces(evidence):
+    found = many_findings(evidence, "reuse")
+    assert found.sentence.startswith(
+        "Over 26 surfaces, 3 of 4 algorithms have a valid map of every one that they take: Direct "
+        "CEM, Harmonic and LSCM. Of the maps to the disk, "
+    )
+    cells, best, worst = found.figures
+    assert cells.number == f"{100 * 101 / 104:.1f} %"
+    assert best.number.endswith("of 26")
+    assert worst.words.startswith("the worst mean angle error of a valid map: ")
 
 
 def test_the_terminal_has_a_line_an_algorithm(evidence):

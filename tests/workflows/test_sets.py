@@ -97,6 +97,7 @@ def test_a_run_over_a_set_has_one_round_and_keeps_what_the_set_gave(cli, folder,
     [
         (["--limit", "3", "--surfaces", "flat-disk"], "--limit is of --set"),
         (["--set", "EMPTY"], "gives no surface"),
+        (["--set", "EMPTY", "--repair"], "--repair is of --mesh"),
         (["--set", "nowhere"], "there is no set 'nowhere'"),
     ],
 )

@@ -24,6 +24,7 @@ from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
+from cembench.report.content.many.found import many_findings
 from cembench.report.content.many.section import is_many, many_section
 from cembench.report.content.many.worst import hardest
 from cembench.report.content.other_targets import other_targets
@@ -52,8 +53,8 @@ PICTURES = (
 
 
 PAPER = "Conformal surface parameterizations: the paper's tables and figures, measured"
-#: The plot at the head: how good maps are against what they cost.
-FIRST_PLOT = "accuracy-against-time"
+#: The plot at the head: how good maps are against what they cost, or on how many surfaces.
+FIRST_PLOTS = ("accuracy-against-time", "accuracy-profiles")
 #: The plot that a report about many surfaces shows with its profiles of accuracy.
 PROFILE = "performance-profile"
 
@@ -80,9 +81,12 @@ def build_report(
     of_paper = not many and bool(evidence.models)
     tested = claims(evidence, inspections) if of_paper else []
     beyond = _beyond(evidence, folder, by_surface=not many)
+    first = _first_plot(beyond)
     sections = [] if many else [_summary(evidence, of_paper=of_paper)]
     if many:
-        sections.append(many_section(evidence, shown, inspections, folder))
+        about_all = many_section(evidence, shown, inspections, folder)
+        first = _first_plot(about_all)
+        sections.append(about_all)
         sections.append(_costs(evidence, folder, beyond))
     elif of_paper:
         sections += [
@@ -99,10 +103,14 @@ def build_report(
         sections.append(Section("not-ok", "Cells without a valid map", (not_ok(evidence),)))
     sections.append(_pages(evidence, shown, inspections, folder))
     progress("done", n, n)
-    found = findings(evidence, inspections, tested)
+    found = (
+        many_findings(evidence, evidence.policies[0])
+        if many
+        else findings(evidence, inspections, tested)
+    )
     return Report(
         title=PAPER if of_paper else _own_title(evidence),
-        findings=replace(found, plot=_first_plot(beyond)) if found else None,
+        findings=replace(found, plot=first) if found else None,
         command=command,
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
@@ -297,7 +305,7 @@ def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
 def _first_plot(section: Section) -> Figure | None:
     """The plot for the head of the report; it stands in this section."""
     figures = [item for item in section.items if isinstance(item, Figure)]
-    return next((f for f in figures if f.name == FIRST_PLOT), figures[0] if figures else None)
+    return next((f for f in figures if f.name in FIRST_PLOTS), figures[0] if figures else None)
 
 
 def _pages(

@@ -63,10 +63,15 @@ def _table(evidence: Evidence, name: str, title: str, score: Score) -> Table | N
         tuple(rows),
         "On how many surfaces the algorithm of the line beats that of the column, of those that "
         "both were tried on; equal figures are left out. What did not end ok loses to what did. "
-        f"A star: more, or fewer, than chance would let it be, with {100 * (1 - ERROR):.0f} % for "
-        f"all {len(pairs)} pairs of this table together (two-sided sign tests, Holm). Surfaces are "
-        "counted, not by how much.",
+        f"A star: more, or fewer, than chance would let it be, with {100 * (1 - ERROR):.0f} %"
+        f"{_together(len(pairs))}. Surfaces are counted, not by how much.",
     )
+
+
+def _together(pairs: int) -> str:
+    if pairs == 1:
+        return " (two-sided sign test)"
+    return f" for all {pairs} pairs of this table together (two-sided sign tests, Holm)"
 
 
 def _wins(first: list[float | None], second: list[float | None]) -> tuple[int, int]:

@@ -99,8 +99,8 @@ def hardest_table(evidence: Evidence, policy: str, surfaces: tuple[MeasuredSurfa
             *(Column(s.label, "mean angle error", "degrees") for s in tried),
         ),
         tuple(rows),
-        "Those on which the best map has the largest angle errors; surfaces that nothing mapped "
-        "come first.",
+        "Those on which the best map has the largest angle errors, of maps to the disk where there "
+        "are any; surfaces that nothing mapped come first.",
     )
 
 
