@@ -264,7 +264,8 @@ def _tick(value: float) -> str:
     if value >= LARGE:
         exponent = int(np.log10(value) + 1e-9)
         factor = round(value / 10.0**exponent)
-        return f"{f'{factor}×' if factor > 1 else ''}10{str(exponent).translate(_RAISED)}"
+        times = f"{factor}\N{MULTIPLICATION SIGN}" if factor > 1 else ""
+        return f"{times}10{str(exponent).translate(_RAISED)}"
     return f"{value:,.0f}" if value >= 1 else f"{value:.8f}".rstrip("0")
 
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from cembench.report import plots
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.figures.cost_by_faces import cost_by_faces, fit, printed_points
 from cembench.report.content.figures.energy_by_iteration import energy_by_iteration
@@ -135,3 +136,11 @@ def test_iterations_have_whole_ticks():
     times = PlotSeries("CEM", [0.5, 1.0], [1.0, 2.0], "both")
     plot = Plot("times", "Times", (PlotPanel(Axis("seconds"), Axis("E_C"), (times,)),))
     assert "dtick" not in plotly_of(plot)["layout"]["xaxis"]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.005, "0.005"), (1000, "1,000"), (1e6, "1,000,000"), (1e7, "10⁷"), (2e8, "2\u00d710⁸")],
+)
+def test_ticks_are_written_so_that_they_do_not_run_into_each_other(value, text):
+    assert plots._tick(value) == text
