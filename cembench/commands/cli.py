@@ -191,7 +191,8 @@ def run(
     ] = None,
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
     mesh_dir: Annotated[
-        list[Path], typer.Option("--mesh-dir", help="All mesh files of a folder. Repeatable.")
+        list[Path],
+        typer.Option("--mesh-dir", help="All mesh files of a folder but NPZ. Repeatable."),
     ] = [],  # noqa: B006
     dataset: Annotated[
         list[str], typer.Option("--dataset", help="Fetched surfaces (see `fetch`), with commas.")

@@ -29,7 +29,7 @@ Complex = NDArray[np.complex128]
 Picture = NDArray[np.uint8]
 
 #: Width and height in pixels, and the smallest that can hold two panels and words.
-SIZE, LEAST = (1600, 940), (240, 150)
+SIZE, LEAST = (1280, 752), (240, 150)
 #: Side in pixels of a picture of the surface alone.
 THUMBNAIL = 480
 

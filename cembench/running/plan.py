@@ -13,7 +13,7 @@ from cembench.core.errors import MeshError, ParameterError
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.datasets import recognised
 from cembench.mesh.files import checked, read_mesh, read_repaired
-from cembench.mesh.reading import is_named_like_a_mesh, read_soup
+from cembench.mesh.reading import READERS, is_named_like_a_mesh, read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
@@ -230,7 +230,7 @@ def mesh_files(folder: Path) -> list[Path]:
     except OSError as error:
         why = f"cannot be listed ({error.strerror or error})"
     else:
-        why = "holds no OBJ, OFF, PLY, STL or MAT file"
+        why = f"holds no file of a mesh ({', '.join(k for k in READERS if k not in _OF_ANYTHING)})"
         if found:
             return found
     raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")

@@ -156,9 +156,8 @@ def _of_face_model(registry: Registry, part: str, limit: int) -> Iterator[Provid
     for seed in range(limit):
         given = family.arguments({"seed": seed, "expression": "random", "part": part})
         mesh: TriangleMesh = family.function(**given)
-        yield Provided(
-            f"{FACE}-{part}-{seed}", f"{family.source}; seed {seed}", mesh, licence="MIT"
-        )
+        name = f"{FACE}-{seed}" if part == "disk" else f"ict-{part}-{seed}"
+        yield Provided(name, f"{family.source}; seed {seed}", mesh, licence="MIT")
 
 
 @dataclass(frozen=True)

@@ -107,7 +107,7 @@ def test_export_writes_a_row_a_cell(runs, form):
         (("run", "--surfaces", "flat-disk", "--memory", "much"), "--memory 'much' is not a size"),
         (("run", "--surfaces", "flat-disk", "--solves", "twice"), "--solves 'twice' is unknown"),
         (("run", "--mesh-dir", "nowhere"), "--mesh-dir nowhere is not a folder"),
-        (("run", "--mesh-dir", "one"), "holds no OBJ, OFF, PLY, STL or MAT file"),
+        (("run", "--mesh-dir", "one"), "holds no file of a mesh (.obj, .off,"),
         (("run",), "nothing to run on: name a --profile"),
     ],
 )

@@ -143,7 +143,7 @@ def test_a_folder_of_meshes_leaves_nothing_out_in_silence(cli, tmp_path):
 def test_a_folder_that_is_none_or_holds_no_mesh(cli, tmp_path):
     for folder, message in (
         (tmp_path / "nowhere", "is not a folder"),
-        (tmp_path, "holds no OBJ, OFF, PLY, STL or MAT file"),
+        (tmp_path, "holds no file of a mesh (.obj, .off,"),
     ):
         code, _, err = cli("run", "--mesh-dir", folder)
         assert (code, f"--mesh-dir {folder} {message}" in err) == (2, True), err

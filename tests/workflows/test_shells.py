@@ -10,6 +10,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from PIL import Image
 
 from cembench.conformal.planar import signed_areas
+from cembench.drawing import preview
 from cembench.mesh.reading import read_soup
 from tests import gallery
 
@@ -68,7 +69,7 @@ def test_a_foreign_reader_finds_the_coordinates(cli, two):
     assert mesh.visual.uv.min() >= 0
     assert mesh.visual.uv.max() <= 1
     with Image.open(cli.folder / "uv.png") as picture:
-        assert picture.size == (1600, 940)
+        assert picture.size == preview.SIZE
 
 
 def test_json_has_a_row_for_each_and_extras_are_refused(cli, two):
