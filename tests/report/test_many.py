@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench.report.content import inspection
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.many.accuracy_profiles import accuracy_profiles
 from cembench.report.content.many.difficulty import boundary_crowding, difficulties
@@ -28,7 +27,7 @@ COUNT = 26
 
 def surface(k):
     """The k-th: flatter or steeper, and of another size."""
-    return hemi_ellipsoid(120 + 10 * k, z=0.5 + 0.1 * k).renamed(f"surface-{k:02d}")
+    return hemi_ellipsoid(60 + 4 * k, z=0.5 + 0.1 * k).renamed(f"surface-{k:02d}")
 
 
 @pytest.fixture(scope="module")
@@ -87,8 +86,8 @@ def test_a_profile_ends_at_the_success_rate_and_the_best_starts_highest(evidence
     energies = plot.panels[2]
     assert "LSCM" not in {line.name for line in energies.series}
     starts = {line.name: line.y[0] for line in energies.series}
-    assert sum(starts.values()) >= 100
-    assert min(starts, key=starts.get) == "Harmonic"
+    assert sum(starts.values()) >= 100  # somebody is the best on every surface
+    assert all(line.y == sorted(line.y) for line in energies.series)
 
 
 def test_wins_are_counted_both_ways_and_failures_lose(evidence):
@@ -146,8 +145,7 @@ def test_crowding_is_one_on_the_disk_itself_and_does_not_see_the_gauge():
     assert boundary_crowding(mesh, 2 * z) is None
 
 
-def test_the_report_has_a_page_for_the_hardest_alone(run, tmp_path, monkeypatch):
-    monkeypatch.setattr(inspection, "SIDE", 24)
+def test_the_report_has_a_page_for_the_hardest_alone(run, tmp_path, quick_drawing):
     write_exhibit(
         run,
         Exhibit(
