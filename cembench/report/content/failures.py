@@ -17,7 +17,7 @@ def not_ok(evidence: Evidence) -> Table | Text:
                     words(cell.mesh),
                     words(record.title),
                     words(cell.solves),
-                    Value(outcome.status, None, "", cell.key, outcome.cause or ""),
+                    Value(outcome.status, None, "", cell.key),
                     words(outcome.cause or ""),
                 )
             )
