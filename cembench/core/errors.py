@@ -1,15 +1,26 @@
-"""Every error that cembench raises on purpose; all derive from :class:`CembenchError`.
+"""The errors that cembench raises on purpose. All derive from :class:`CembenchError`.
 
-A message says what is wrong, where, what is allowed and what to do about it.
+A message names what is wrong, where, what is allowed and what to do.
 """
 
 
 class CembenchError(Exception):
-    """Base of all errors whose message is written for the user."""
+    """Base class of all errors whose message is written for the user.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> try:
+    ...     cembench.surface("no-such-surface")
+    ... except cembench.CembenchError as error:
+    ...     print(type(error).__name__)
+    RegistryError
+
+    """
 
 
 class MeshError(CembenchError):
-    """A mesh, or the file that should hold one, cannot be used."""
+    """A mesh, or the file it is read from, cannot be used."""
 
 
 class RegistryError(CembenchError):
@@ -17,23 +28,35 @@ class RegistryError(CembenchError):
 
 
 class ParameterError(CembenchError):
-    """A parameter has an unknown name, or a value outside its range."""
+    """A parameter has an unknown name or a value outside its range."""
 
 
 class RecordError(CembenchError):
-    """A run directory, or a record in it, cannot be read or written."""
+    """A run folder, or a record in it, cannot be read or written."""
 
 
 class DatasetError(CembenchError):
-    """A real mesh is unknown, cannot be fetched, or is not what its checksum says."""
+    """A dataset is unknown, cannot be fetched, or does not match its checksum."""
 
 
 class AlgorithmFailed(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
-    """An algorithm gave up; the message is the cause."""
+    """An algorithm could not compute a map; the message gives the cause.
+
+    Solvers raise it themselves. The harness records it as the status of that run.
+
+    Examples
+    --------
+    >>> from cembench import AlgorithmFailed
+    >>> raise AlgorithmFailed("the boundary is too crowded")
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.AlgorithmFailed: the boundary is too crowded
+
+    """
 
 
 class NotThere(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
-    """What an algorithm needs is not on this machine; the message says what, and what brings it."""
+    """A program or library that an algorithm needs is missing; the message says how to get it."""
 
 
 class NotPositiveDefinite(AlgorithmFailed):
@@ -44,17 +67,17 @@ class RenderError(CembenchError):
     """A picture cannot be drawn or written."""
 
 
-#: The longest text that is kept of an exception, in characters.
+#: Longest exception text that is kept, in characters.
 LONGEST_MESSAGE = 2_000
 
 
 def said_by(error: BaseException) -> str:
-    """Return an exception's type and message, of bounded length."""
+    """Return the type and message of an exception, cut to a bounded length."""
     return shortened(f"{type(error).__name__}: {message_of(error)}")
 
 
 def message_of(error: BaseException) -> str:
-    """Return the message of an exception, even of one that cannot say it."""
+    """Return the message of an exception, even if its ``__str__`` raises."""
     try:
         return str(error)
     except BaseException as another:
@@ -62,7 +85,7 @@ def message_of(error: BaseException) -> str:
 
 
 def shortened(text: str, length: int = LONGEST_MESSAGE) -> str:
-    """Return a text of at most this length, cut in the middle, without what UTF-8 cannot hold."""
+    """Return a text of at most `length` characters, cut in the middle, that UTF-8 can encode."""
     if len(text) > length:
         half = (length - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"

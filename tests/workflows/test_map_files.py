@@ -60,7 +60,7 @@ def test_a_checkerboard_is_found_from_obj_and_from_ply(result, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mtl", "a.obj", "a_texture.png"]
     picture = trimesh.load_mesh(tmp_path / "a.obj").visual.material.image
     assert picture.size == (1024, 1024)
-    with pytest.raises(cembench.ParameterError, match=r"a_texture\.png is there already"):
+    with pytest.raises(cembench.ParameterError, match=r"a_texture\.png already exists"):
         result.save(tmp_path / "a.ply", checker=True)
     result.save(tmp_path / "b.ply", checker=True)
     assert b"TextureFile b_texture.png" in (tmp_path / "b.ply").read_bytes()
