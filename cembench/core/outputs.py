@@ -17,7 +17,7 @@ def refuse_inputs(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
         if not force and output.exists() and source.exists() and output.samefile(source):
             raise ParameterError(
                 f"the output {output} is the input {source}. Name another path, or add --force to "
-                "write over it."
+                "overwrite it."
             )
 
 
@@ -37,6 +37,6 @@ def refuse_present(outputs: Iterable[Path], *, force: bool) -> None:
     for output in outputs:
         if not force and (output.exists() or output.is_symlink()):
             raise ParameterError(
-                f"{output} already exists. Name another path with -o, or add --force to write "
-                "over it."
+                f"{output} already exists. Name another path with -o, or add --force to "
+                "overwrite it."
             )
