@@ -164,7 +164,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
     [
         (("-o", "a.fbx"), "allowed here: .obj, .ply, .glb, .vtp, .npz"),
         (("-o", "a.obj", "--bake", "nothing.png"), "nothing.png cannot be read: No such file"),
-        (("-o", "a.obj", "--bake", "flat.obj"), "it is no picture"),
+        (("-o", "a.obj", "--bake", "flat.obj"), "it is not a picture"),
         (("-o", "a.obj", "--bake", "paint.png", "--checker"), "two textures; choose one"),
         (("-o", "a.vtp", "--checker"), "names no texture"),
         (("--checker",), "need a file that uses the texture"),
