@@ -57,6 +57,11 @@ def phase(name: str) -> Iterator[None]:
     name : str
         The phase, such as "laplacian", "factorisation" or "solve".
 
+    Yields
+    ------
+    None
+        Control, while the time is credited.
+
     Examples
     --------
     >>> import time

@@ -20,19 +20,60 @@ class CembenchError(Exception):
 
 
 class MeshError(CembenchError):
-    """A mesh, or the file it is read from, cannot be used."""
+    """A mesh, or the file it is read from, cannot be used.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.DiskMesh([[0, 0]], [[0, 0, 0]])
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.MeshError: vertices have shape (1, 2); allowed is (n, 3), a row per vertex.
+
+    """
 
 
 class RegistryError(CembenchError):
-    """An algorithm or surface is unknown, declared twice, or declared wrongly."""
+    """An algorithm or surface is unknown, declared twice, or declared wrongly.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.surface("no-such-surface")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.RegistryError: unknown surface 'no-such-surface'; known: ...
+
+    """
 
 
 class ParameterError(CembenchError):
-    """A parameter has an unknown name or a value outside its range."""
+    """A parameter has an unknown name or a value outside its range.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.surface("cone", 600, angle=120)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.ParameterError: cone: angle=120 is not allowed: ... (default 30.0).
+
+    """
 
 
 class RecordError(CembenchError):
-    """A run folder, or a record in it, cannot be read or written."""
+    """A run folder, or a record in it, cannot be read or written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from cembench.core.loading import read_bytes
+    >>> read_bytes(Path("nowhere.json"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.RecordError: 'nowhere.json' cannot be read: ...
+
+    """
 
 
 class DatasetError(CembenchError):
@@ -60,11 +101,33 @@ class NotThere(CembenchError):  # noqa: N818 - it is a result's status, not a mi
 
 
 class NotPositiveDefinite(AlgorithmFailed):
-    """A Cholesky factorisation met a pivot that is not positive."""
+    """A Cholesky factorisation met a pivot that is not positive.
+
+    Examples
+    --------
+    >>> from scipy import sparse
+    >>> from cembench.linear_algebra.cholesky import Cholesky
+    >>> Cholesky(-sparse.eye_array(2, format="csc"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.NotPositiveDefinite: the matrix of order 2 is not positive definite ...
+
+    """
 
 
 class RenderError(CembenchError):
-    """A picture cannot be drawn or written."""
+    """A picture cannot be drawn or written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from cembench.drawing.texture import read_texture
+    >>> read_texture(Path("nowhere.png"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.RenderError: the texture nowhere.png cannot be read: ...
+
+    """
 
 
 #: Longest exception text that is kept, in characters.

@@ -87,6 +87,13 @@ class MapStep:
     result : complex128 (n,) or None
         The finished map if the method ended here; set only for the last step of a sweep.
 
+    Examples
+    --------
+    >>> import cembench
+    >>> from cembench.algorithms.koebe_cem.steps import shown_steps
+    >>> [step.boundary for step in shown_steps(cembench.surface("catenoid-ring", 400))]
+    [1, 0]
+
     """
 
     sweep: int

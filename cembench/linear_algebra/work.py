@@ -46,6 +46,11 @@ _work: ContextVar[Work | None] = ContextVar("cembench_work", default=None)
 def counting() -> Iterator[Work]:
     """Count the factorisations and solves inside the ``with`` block.
 
+    Yields
+    ------
+    Work
+        The counts so far; final after the block.
+
     Examples
     --------
     >>> from cembench.linear_algebra.cholesky import Cholesky
