@@ -109,6 +109,7 @@ def _coefficients(mesh: DiskMesh, z: Complex) -> Complex:
 
 
 def _mean_modulus(mu: Complex) -> float:
+    """Return the mean of |mu|, with folds reversed and collapsed triangles as 1."""
     return float(np.nan_to_num(np.abs(unfolded(mu)), nan=1.0).mean())
 
 
@@ -198,7 +199,7 @@ def _corrected_by_reflection(
     z = z / max(float(np.abs(z).max()), 1.0)
     modulus = np.abs(z[b])
     if not modulus.min() > 0:
-        raise AlgorithmFailed("a boundary vertex came to lie at the centre of the map")
+        raise AlgorithmFailed("a boundary vertex is mapped to the centre")
     if L is not None:
         return harmonic_extension(L, b, z[b] / modulus)
     with phase("assembly"):
@@ -213,6 +214,7 @@ def _mirrored(mesh: DiskMesh, z: Complex, mu: Complex) -> Complex:
 
 
 def _off_centre(z: Complex) -> Complex:
+    """Move vertices away from the centre, to at least the inverse of `FARTHEST`."""
     z = z.copy()
     z[np.abs(z) < 1 / FARTHEST] = 1 / FARTHEST
     return z

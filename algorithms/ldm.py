@@ -147,7 +147,7 @@ def _laid_on_disk(mesh: DiskMesh, w: Complex, first: int) -> Complex:
         z = -np.conj(z)
     modulus = np.abs(z[b])
     if not modulus.min() > 0:
-        raise AlgorithmFailed("a boundary vertex came to lie at the centre of the disk")
+        raise AlgorithmFailed("a boundary vertex is mapped to the centre of the disk")
     z[b] /= modulus
     return z
 

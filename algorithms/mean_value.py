@@ -64,6 +64,7 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
 
 
 def _factored(A: sparse.csc_array) -> linalg.SuperLU:
+    """Factor the matrix of mean value weights."""
     try:
         return linalg.splu(
             A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}

@@ -89,6 +89,8 @@ class Parameter:
 
 @dataclass(frozen=True)
 class _Registered:
+    """The common fields of registered algorithms and surface families."""
+
     name: str
     title: str
     function: Callable[..., Any]
@@ -368,6 +370,7 @@ def _program_of(
     folder: Path,
     how: Mapping[str, Any],
 ) -> Algorithm:
+    """Return the algorithm that runs an external program."""
     known = [one.name for one in fields(Program) if one.name != "command"]
     unknown = [key for key in how if key not in known]
     if unknown:
@@ -388,6 +391,7 @@ def _algorithm_of(
     title: str,
     about: Mapping[str, Any],
 ) -> Algorithm:
+    """Return the algorithm that a function and its declaration make."""
     if about["target"] not in get_args(Target):
         raise RegistryError(
             f"algorithm {name!r}: target {about['target']!r} is unknown; "
@@ -496,6 +500,7 @@ def surface_family(
 def _signature(
     name: str, function: Callable[..., Any], positional: str | None = None
 ) -> tuple[dict[str, Any], tuple[Parameter, ...]]:
+    """Return the type hints of a function, and its keyword parameters."""
     try:
         hints = typing.get_type_hints(_annotated(function), include_extras=True)
         signature = inspect.signature(function)
@@ -657,6 +662,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
 
 @functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
+    """Return the registry of all entry points."""
     found = _all_datasets()
     surfaces = {name: dataset for name, dataset in found.items() if dataset.part is None}
     parts = {name: dataset for name, dataset in found.items() if dataset.part is not None}
@@ -700,6 +706,7 @@ def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
 
 
 def _declared_at(entry: Any, kind: type[R]) -> R:
+    """Return what an entry point declares; :class:`RegistryError` if it is something else."""
     loaded = _load_entry(entry)
     spec = getattr(loaded, _MARK, loaded)
     if not isinstance(spec, kind) or spec.name != entry.name:
@@ -764,6 +771,7 @@ def declared_by(plugin: str) -> list[_Registered]:
 
 
 def _import_file(path: Path) -> ModuleType:
+    """Import a Python file as a module."""
     if not path.is_file():
         raise RegistryError(f"plug-in {str(path)!r}: there is no such file.")
     name = f"cembench_plugin_{path.stem}"

@@ -138,6 +138,7 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
 
 
 def _registered(name: str) -> Callable[..., DiskMesh]:
+    """Return the stand-in for a row as a registered surface family."""
     row = ROWS[name]
 
     def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:

@@ -201,6 +201,7 @@ def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict
 
 
 def _weight(given: str, expression: str) -> float:
+    """Return a weight between 0 and 1 from text."""
     try:
         weight = float(given)
     except ValueError:

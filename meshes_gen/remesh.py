@@ -142,6 +142,7 @@ def _remove_strays(values: Real, spacing: float) -> None:
 
 
 def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
+    """Return the surface of sampled values by marching cubes, cut by the body's `keep`."""
     from skimage.measure import marching_cubes
 
     V, F, _, _ = marching_cubes(values, 0.0)  # type: ignore[no-untyped-call] # has no type hints

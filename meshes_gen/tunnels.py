@@ -105,6 +105,7 @@ def plugs_for(V: Real, F: Faces, spacing: float, largest: float) -> tuple[Plug, 
 
 
 def _plugs(V: Real, loops: list[Faces], spacing: float, largest: float) -> tuple[Plug, ...]:
+    """Return balls that close narrow loops and do not touch each other."""
     plugs: list[Plug] = []
     for loop in loops:
         points = V[loop]

@@ -20,6 +20,7 @@ Real = NDArray[np.float64]
 
 
 def _no_digon(corners: int) -> int:
+    """Refuse polygons with one or two corners."""
     if corners in (1, 2):
         raise ValueError("a polygon has at least 3 corners; 0 leaves the boundary free")
     return corners

@@ -193,7 +193,7 @@ def _on_disk(mesh: DiskMesh, z: Complex, v: int) -> Complex:
     corners = middle_triangle(mesh.V, mesh.F)
     p = complex(z[corners[corners != v]].mean())
     if not p.imag > 0:
-        raise AlgorithmFailed("the middle of the surface came to lie on its boundary")
+        raise AlgorithmFailed("the middle of the surface is mapped to its boundary")
     w = np.empty_like(z)
     others = np.arange(mesh.n) != v
     w[others] = (z[others] - p) / (z[others] - p.conjugate())

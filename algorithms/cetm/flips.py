@@ -77,7 +77,7 @@ def cetm_flips(
         z, off = _laid_out(T, u, cones, mesh.n)
         uv = disk_of_triangle(z)
     if not np.isfinite(uv).all():
-        raise AlgorithmFailed("a vertex came to lie on the wrong side of the boundary")
+        raise AlgorithmFailed("a vertex is mapped to the wrong side of the boundary")
     uv[b] /= np.abs(uv[b])
     uv /= np.maximum(np.abs(uv), 1.0)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))

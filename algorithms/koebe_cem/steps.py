@@ -281,6 +281,7 @@ def _around(z: Complex, centre: complex) -> Complex:
 
 
 def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> sparse.csc_array:
+    """Return the cotangent Laplacian of an image."""
     with np.errstate(divide="ignore", invalid="ignore"):
         L = cotangent_laplacian(points, F)
     if not np.isfinite(L.data).all():

@@ -130,6 +130,7 @@ def _complex(uv: NDArray[np.float64]) -> NDArray[np.complex128]:
 
 
 def _of_area_pi(mesh: DiskMesh, uv: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Scale a map so that its boundary encloses pi."""
     area = polygon_area(uv[mesh.boundary])
     if not area > 0:
         raise AlgorithmFailed(f"the image of the boundary encloses an area of {area:.3g}")

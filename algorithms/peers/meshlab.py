@@ -80,6 +80,7 @@ def _loaded(mesh: TriangleMesh) -> Any:
 
 
 def _apply(meshes: Any, name: str, **parameters: Any) -> None:
+    """Apply a MeshLab filter; its errors become those of an algorithm."""
     from pymeshlab.pmeshlab import PyMeshLabException
 
     try:

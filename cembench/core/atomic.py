@@ -197,12 +197,14 @@ def _new_draft(path: Path, suffix: str) -> Path:
 
 
 def _runs(pid: int) -> bool:
+    """Whether a process with this id is running."""
     import psutil  # imported here: needed only if a draft was left behind
 
     return bool(psutil.pid_exists(pid))
 
 
 def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
+    """Write a draft by `fill`, and raise its first disk error even if `fill` drops it."""
     opened = draft.open("xb")
     file = _Draft(opened)
     try:

@@ -22,6 +22,8 @@ OTHER = "other"
 
 @dataclass
 class _Ledger:
+    """The seconds of each phase, and the stack of open phases."""
+
     seconds: dict[str, float] = field(default_factory=dict)
     stack: list[str] = field(default_factory=lambda: [OTHER])
     since: float = field(default_factory=perf_counter)

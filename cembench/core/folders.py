@@ -140,6 +140,7 @@ def is_link_or_not_folder(path: Path) -> bool:
 
 
 def _may_be_replaced(folder: Path, name: str, before: dict[str, tuple[str, ...]]) -> bool:
+    """Whether a name in a folder is free, or holds a file as we wrote it."""
     above = [folder / parent for parent in PurePosixPath(name).parents if parent.name]
     if any(is_link_or_not_folder(parent) for parent in above):
         return False
@@ -165,6 +166,7 @@ def is_empty_file(path: Path) -> bool:
 
 
 def _read(folder: Path, kind: Kind) -> Marker:
+    """Return the marker of a folder of this kind; :class:`RecordError` if there is none."""
     path = folder / MARKERS[kind]
     try:
         if path.is_symlink() or not path.is_file():

@@ -102,6 +102,7 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Return one array of an archive, after comparing its header with its size and with memory."""
     member = archive.getinfo(f"{name}.npy")
     with archive.open(member) as file:
         shape, dtype = _header(file)
@@ -118,6 +119,7 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
 
 
 def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Return the shape and type that the header of an ``.npy`` file declares."""
     version = npy.read_magic(file)
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, _, dtype = read(file)

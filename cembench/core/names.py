@@ -82,6 +82,7 @@ def digest(name: str) -> str:
 
 
 def _is_ordinary(name: str, longest: int) -> bool:
+    """Whether every common system accepts a name as a file name."""
     return (
         0 < len(name.encode("utf-8", "surrogatepass")) <= longest
         and name.isprintable()

@@ -140,6 +140,7 @@ def checked_program(name: str, program: Program, parameters: Iterable[str]) -> P
 
 
 def _wrong_pattern(pattern: str) -> str:
+    """Return what is wrong with the pattern of a solve time; empty if nothing is."""
     try:
         groups = re.compile(pattern)
     except re.error as error:
@@ -196,6 +197,7 @@ def found_words(command: str, folder: Path) -> tuple[str, ...]:
 
 
 def _absolute(word: str, folder: Path) -> str:
+    """Return a word as an absolute path if it names a file in this folder."""
     try:
         is_file = not _PLACEHOLDER.search(word) and (folder / word).is_file()
     except (OSError, ValueError):

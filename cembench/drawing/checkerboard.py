@@ -98,6 +98,7 @@ class Checkerboard:
 
 
 def _roots(places: Real, low: Ints, across: int) -> Ints:
+    """Return the square of side 1 that holds each point."""
     column = np.floor(places[:, 0]).astype(np.int64) - low[0]
     row = np.floor(places[:, 1]).astype(np.int64) - low[1]
     return np.asarray(column.clip(0, across - 1) + across * row)
@@ -110,6 +111,7 @@ def _part(places: Real, level: int) -> Ints:
 
 
 def _is_dark(places: Real, level: int) -> NDArray[np.bool_]:
+    """Whether points lie on dark squares of this level."""
     scale = FINER**level
     whole = np.floor(places[:, 0] * scale) + np.floor(places[:, 1] * scale)
     return np.asarray(whole.astype(np.int64) & 1 == 1)

@@ -41,6 +41,7 @@ def shrunk(picture: Real) -> Picture:
 
 
 def _drawn(scene: Scene, view: View, side: int) -> Picture:
+    """Draw one panel of a scene."""
     raster = rasterize(view.corners, side * SAMPLES)
     # Averaged over a pixel's samples: its shares of empty, light, dark and folded.
     parts = np.zeros((4, raster.size**2), dtype=np.float32)

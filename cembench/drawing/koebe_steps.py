@@ -86,6 +86,7 @@ def _outline(
     corner: tuple[int, int],
     size: tuple[int, int],
 ) -> None:
+    """Draw the highlighted boundary of a panel."""
     assert panel.uv is not None
     window = image_in_window(panel.uv)[:, :2]
     for loop in mesh.loops:

@@ -116,6 +116,7 @@ def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Pi
 
 
 def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
+    """Raise :class:`ParameterError` for a map or a size that cannot be drawn."""
     if uv.shape != (mesh.n,):
         raise ParameterError(
             f"the map has shape {uv.shape}; allowed is ({mesh.n},), one image per vertex."
@@ -134,6 +135,7 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
 
 
 def _note(scene: Scene, *, turned: bool) -> str:
+    """Return the note below a picture on how it was drawn."""
     up = "The image is turned so that up on the surface is up in it." if turned else ""
     finer = (
         f"Squares that would be large on the surface are divided {FINER} by {FINER}, in both "

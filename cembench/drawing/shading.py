@@ -93,6 +93,7 @@ def image_panel(mesh: TriangleMesh, uv: Complex, side: int) -> RasterPanel:
 def _panel(
     mesh: TriangleMesh, points: Real, light: Real, folded: NDArray[np.bool_], side: int
 ) -> RasterPanel:
+    """Rasterize triangles at these points, folds on top."""
     corners = points[mesh.F].reshape(-1, 3)
     corners[np.repeat(folded, 3), 2] += 1.0  # folds on top
     raster = rasterize(corners, side * SAMPLES)

@@ -78,14 +78,17 @@ def soup_of_arrays(
 
 
 def _fits(v: NDArray[Any], f: NDArray[Any]) -> bool:
+    """Whether two arrays can be the vertices and the triangles of a surface."""
     if v.shape[1] not in (2, 3) or f.shape[1] != 3 or not len(f) or not _whole(f):
         return False
     return any(f.min() == first and f.max() == len(v) - 1 + first for first in _COUNTED_FROM)
 
 
 def _whole(f: NDArray[Any]) -> bool:
+    """Whether all numbers are whole and exact in float64."""
     return bool((np.abs(f.astype(np.float64)) < 2**53).all() and (np.round(f) == f).all())
 
 
 def _listed(found: Mapping[str, NDArray[Any]]) -> str:
+    """Return the names and shapes of arrays for a message."""
     return ", ".join(f"{name} {array.shape}" for name, array in found.items()) or "none"

@@ -237,6 +237,7 @@ class _Net:
 
 
 def _graph(edges: Indices, weights: Points, n: int) -> sparse.csr_array:
+    """Return the symmetric weighted graph of edges (k, 2) on n vertices."""
     i, j = edges.T
     both = np.concatenate([weights, weights])
     ends = (np.concatenate([i, j]), np.concatenate([j, i]))

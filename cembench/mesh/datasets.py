@@ -152,6 +152,7 @@ def is_fetched(dataset: Dataset) -> bool:
 
 
 def _is_whole(dataset: Dataset, path: Path) -> bool:
+    """Whether the file at a path is the dataset's, by its checksum or by its mesh."""
     if dataset.part and path == dataset.path:
         return dataset.part.is_whole(path)
     if dataset.sha256:
@@ -160,6 +161,7 @@ def _is_whole(dataset: Dataset, path: Path) -> bool:
 
 
 def _hash_of_mesh(dataset: Dataset, path: Path) -> str | None:
+    """Return the hash of the mesh in a file; None if it holds no valid mesh."""
     from cembench.mesh.files import read_mesh
     from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -336,6 +338,7 @@ def surface_file(dataset: Dataset) -> Path:
 
 
 def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progress | None) -> None:
+    """Download a dataset's file; :class:`DatasetError` if that fails."""
     import pooch
     import requests
 
@@ -351,6 +354,7 @@ def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progre
 
 
 def _check_whole(dataset: Dataset, path: Path) -> None:
+    """Raise :class:`DatasetError` if a downloaded file is not the dataset's."""
     if _is_whole(dataset, path):
         return
     what = f"SHA-256 is not {dataset.sha256}"

@@ -369,6 +369,7 @@ def _thinner_than(share: float, V: Points, F: Indices) -> Mask:
 
 
 def _slivers(V: Points, F: Indices) -> tuple[Notice, ...]:
+    """Return a notice if some triangles are slivers."""
     thin = np.flatnonzero(_thinner_than(SLIVER_AREA, V, F))
     if not len(thin):
         return ()
@@ -380,6 +381,7 @@ def _slivers(V: Points, F: Indices) -> tuple[Notice, ...]:
 
 
 def _turned(turned: Mask) -> tuple[Notice, ...]:
+    """Return a notice if some triangles were reversed."""
     if not turned.any():
         return ()
     told = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
@@ -387,6 +389,7 @@ def _turned(turned: Mask) -> tuple[Notice, ...]:
 
 
 def _used(F: Indices, n: int) -> Mask:
+    """Whether each of n vertices belongs to a triangle."""
     used = np.zeros(n, dtype=bool)
     used[F] = True
     return used
@@ -448,6 +451,7 @@ def _duplicates(F: Indices, number: Indices) -> Problem | None:
 
 
 def _edges(edges: Indices, faces: Indices) -> Problem | None:
+    """Return the problem that edges have more than two triangles, or None."""
     bad = np.flatnonzero(faces > 2)
     if not len(bad):
         return None
@@ -461,6 +465,7 @@ def _edges(edges: Indices, faces: Indices) -> Problem | None:
 
 
 def _one_sided(contradictions: Indices, faces: Indices) -> Problem | None:
+    """Return the problem that a surface with manifold edges is one-sided, or None."""
     if not len(contradictions) or faces.max() > 2:
         return None
     i, j = contradictions[0].tolist()
@@ -484,6 +489,7 @@ def _orientation(bad: Indices, F: Indices) -> Problem | None:
 
 
 def _vertices(F: Indices) -> Problem | None:
+    """Return the problem that triangles at a vertex form several fans, or None."""
     import igl
 
     # Triangles with one or two vertices are another defect; libigl is slow with many of them.

@@ -27,7 +27,7 @@ def read_gltf(path: Path) -> Soup:
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
     notices: tuple[Notice, ...] = ()
     if len(meshes) < len(pieces):
-        told = f"{len(pieces) - len(meshes)} pieces that are points or lines were left"
+        told = f"{len(pieces) - len(meshes)} pieces that are points or lines were ignored"
         notices = (Notice(NoticeKind.LINES_IGNORED, told),)
     if not meshes:
         return Soup.from_arrays(np.empty((0, 3)), [], [])

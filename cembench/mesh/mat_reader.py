@@ -103,6 +103,7 @@ def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 
 
 def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
+    """Return the two 32-bit numbers at a position."""
     if at + 8 > len(content):
         raise damaged("it cannot be read as MAT: it ends within the head of an element")
     first, second = np.frombuffer(content, f"{order}u4", 2, at).tolist()
@@ -110,6 +111,7 @@ def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
 
 
 def _inflated(element: bytes, most: int) -> bytes:
+    """Return at most this many first bytes of a compressed element."""
     try:
         return zlib.decompressobj().decompress(element, most)
     except zlib.error as error:

@@ -113,6 +113,7 @@ def _statements(text: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _noted(lines: Iterator[tuple[int, str]], whole: list[str]) -> Iterator[tuple[int, str]]:
+    """Yield numbered lines, and append each to `whole` on the way."""
     for number, line in lines:
         whole.append(line)
         yield number, line
@@ -146,6 +147,7 @@ def _face_lines(face: Face, corners: Corners) -> list[str]:
 
 
 def _face_line(face: Face, uv: Mapping[int, int]) -> str:
+    """Return the line of a face whose corners have these texture coordinates."""
     corners = [
         f"{v + 1}/{uv.get(v, v) + 1}" + (f"/{normal}" if normal else "") for v, normal in face
     ]

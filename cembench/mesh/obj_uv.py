@@ -76,6 +76,7 @@ def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def _point(path: Path, number: int, words: list[str]) -> tuple[float, float]:
+    """Return the texture coordinate of a line."""
     try:
         u, v = (float(word) for word in [*words[1:], "0"][:2])
     except ValueError:
@@ -88,9 +89,11 @@ def _point(path: Path, number: int, words: list[str]) -> tuple[float, float]:
 
 
 def _corner(word: str, vertices: int, points: int) -> tuple[int, int]:
+    """Return the indices, from 0, of the vertex and the texture coordinate of a corner."""
     vertex, texture = [*word.split("/"), ""][:2]
     return _from_0(int(vertex), vertices), _from_0(int(texture), points) if texture else -1
 
 
 def _from_0(index: int, count: int) -> int:
+    """Return an OBJ index, which may count back from the end, counted from 0."""
     return index - 1 if index > 0 else count + index

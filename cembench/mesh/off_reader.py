@@ -54,6 +54,7 @@ def _statements(file: Iterator[str]) -> _Lines:
 
 
 def _next(lines: _Lines, missing: str) -> tuple[int, list[str]]:
+    """Return the next line; an error with the text `missing` if there is none."""
     found = next(lines, None)
     if found is None:
         raise damaged(missing)

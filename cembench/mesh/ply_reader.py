@@ -221,6 +221,7 @@ def _header(text: bytes) -> tuple[str, list[_Element], int, int]:
 
 
 def _element(elements: list[_Element], name: str) -> _Element:
+    """Return the element of this name."""
     for element in elements:
         if element.name == name:
             return element
@@ -381,6 +382,7 @@ def _walk_rows(
 
 
 def _unpacker(size: np.dtype[Any]) -> Callable[[Any, int], tuple[Any, ...]]:
+    """Return the function that reads a list's length from bytes."""
     order = "=" if size.byteorder == "|" else size.byteorder
     return struct.Struct(order + _STRUCT[size.str[1:]]).unpack_from
 

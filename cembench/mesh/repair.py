@@ -242,7 +242,7 @@ def _weld(V: Points, F: Indices, tolerance: float, steps: dict[Step, int]) -> In
 
 
 def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
-    """Collapse needles, flip triangles whose corners are collinear, drop the rest."""
+    """Collapse needles, flip triangles with collinear corners, drop the rest."""
     for _ in range(_FLIP_ROUNDS):
         F, dropped = _without(F, _repeats_a_vertex(F))
         steps[Step.degenerate] += dropped

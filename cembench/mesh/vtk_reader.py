@@ -37,7 +37,8 @@ def read_vtk(path: Path) -> Soup:
     notices: tuple[Notice, ...] = ()
     if others:
         told = ", ".join(f"{count} of type {kind}" for kind, count in others.items())
-        notices = (Notice(NoticeKind.LINES_IGNORED, f"cells that are no faces were left: {told}"),)
+        text = f"cells that are not faces were ignored: {told}"
+        notices = (Notice(NoticeKind.LINES_IGNORED, text),)
     V = np.asarray(mesh.points, dtype=np.float64)
     if V.ndim != 2 or V.shape[1] not in (2, 3):
         raise damaged(f"its points have shape {V.shape}")

@@ -132,9 +132,7 @@ def test_landmarks_are_found_on_every_part_and_size():
 
 
 def test_landmarks_of_another_surface_are_refused():
-    with pytest.raises(
-        ParameterError, match="flat-disk has no landmarks: it is not"
-    ):
+    with pytest.raises(ParameterError, match="flat-disk has no landmarks: it is not"):
         landmarks(cembench.surface("flat-disk", 200))
 
 
