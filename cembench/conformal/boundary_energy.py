@@ -388,5 +388,6 @@ class EnergyModel:
 
 
 def _projected(x: Real, constraints: tuple[Real, Real, Real]) -> Real:
+    """Project a preconditioned gradient onto the steps that satisfy the constraints."""
     c, preconditioned, inverse = constraints
     return x - preconditioned @ (inverse @ (c.T @ x))

@@ -59,6 +59,7 @@ def _mixed_areas(
 
 
 def _continued_to_boundary(mesh: TriangleMesh, H: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give boundary vertices the mean of their interior neighbours."""
     inside = np.zeros(mesh.n)
     inside[mesh.interior] = 1.0
     graph = topology.vertex_graph(mesh.F, mesh.n).astype(bool).astype(float)

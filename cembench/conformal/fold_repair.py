@@ -55,6 +55,7 @@ def accepted_repair(
 
 
 def _figures(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
+    """Return the metrics that decide on a repair."""
     return {
         "flipped_triangles": flipped_triangles(mesh, uv),
         "conformal_energy": dirichlet_energy(mesh, uv) - image_area(mesh, uv),

@@ -128,6 +128,7 @@ def _accepted(
 
 
 def _folded(mesh: TriangleMesh, z: Complex) -> NDArray[np.int64]:
+    """Return the folded triangles, in the phase "folds"."""
     with phase("folds"):
         return folded_triangles(z, mesh.F)
 
@@ -180,6 +181,7 @@ def in_order(circle: Complex) -> Complex:
 
 
 def _in_order(angles: Real) -> Real:
+    """Return the isotonic regression of angles, with distinct values."""
     from scipy.optimize import isotonic_regression  # slow to load, and rarely needed
 
     spread = LEAST_ARC * np.arange(len(angles))

@@ -57,4 +57,5 @@ def three_point_map(p: Sequence[complex] | Complex, q: Sequence[complex] | Compl
 
 
 def _to_zero_one_infinity(p: complex, q: complex, r: complex) -> Complex:
+    """Return the matrix of the Moebius map that takes p, q, r to 0, 1, infinity."""
     return np.array([[q - r, -p * (q - r)], [q - p, -r * (q - p)]])

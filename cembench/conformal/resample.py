@@ -179,6 +179,7 @@ def square_to_disk(w: Complex) -> Complex:
 
 
 def _weights(corners: Complex, points: Complex) -> Real:
+    """Return the barycentric coordinates of points, clipped to the triangle."""
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = points - a
     area = (np.conj(u) * v).imag
@@ -189,11 +190,13 @@ def _weights(corners: Complex, points: Complex) -> Real:
 
 
 def _check_side(side: int) -> None:
+    """Raise :class:`ParameterError` for a side out of range."""
     if not LEAST <= side <= MOST:
         raise ParameterError(f"the side is {side}; allowed: {LEAST} to {MOST} samples.")
 
 
 def _check_disk(mesh: TriangleMesh, z: Complex) -> None:
+    """Raise :class:`ParameterError` for a map that is not onto the disk."""
     if len(mesh.loops) == 1:
         off = float(np.abs(np.abs(z[mesh.loops[0]]) - 1).max())
         if off <= _ON_CIRCLE:

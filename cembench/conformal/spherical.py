@@ -67,4 +67,5 @@ def balanced(z: Complex, F: NDArray[np.int64], outer: int) -> Complex:
 
 
 def _mean_side(corners: Complex) -> float:
+    """Return the mean side length of a triangle."""
     return float(np.abs(corners - np.roll(corners, 1)).mean())

@@ -232,4 +232,5 @@ def _hessian_of_square(c: Complex) -> Real:
 
 
 def _outer(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Return the outer products of the rows of a and b."""
     return a[:, :, None] * b[:, None, :]

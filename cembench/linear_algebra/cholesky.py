@@ -108,6 +108,7 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
 
 
 def _names(kind: Any) -> str:
+    """Return the allowed values of a Literal type for a message."""
     return ", ".join(repr(name) for name in get_args(kind))
 
 
@@ -116,6 +117,8 @@ SolverOf = Callable[[sparse.csc_array], Solver]
 
 
 class _Factor(Protocol):
+    """The interface of the factors of all back ends."""
+
     def update(self, A: sparse.csc_array) -> None: ...
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
@@ -267,6 +270,7 @@ def _count(b: NDArray[Any], share: float = 1.0) -> None:
 
 
 def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
+    """Factor a matrix with a back end."""
     if backend == "cvxopt" and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
         from cembench.linear_algebra.cholmod import cholmod_solver
 
@@ -275,6 +279,7 @@ def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Fact
 
 
 def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], _Factor]:
+    """Return the constructor of a back end's factors."""
     # Imported on demand: an extra may be missing, and start-up should not load a solver.
     if backend == "cvxopt":
         from cembench.linear_algebra.cholmod import CholmodFactor

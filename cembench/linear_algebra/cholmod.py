@@ -124,6 +124,7 @@ def cholmod_solver(A: sparse.csc_array) -> Callable[[NDArray[np.float64]], NDArr
 
 
 def _set_options() -> None:
+    """Set the options of CHOLMOD, which are global."""
     cholmod.options["supernodal"] = 2
     cholmod.options["nmethods"] = 1
     cholmod.options["print"] = 0

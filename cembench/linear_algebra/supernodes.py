@@ -21,6 +21,8 @@ _FLAGS = ("ordering", "is_ll", "is_super", "is_monotonic", "itype", "xtype", "dt
 
 
 class _CholmodFactor(ctypes.Structure):
+    """The layout of CHOLMOD's factor."""
+
     # Sizes and pointers have the same width; a null pointer reads as 0.
     _fields_ = [
         *((name, ctypes.c_size_t) for name in _NUMBERS_BEFORE + _POINTERS),
@@ -82,6 +84,7 @@ def factor_entries(factor: Any) -> int:
 
 
 def _held(factor: Any) -> _CholmodFactor | None:
+    """Return the structure in a capsule; None if the capsule is not as expected."""
     api = ctypes.pythonapi
     name_of, pointer_of = api.PyCapsule_GetName, api.PyCapsule_GetPointer
     name_of.restype, name_of.argtypes = ctypes.c_char_p, [ctypes.py_object]
@@ -100,4 +103,5 @@ def _as_expected(held: _CholmodFactor, n: int) -> bool:
 
 
 def _array(address: int, kind: Any, length: int) -> NDArray[Any]:
+    """Return the array at an address, without a copy."""
     return np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(kind)), (length,))

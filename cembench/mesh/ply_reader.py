@@ -243,6 +243,7 @@ def _check_elements(elements: list[_Element]) -> None:
 
 
 def _repeated(names: list[str]) -> list[str]:
+    """Return the names that appear more than once."""
     return [name for name, count in Counter(names).items() if count > 1]
 
 
@@ -265,6 +266,7 @@ def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
 
 
 def _is_number(word: str) -> bool:
+    """Whether a word is a number in ASCII files."""
     try:
         float(word)
     except ValueError:
@@ -303,6 +305,7 @@ def _check_rest(elements: list[_Element], rest: Bytes, form: str) -> None:
 
 
 def _counts(elements: list[_Element]) -> str:
+    """Return the declared counts of elements for a message."""
     return ", ".join(f"{element.count} of {element.name!r}" for element in elements)
 
 
@@ -399,6 +402,7 @@ def _items(
 
 
 def _ends_within(element: _Element, row: int) -> MeshError:
+    """Return the error for a file that ends within a row."""
     return damaged(
         f"the header declares {element.count} of {element.name!r}, but the file ends within "
         f"{element.name!r} {row} (counted from 0)"
@@ -406,6 +410,7 @@ def _ends_within(element: _Element, row: int) -> MeshError:
 
 
 def _whole(indices: NDArray[Any]) -> NDArray[np.int64]:
+    """Return indices as integers; whole numbers in floating point are accepted."""
     if indices.dtype.kind != "f":
         return indices.astype(np.int64)
     bad = np.flatnonzero(~(np.abs(indices) < 2**53) | (indices != np.rint(indices)))

@@ -208,6 +208,7 @@ def repair(
 
 
 def _check_options(weld: float, fill_holes: int, components: str) -> None:
+    """Raise :class:`ParameterError` for options out of range."""
     if not (np.isfinite(weld) and weld >= 0):
         raise ParameterError(f"weld={weld!r} is not allowed; a tolerance is 0 or a finite length.")
     if fill_holes < 0:
@@ -263,10 +264,12 @@ def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
 
 
 def _without(F: Indices, bad: NDArray[np.bool_]) -> tuple[Indices, int]:
+    """Return the triangles that are not bad, and the number of bad ones."""
     return F[~bad], int(bad.sum())
 
 
 def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
+    """Whether each triangle has a vertex twice."""
     twice: NDArray[np.bool_] = (np.roll(F, 1, axis=1) == F).any(axis=1)
     return twice
 

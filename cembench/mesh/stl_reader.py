@@ -72,6 +72,7 @@ def _read_ascii(path: Path) -> Soup:
 
 
 def _point(number: int, line: str, words: list[str]) -> list[float]:
+    """Return the three coordinates of a vertex line."""
     try:
         refuse_underscores(words)
         x, y, z = map(float, words)
@@ -81,6 +82,7 @@ def _point(number: int, line: str, words: list[str]) -> list[float]:
 
 
 def _merged(corners: NDArray[Any]) -> Soup:
+    """Return the soup of triangle corners, with coinciding corners merged."""
     points = corners.reshape(-1, 3)
     order = np.lexsort(points.T)  # stable sort, so a point's first corner comes first
     ordered = points[order]

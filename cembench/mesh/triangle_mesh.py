@@ -359,6 +359,7 @@ def _checked_loops(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[NDArray
 
 
 def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
+    """Return the problem that a surface has several boundary loops."""
     sizes = sorted(map(len, loops), reverse=True)
     lengths = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
     longest = int(np.argmax(lengths))
@@ -373,6 +374,7 @@ def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
 
 
 def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
+    """Return the problem that a surface has handles, if it has."""
     euler = topology.euler_characteristic(F, n)
     genus = topology.genus(F, n, loops)
     if not genus:
@@ -395,6 +397,7 @@ def definition_1_notices(
 def _breaks_of_definition_1(
     F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
 ) -> Iterator[str]:
+    """Yield a text for each condition of Definition 1 that the mesh breaks."""
     inside = np.ones(n, dtype=bool)
     inside[np.concatenate(loops)] = False
     graph = topology.vertex_graph(F, n)

@@ -175,6 +175,7 @@ def _turned(F: Indices) -> tuple[Indices, Indices]:
 
 
 def _read_obj(path: Path) -> UVFile:
+    """Read the UVs of an OBJ file, with the surface that it holds."""
     V: list[list[float]] = []
     uv: list[complex] = []
     faces: list[list[tuple[int, int]]] = []
@@ -246,11 +247,13 @@ def _read_off(path: Path) -> UVFile:
 
 
 def _read_ply(path: Path) -> UVFile:
+    """Read the UVs of a PLY file, with the surface that it holds."""
     V, F, uv, index = read_ply_texture(path)
     return UVFile(uv[:, 0] + 1j * uv[:, 1], V, F, index)
 
 
 def _read_mat(path: Path) -> UVFile:
+    """Read the UVs of a MATLAB file of versions up to 7.2."""
     from scipy.io import loadmat
 
     try:
@@ -263,6 +266,7 @@ def _read_mat(path: Path) -> UVFile:
 
 
 def _read_npz(path: Path) -> UVFile:
+    """Read the UVs of a NumPy archive."""
     import zipfile
 
     try:
@@ -297,6 +301,7 @@ def _read_text(path: Path) -> UVFile:
 
 
 def _complex(uv: ArrayLike) -> Complex:
+    """Return UVs (k, 2) or complex (k,) as complex numbers."""
     a = np.asarray(uv)
     if a.dtype.kind == "c":
         return np.ascontiguousarray(a.ravel(), dtype=np.complex128)

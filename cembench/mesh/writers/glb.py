@@ -83,6 +83,7 @@ class _File:
 
 
 def _add(file: _File, surface: Textured) -> None:
+    """Add a surface as a mesh and a node."""
     middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
     points = in_single_precision(surface.V - middle, "glTF")
     in_single_precision(middle, "glTF")
@@ -109,6 +110,7 @@ def _moved(middle: Sequence[float]) -> dict[str, Any]:
 
 
 def _material(file: _File, texture: bytes | None) -> int:
+    """Add a material, with a texture if one is given, and return its index."""
     surface: dict[str, Any] = {"metallicFactor": 0, "roughnessFactor": 1}
     if texture is not None:
         known = [
@@ -131,6 +133,7 @@ def _material(file: _File, texture: bytes | None) -> int:
 
 
 def _bytes_of(file: _File, view: int) -> bytes:
+    """Return the bytes of a view."""
     place = file.parts["bufferViews"][view]
     return file.content[place["byteOffset"] : place["byteOffset"] + place["byteLength"]]
 

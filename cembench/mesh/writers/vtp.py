@@ -38,6 +38,7 @@ def _element(name: str, content: Sequence[str], attributes: str = "") -> str:
 
 
 def _array(name: str, values: NDArray[Any]) -> str:
+    """Return an array as a binary DataArray element."""
     little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<"))
     content = np.uint64(little.nbytes).astype("<u8").tobytes() + little.tobytes()
     components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
