@@ -89,13 +89,13 @@ def _circular(
             raise AlgorithmFailed(
                 f"the boundary is too crowded: in sweep {sweep} its scale differs by a factor of "
                 f"exp({np.ptp(u):.3g}) between its vertices, beyond what numbers can hold. "
-                "direct-cem keeps its vertices apart"
+                "Use direct-cem, which keeps vertices apart"
             )
         before, domain = domain, in_gauge(CircleDomain.of_arcs(yamabe.scaled(u)), weights)
         change = float(np.abs(np.log(domain.arcs / before.arcs)).max())
         if change <= tolerance:
             return domain, sweep, change
     raise AlgorithmFailed(
-        f"the boundary's arcs have not converged after {most} sweeps: the last one changed one "
-        f"by the factor exp({change:.2g}), tolerance {tolerance:g}. Allow more with max_sweeps"
+        f"the boundary's arcs have not converged after {most} sweeps: the last one changed an "
+        f"arc by the factor exp({change:.2g}), tolerance {tolerance:g}. Allow more with max_sweeps"
     )

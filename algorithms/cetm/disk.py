@@ -56,7 +56,7 @@ def cetm(
     map are those of the surface (`cross_ratios` is the largest change of their logarithms).
 
     Decided here: the vertex is the boundary vertex nearest to the mean vertex (`at_infinity`), or
-    one of up to four others if triangles break with that one. Steps and stopping rule are those of
+    the next of about four candidates if triangles break with it. Steps and stopping rule are those of
     cetm-free (`curvature`, radians). No interior edge may join two boundary vertices, since it
     would fall on the line together with what it cuts off: that is a failure, as are triangles that
     break the triangle inequality; cetm-flips maps both. The flat surface is laid out by one solve;
@@ -100,7 +100,7 @@ def _with_infinity_at(
     touching = np.any(np.int64(v) == mesh.F, axis=1)
     F = mesh.F[~touching]
     if not len(F):
-        raise AlgorithmFailed(f"every triangle touches the boundary vertex {v}: too few for CETM")
+        raise AlgorithmFailed(f"every triangle touches the boundary vertex {v}: too few triangles")
     u, link = _infinity(mesh, v, mesh.F[touching])
     flat = np.full(mesh.n, 2 * np.pi)
     flat[mesh.boundary] = np.pi

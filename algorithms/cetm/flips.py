@@ -210,7 +210,7 @@ def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, 
     if not off < 1e-3:
         raise AlgorithmFailed(
             f"the laid out flat surface is not an equilateral triangle (off by {off:.2g}): its "
-            "places differ by more than doubles can hold"
+            "positions differ by more than doubles can resolve"
         )
     third = here + (there - here) * np.exp(1j * np.pi / 3)
     centre = (here + there + third) / 3

@@ -73,7 +73,7 @@ def with_area_pi(mesh: DiskMesh, uv: Complex) -> tuple[Complex, dict[str, Any]]:
     if not area > 0:
         raise AlgorithmFailed(
             f"the image of the boundary encloses an area of {area:.3g}, which is not positive: "
-            "the map has collapsed or crosses itself. A disk map, such as direct-cem, cannot"
+            "the map has collapsed or crosses itself. Use a disk map, such as direct-cem"
         )
     uv = uv * np.sqrt(np.pi / area)
     return accepted_repair(mesh, uv, interior_without_folds(mesh, uv))

@@ -65,7 +65,7 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
     solves : {"reuse", "backslash"}
         Whether to reuse a factorisation or to factor for every solve.
     backend : {"cvxopt", "superlu", "pardiso"}, optional
-        The library that factors (default: the fastest one that is installed).
+        The library that factors (default: cvxopt, or superlu if cvxopt is missing).
 
     Yields
     ------

@@ -14,7 +14,7 @@ from cembench.mesh.soup import Soup
 
 #: Usual names of vertices and triangles, tried before any guess.
 USUAL = (("v", "f"), ("V", "F"))
-#: Named arrays may count vertices in either way: 1 to n, or 0 to n - 1.
+#: Two arrays fit if the indices span one of these ranges exactly: 1 to n, or 0 to n - 1.
 _COUNTED_FROM = (1, 0)
 
 

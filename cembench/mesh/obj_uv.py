@@ -18,7 +18,7 @@ def read_obj_uv(path: Path, F: NDArray[np.int64]) -> NDArray[np.float64]:
     Parameters
     ----------
     path : Path
-        A file that was read as a surface, so its vertices and faces are valid.
+        A file that was read as a surface, so its statements of vertices and faces are valid.
     F : int64 (m, 3)
         The triangles of that surface: the file's faces in order, cut into triangles.
 
