@@ -56,8 +56,8 @@ def cetm(
     map are those of the surface (`cross_ratios` is the largest change of their logarithms).
 
     Decided here: the vertex is the boundary vertex nearest to the mean vertex (`at_infinity`), or
-    the next of about four candidates if triangles break with it. Steps and stopping rule are those of
-    cetm-free (`curvature`, radians). No interior edge may join two boundary vertices, since it
+    the next of about four candidates if triangles break with it. Steps and stopping rule are those
+    of cetm-free (`curvature`, radians). No interior edge may join two boundary vertices, since it
     would fall on the line together with what it cuts off: that is a failure, as are triangles that
     break the triangle inequality; cetm-flips maps both. The flat surface is laid out by one solve;
     the image is moved into the `gauge` of direct-cem. Images of triangles have straight edges, so a
