@@ -65,7 +65,7 @@ _TETRAHEDRON = np.array([[1, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]], dtyp
 
 
 def gradient(f: Field, p: Real, step: float) -> Real:
-    """Return the gradient of f at p (n, 3), by differences at distance `step`."""
+    """Return the gradient of f at p (n, 3), from a tetrahedron of half-width `step`."""
     return value_and_gradient(f, p, step)[1]
 
 

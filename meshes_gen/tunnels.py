@@ -50,7 +50,7 @@ def plugged(f: Field, plugs: tuple[Plug, ...]) -> Field:
 
 
 def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
-    """Return loops of vertices that a disk would not have (generators), shortest first.
+    """Return loops that generate the homology that a disk would not have, shortest first.
 
     They are short as seen from the vertex `root` (default: the highest).
     """

@@ -23,7 +23,7 @@ CLOSED, APART = 0.25, 0.08
 LEANING = 1.5
 #: Above this ratio of net to total area a surface is a relief, seen obliquely from above ...
 RELIEF = 0.7
-#: ... and above this one it is flat, and seen from straight above.
+#: ... and above this one it is flat, and seen face on.
 FLAT = 0.999
 #: Degrees by which the viewer moves right and up, to make depth visible.
 PORTRAIT, OBLIQUE = (14.0, 8.0), (12.0, -42.0)

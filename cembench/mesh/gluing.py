@@ -1,7 +1,7 @@
 """Triangles glued along chosen pairs of sides, and separate everywhere else.
 
 A triangulation is a list of triangles and a list of pairs of sides that are glued. Omitting a pair
-cuts the surface there. A side that is glued to at most one other makes every vertex a single fan.
+cuts the surface there. Since a side is glued to at most one other, every vertex has a single fan.
 So one function splits non-manifold vertices and edges, and cuts a surface open.
 
 Half-edge ``h = 3 t + c`` is the side of triangle ``t`` from corner ``h`` to the next corner of the

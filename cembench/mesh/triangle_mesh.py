@@ -279,7 +279,7 @@ class HoledMesh(TriangleMesh):
         -------
         outer : int64 (k,)
             The vertices of the outer boundary in order.
-        holes : list of int64 arrays
+        holes : tuple of int64 arrays
             The vertices of each hole in order.
 
         Raises
