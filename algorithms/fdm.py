@@ -56,12 +56,12 @@ def fdm(
     Faithful to the published method and to the program that its authors made public: a harmonic map
     whose boundary keeps its arc length; one correction after the Cayley transform to the upper half
     plane; then, on the map reflected in the circle, one linear Beltrami solve and one normalisation
-    per iteration, until the mean of |mu| changes by less than `tolerance`. Taken from that program
-    where the article leaves it open: the boundary edge that goes to z = 1 has the least sum of |mu|
-    over its two ends, with mu of a vertex the mean over its triangles; a reflected triangle's
-    coefficient carries a factor 1/3; the 1 % of vertices held far out are counted on the doubled
-    surface. On Chinese Lion the published standard deviation of angles, 2.04, needs both of the
-    first two (2.05 with either one left out); the third changes no printed digit.
+    per iteration, until the mean of abs(mu) changes by less than `tolerance`. Taken from that
+    program where the article leaves it open: the boundary edge that goes to z = 1 has the least sum
+    of abs(mu) over its two ends, with mu of a vertex the mean over its triangles; a reflected
+    triangle's coefficient carries a factor 1/3; the 1 % of vertices held far out are counted on the
+    doubled surface. On Chinese Lion the published standard deviation of angles, 2.04, needs both of
+    the first two (2.05 with either one left out); the third changes no printed digit.
 
     Decided here: the midpoint of that edge is taken across the branch cut of the argument; a start
     that folds is replaced by uniform weights; triangles that have collapsed in the plane take the
@@ -69,7 +69,7 @@ def fdm(
     reflected to a modulus of 1e8. If the last map folds, boundary vertices that changed places are
     put in order, and patches around the folds are laid out again (`fold_repairs` counts the
     rounds). On meshes of a few hundred triangles, of which the held vertices are a large share, the
-    iteration can diverge: the returned map is the iterate of the least mean |mu|, and
+    iteration can diverge: the returned map is the iterate of the least mean abs(mu), and
     `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes the weights of the
     intrinsic Delaunay triangulation in every solve whose matrix is the surface's own Laplacian: in
     all but that of the reflected map.

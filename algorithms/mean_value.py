@@ -32,7 +32,7 @@ Real = NDArray[np.float64]
 def mean_value(mesh: DiskMesh) -> Parameterization:
     """Map a disk by mean value weights, which use the geometry and are always positive.
 
-    As harmonic-circle, with the weight (tan(a / 2) + tan(b / 2)) / |ij| from i to j, a and b the
+    As harmonic-circle, with the weight (tan(a / 2) + tan(b / 2)) / l_ij from i to j, a and b the
     angles at i on either side of that edge. The weights are positive, so that only triangles with
     all corners on the boundary can fold, and they reproduce flat surfaces exactly. They are not
     symmetric, so the map does not minimise an energy. The boundary keeps its arc length.

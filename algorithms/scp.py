@@ -53,13 +53,14 @@ def scp(
     """Map a disk with a free boundary and least conformal energy for its size, without pins.
 
     E_C (Eq. 7) is a Hermitian form in the map; the map is the eigenvector of the smallest
-    eigenvalue other than that of the constants. The size is the sum of |z|^2 over the boundary, as
-    in the paper, over the boundary by length, or over the surface by area as in libigl (`weights`).
-    With the first two the interior is eliminated: (S - M) z = lambda W z on the boundary alone,
-    with S the Schur complement of the Laplacian and M the area.
+    eigenvalue other than that of the constants. The size is the sum of abs(z)^2 over the boundary,
+    as in the paper, over the boundary by length, or over the surface by area as in libigl
+    (`weights`). With the first two the interior is eliminated: (S - M) z = lambda W z on the
+    boundary alone, with S the Schur complement of the Laplacian and M the area.
 
-    It is not the map of least angle error: E_C weighs |mu|^2 by the square of the image's scale, so
-    it accepts slightly larger errors in many triangles for much smaller ones in a few large ones.
+    It is not the map of least angle error: E_C weighs abs(mu)^2 by the square of the image's scale,
+    so it accepts slightly larger errors in many triangles for much smaller ones in a few large
+    ones.
 
     Decided here: inverse iteration with six vectors and one factor, dense up to 5,000 boundary
     vertices, ends when the vector is within about `tolerance` of its limit: its residual over the

@@ -19,17 +19,17 @@ from cembench.core.errors import AlgorithmFailed
 
 Complex = NDArray[np.complex128]
 
-#: A triangle with 1 - |mu| below this is collapsed: its coefficient has no correct digits.
+#: A triangle with 1 - abs(mu) below this is collapsed: its coefficient has no correct digits.
 COLLAPSED = 1e-8
 
 
 def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> Complex:
     """Return mu (m,) of the map that takes each planar triangle ``uv[F]`` to ``V[F]``.
 
-    V is (n, 2) or (n, 3). With the first fundamental form E, F, G of that map,
-    mu = (E - G + 2 i F) / (E + G + 2 sqrt(EG - F^2)), where the root has the sign of the planar
-    area: |mu| < 1 if the orientation is kept, |mu| > 1 if the triangle is folded, NaN if the planar
-    triangle has no area.
+    V is (n, 2) or (n, 3). With the first fundamental form E, F, G of that map, ``mu = (E - G + 2 i
+    F) / (E + G + 2 sqrt(EG - F^2))``, where the root has the sign of the planar area: ``|mu| < 1``
+    if the orientation is kept, ``|mu| > 1`` if the triangle is folded, NaN if the planar triangle
+    has no area.
     """
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
@@ -43,9 +43,9 @@ def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> ND
     """Return the ratio of the largest to the smallest stretch of each triangle (m,), at least 1.
 
     Infinite if an image has no area. The map is that between ``uv[F]`` and ``V[F]``. The ratio is
-    (1 + |mu|) / |1 - |mu||, with mu as in :func:`beltrami_coefficients`, computed as
-    (1 + |mu|)^2 / (1 - |mu|^2) with the ratio of the areas as the root. No nearly equal numbers are
-    subtracted, so slivers cost no digits.
+    ``(1 + |mu|) / |1 - |mu||``, with mu as in :func:`beltrami_coefficients`, computed as
+    ``(1 + |mu|)^2 / (1 - |mu|^2)`` with the ratio of the areas as the root. No nearly equal numbers
+    are subtracted, so slivers cost no digits.
     """
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
@@ -75,7 +75,7 @@ def _first_fundamental_form(
 
 
 def unfolded(mu: Complex) -> Complex:
-    """Return mu after reversing folded triangles: 1 / conj(mu) where |mu| > 1."""
+    """Return mu after reversing folded triangles: ``1 / conj(mu)`` where ``|mu| > 1``."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(np.abs(mu) > 1, 1 / np.conj(mu), mu)
 
@@ -84,10 +84,11 @@ def generalised_weights(uv: Complex, F: NDArray[np.int64], mu: Complex) -> NDArr
     """Return the edge weights (m, 3) for which maps with coefficients mu are harmonic.
 
     Weights belong to the opposite edges. They assemble (`laplacian_of_weights`) into the
-    generalised Laplacian, the stiffness matrix of -div(A grad) on the planar triangles ``uv[F]``,
-    with A = [[a, b], [b, c]], a = |1 - mu|^2 / d, b = -2 Im mu / d, c = |1 + mu|^2 / d, d = 1 -
-    |mu|^2; mu = 0 gives half the cotangents of the plane. A folded triangle uses its coefficient
-    `unfolded`, which keeps A positive. Not finite if a planar triangle has no area or |mu| = 1.
+    generalised Laplacian, the stiffness matrix of ``-div(A grad)`` on the planar triangles
+    ``uv[F]``, with ``A = [[a, b], [b, c]]``, ``a = |1 - mu|^2 / d``, ``b = -2 Im mu / d``, ``c = |1
+    + mu|^2 / d`` and ``d = 1 - |mu|^2``; mu = 0 gives half the cotangents of the plane. A folded
+    triangle uses its coefficient `unfolded`, which keeps A positive. Not finite if a planar
+    triangle has no area or ``|mu| = 1``.
     """
     mu = unfolded(mu)
     edge = [uv[F[:, (c + 2) % 3]] - uv[F[:, (c + 1) % 3]] for c in range(3)]

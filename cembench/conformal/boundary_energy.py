@@ -8,7 +8,7 @@ derivative along dz is Re(dz^* G), and the second derivative is Re(dz^* (S - A''
 Re(G^* d^2 z). So Newton steps can be taken.
 
 S and its inverse cost B^2 operations for B boundary vertices. S is also the preconditioner: on the
-disk the Hessian's Fourier mode k has |k| - 1 where S has |k|.
+disk the Hessian's Fourier mode k has ``|k| - 1`` where S has ``|k|``.
 
 The Moebius maps of the disk preserve conformality, but the energy of a polygon only nearly. They
 are therefore held fixed by a *gauge*: weights w with sum 1 for which sum w z = 0.
@@ -133,10 +133,10 @@ def minimise(
 
 
 def moebius_descent(here: EnergyModel, leash: float) -> complex:
-    """Return the a, |a| <= `leash`, whose Moebius map of the disk lowers the energy most.
+    """Return the a, ``|a| <= leash``, whose Moebius map of the disk lowers the energy most.
 
     The map is z -> (z - a) / (1 - conj(a) z). By the second-order model of E_C in a: z moves by
-    -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + ....
+    ``-a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + ...``.
     """
     z, G = here.domain.points, here.residual
     squared = z * z

@@ -77,7 +77,7 @@ def on_circle(f_b: Complex) -> Complex:
 
 
 def inverted(f: Complex) -> Complex:
-    """Return F / |f|^2 (Eq. 30); zero stays zero."""
+    """Return ``F / |f|^2`` (Eq. 30); zero stays zero."""
     squared = (f * np.conj(f)).real
     return np.divide(f, squared, out=np.zeros_like(f), where=squared > 0)
 

@@ -245,7 +245,7 @@ class MapFigures:
 
     @cached_property
     def beltrami(self) -> Real:
-        """|mu| of every triangle, (m,): 0 if conformal, 1 if collapsed; folds count as reversed."""
+        """Modulus of mu of every triangle, (m,): 0 if conformal, 1 if collapsed; folds reversed."""
         K = self.dilatations
         with np.errstate(invalid="ignore"):
             mu = (K - 1) / (K + 1)
@@ -253,7 +253,7 @@ class MapFigures:
 
     @cached_property
     def beltrami_mean(self) -> float:
-        """Mean of |mu| over the surface's area."""
+        """Mean of the modulus of mu over the surface's area."""
         areas = surface_areas(self.mesh)
         return float(areas @ self.beltrami / areas.sum())
 

@@ -68,9 +68,9 @@ def disk_patch(angles: Real) -> Real:
     """Return P of a round disk with rim vertices at these angles (k,), increasing within one turn.
 
     Exact for values that are linear in the angle between neighbours. With u' constant on arcs, u^T
-    P u = -(1/pi) times the double integral of u'(s) u'(t) log|2 sin((s - t)/2)|, of which a second
-    antiderivative is known (`sum_of_cosines`). Up to that interpolation it is invariant under
-    Moebius maps of the disk.
+    P u = -(1/pi) times the double integral of u'(s) u'(t) log abs(2 sin((s - t)/2)), of which a
+    second antiderivative is known (`sum_of_cosines`). Up to that interpolation it is invariant
+    under Moebius maps of the disk.
     """
     ends = np.append(angles, angles[0] + 2 * np.pi)
     table = sum_of_cosines(ends[:, None] - ends[None, :])
@@ -86,8 +86,8 @@ def disk_patch(angles: Real) -> Real:
 def sum_of_cosines(x: Real) -> Real:
     """Return the sum over k >= 1 of (cos(k x) - 1) / k^3 to rounding errors, also for small x.
 
-    Its second derivative is log|2 sin(x / 2)|: x^2 (log x / 2 - 3 / 4) minus a power series in x^2
-    with coefficients |B_2k| / (2k (2k + 2)!), B the Bernoulli numbers.
+    Its second derivative is log abs(2 sin(x / 2)): x^2 (log x / 2 - 3 / 4) minus a power series in
+    x^2 with coefficients abs(B_2k) / (2k (2k + 2)!), B the Bernoulli numbers.
     """
     x = np.abs(x) % (2 * np.pi)
     x = np.minimum(x, 2 * np.pi - x)

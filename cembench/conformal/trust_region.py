@@ -19,7 +19,7 @@ Linear = Callable[[Real], Real]
 class Step:
     """A step p, its predicted decrease, its length and the number of products.
 
-    `decrease` is -(g p + p H p / 2) > 0; `length` is the norm |p|_M of the preconditioner M;
+    `decrease` is -(g p + p H p / 2) > 0; `length` is the norm of p in the preconditioner M;
     `at_edge` is whether the trust region's radius cut it short.
     """
 
@@ -39,7 +39,7 @@ def newton_step(
     accuracy: float,
     most: int = 200,
 ) -> Step:
-    """Return a step p with |p|_M <= radius that makes g p + p H p / 2 small.
+    """Return a step p of norm at most `radius` that makes g p + p H p / 2 small.
 
     Parameters
     ----------

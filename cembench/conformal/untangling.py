@@ -1,9 +1,9 @@
 """Lay out patches of a planar map without folds, with everything around them fixed.
 
-For the map of a triangle with derivatives f_z and f_zbar, let N = |f_z|^2 + |f_zbar|^2, and let
-D = |f_z|^2 - |f_zbar|^2 be its Jacobian, both in units of the local N. The objective is
+For the map of a triangle with derivatives f_z and f_zbar, let ``N = |f_z|^2 + |f_zbar|^2``, and let
+``D = |f_z|^2 - |f_zbar|^2`` be its Jacobian, both in units of the local N. The objective is::
 
-    the mean of 2 |f_zbar|^2 + BARRIER (N + AREA) / chi(D), chi(D) = (D + sqrt(D^2 + eps^2)) / 2.
+    the mean of 2 |f_zbar|^2 + BARRIER (N + AREA) / chi(D), chi(D) = (D + sqrt(D^2 + eps^2)) / 2
 
 The first term is the density of the conformal energy, so that unfolded parts hardly change. The
 second term is a barrier against folds. chi is positive everywhere, so the barrier is finite for a

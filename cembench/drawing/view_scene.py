@@ -29,7 +29,7 @@ Complex = NDArray[np.complex128]
 MOST = 50_000
 #: Triangles of all surfaces on one page together, to keep it small; each gets some.
 TOGETHER, LEAST = 200_000, 5_000
-#: Ends of the colour scales: degrees, |mu|, and powers of two of the area scaling.
+#: Ends of the colour scales: degrees, abs(mu), and powers of two of the area scaling.
 DEGREES, MU, DOUBLINGS = 10.0, 0.3, 6.0
 #: Up to this many maps, image coordinates are float32, for detail inside fingers.
 FEW = 2

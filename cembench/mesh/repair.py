@@ -9,18 +9,17 @@ The order of the steps; each may rely on the previous ones and undoes none of th
 4. *Degenerate triangles* are collapsed (two corners nearly coincide), flipped with their neighbour
    over the longest edge (three corners on a line: dropping such a triangle would leave a crack), or
    dropped if they have no neighbour there.
-5. *Duplicate triangles*: of those with the same three vertices, the first is kept. 6. *Non-manifold
-edges and vertices* are split. At an edge with more than two triangles, the two that
-   continue each other most smoothly stay connected, so a fin is separated and the sheet under it
-   stays whole.
+5. *Duplicate triangles*: of those with the same three vertices, the first is kept.
+6. *Non-manifold edges and vertices* are split. At an edge with more than two triangles, the two
+   that continue each other most smoothly stay connected, so a fin is separated and the sheet under
+   it stays whole.
 7. *Orientation*: all triangles of a piece as most of them are, and closed pieces outwards. A
    one-sided surface is cut where its triangles contradict each other. This follows the splitting,
    which decides what the pieces are.
 8. *Components*: the one with most triangles is kept, or all of them as separate surfaces. Fins and
    fragments that were separated before are dropped here.
 9. *Ears*, triangles with two sides on the boundary, whose tip has no interior neighbour, are
-dropped
-   until there are none.
+   dropped until there are none.
 10. *Holes* with at most a given number of edges are filled, if requested; the longest loop stays
     open.
 11. *Isolated vertices* are removed last, whatever isolated them.
