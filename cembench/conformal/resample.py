@@ -206,5 +206,5 @@ def _check_disk(mesh: TriangleMesh, z: Complex) -> None:
         why = f"the surface has {len(mesh.loops)} boundaries"
     raise ParameterError(
         f"the map of {mesh.name} is not onto the disk: {why}. Use an algorithm whose target is the "
-        "disk, as direct-cem on a surface with one boundary."
+        "disk, such as direct-cem on a surface with one boundary."
     )
