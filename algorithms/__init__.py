@@ -1,1 +1,1 @@
-"""The algorithms, one a file, found by the entry points ``cembench.algorithms``."""
+"""The algorithms, one per file, found by the entry points ``cembench.algorithms``."""

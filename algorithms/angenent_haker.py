@@ -1,4 +1,4 @@
-"""The linear map with a pole: what CEM starts from, with its natural boundary."""
+"""The linear map with a pole, from which CEM starts, with its natural boundary."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ from cembench.registry import algorithm
     usual=False,
 )
 def angenent_haker(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
-    """Where does the linear map with a pole in the middle put the boundary?
+    """Map a disk by the linear map with a pole in the middle, whose boundary is natural.
 
-    Eqs. 11-14 and 18: L f = b with a dipole in the triangle nearest to the mean vertex and nothing
-    prescribed on the boundary, whose image is therefore natural, nearly a circle (Eq. 12). This is
-    what CEM starts from, before it puts the boundary on the unit circle (16) and iterates; what
-    these add can be read off beside it.
+    Eqs. 11-14 and 18: L f = b with a dipole in the triangle nearest to the mean vertex and no
+    boundary condition; the image of the boundary is therefore natural, and nearly a circle (Eq.
+    12). CEM starts from this map, before it puts the boundary on the unit circle (16) and iterates.
+    Comparing the two shows what these steps add.
 
     Decided here: f takes the surface to the outside of the curve, with folded triangles at the
-    pole, and is far from conformal round it, so it is no map to measure. As in CEM's own start, the
-    boundary alone is kept, mirrored so that it runs counter-clockwise, its mean moved to 0 (15),
-    and the interior is one Dirichlet solve out of the same factor. The image is scaled to area pi;
-    folds inside are mended as in LSCM (`fold_repairs`).
+    pole, and is far from conformal around it, so it is not useful as a map. As in CEM's own start,
+    only the boundary is kept, mirrored so that it runs counter-clockwise, with its mean moved to 0
+    (15), and the interior is one Dirichlet solve with the same factor. The image is scaled to area
+    pi; folds inside are repaired as in LSCM (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))

@@ -34,18 +34,19 @@ def cem(
     """Map a disk by Algorithm 1 of the paper.
 
     Faithful to Algorithm 1: start (14), (18), (15), (16); iteration (30), (24), (25), (22), or (23)
-    for (30) with ``inversion=False``. Decided here, where the paper is silent: the start's triangle
-    is the one whose barycentre is nearest to the mean vertex; iteration ends after the first one
-    that changes E_C by less than `tolerance`, or after `max_iterations`, and the last iterate is
-    the map, also where E_C rose on the way; `best` returns the iterate of least E_C instead, where
-    the history then ends (`iterations_dropped` counts those after it); a vertex at the origin,
-    which has no inverse, counts as zero in (30); where (30) would make boundary vertices change
-    places, which folds the map, that step is (23), and iteration ends where (23) would do so too
-    (`order_kept` counts these steps; 0 on most surfaces); where negative cotangent weights still
-    fold the final map, patches around the folds are laid out anew (`fold_repairs`).
-    With the vertices ordered interior first, boundary last, and the last one pinned, a single
-    Cholesky factor serves the start, and its leading block all Dirichlet solves. `delaunay` takes
-    the weights of the intrinsic Delaunay triangulation.
+    instead of (30) with ``inversion=False``. With the vertices ordered interior first, boundary
+    last, and the last one pinned, a single Cholesky factor serves the start, and its leading block
+    all Dirichlet solves. `delaunay` takes the weights of the intrinsic Delaunay triangulation.
+
+    Decided here, where the paper is silent: the start's triangle is the one whose barycentre is
+    nearest to the mean vertex. The iteration ends after the first step that changes E_C by less
+    than `tolerance`, or after `max_iterations`, and the last iterate is the map, even if E_C
+    increased on the way; `best` returns the iterate of least E_C instead, where the history then
+    ends (`iterations_dropped` counts those after it). A vertex at the origin, which has no inverse,
+    counts as zero in (30). If (30) would make boundary vertices change places, which folds the map,
+    that step is (23), and the iteration ends if (23) would do so too (`order_kept` counts these
+    steps; 0 on most surfaces). If negative cotangent weights still fold the final map, patches
+    around the folds are laid out again (`fold_repairs`).
     """
     return map_from_triangle(
         mesh,
@@ -68,7 +69,7 @@ def map_from_triangle(
     best: bool = False,
     delaunay: bool = False,
 ) -> Parameterization:
-    """Map by CEM with the start's triangle given by hand; None for the usual one."""
+    """Map by CEM starting from the given triangle; None for the usual one."""
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
     ring = Cholesky(bordered.L_bb)

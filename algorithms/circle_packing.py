@@ -24,9 +24,9 @@ from cembench.registry import algorithm
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: How many steps before are used to extrapolate, and by how much, in logarithms, at most.
+#: Number of earlier steps used for extrapolation, and its largest size in logarithms.
 MEMORY, FARTHEST = 8, 2.0
-#: Bisection steps for the scale at which the boundary's circles close.
+#: Bisection steps for the scale at which the boundary's circles close up.
 BISECTIONS = 200
 
 
@@ -46,21 +46,21 @@ def circle_packing(
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 500,
     gauge: Gauge = "boundary",
 ) -> Parameterization:
-    """What does the graph of the mesh alone tell of its conformal map?
+    """Map a disk by the circle packing of its graph, one circle per vertex.
 
-    Ignores geometry: the maximal packing of the unit disk, one circle a vertex, tangent where there
-    is an edge, depends on which vertices are joined and on nothing else. It approaches a conformal
-    map where triangles are nearly regular, and shows elsewhere what ignoring them costs.
-    In turn, the circles of the boundary are laid round the unit circle, touching it from inside;
-    the centres inside are found by one solve with weights from the radii; and radii are taken from
-    the angles and sectors at the centres.
+    Ignores geometry: the maximal packing of the unit disk, in which circles of adjacent vertices
+    are tangent, depends on the edges of the mesh and on nothing else. It approximates a conformal
+    map where triangles are nearly regular; elsewhere it shows the price of ignoring their shape. In
+    each step the circles of the boundary are laid around the unit circle, touching it from inside;
+    the centres inside are found by one solve with weights from the radii; and new radii are
+    computed from the angles and sectors at the centres.
 
     Decided here: the fixed point is reached by extrapolation over eight steps (Anderson) in the
-    logarithms of the radii. It ends when the angles of the circles' triangles round every interior
-    vertex sum to 2 pi within `tolerance`, radians (`angle_sum`), and fails after `max_iterations`.
-    The image is that of the centres, but a vertex of the boundary goes to where its circle touches
-    the unit circle; a Moebius map, under which a packing stays one, brings it into the `gauge` of
-    direct-cem. Folds are repaired as in CEM (`fold_repairs`).
+    logarithms of the radii. The iteration ends when the angles of the circles' triangles around
+    every interior vertex sum to 2 pi within `tolerance`, radians (`angle_sum`), and fails after
+    `max_iterations`. The image consists of the centres, but a boundary vertex goes to the point
+    where its circle touches the unit circle. A Moebius map, which preserves packings, moves the
+    image into the `gauge` of direct-cem. Folds are repaired as in CEM (`fold_repairs`).
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so its circles have no freedom")
@@ -75,9 +75,9 @@ def circle_packing(
 
 
 def _touching(mesh: DiskMesh, z: Complex, radii: Real) -> Complex:
-    """Centres inside, as hyperbolic ones, and points of contact on the boundary.
+    """Return the hyperbolic centres inside and the points of contact on the boundary.
 
-    The hyperbolic centre of a circle, not the Euclidean one, goes with it under Moebius maps.
+    The hyperbolic centre of a circle, unlike the Euclidean one, is preserved by Moebius maps.
     """
     uv = z.copy()
     uv[mesh.boundary] /= np.abs(uv[mesh.boundary])
@@ -89,7 +89,7 @@ def _touching(mesh: DiskMesh, z: Complex, radii: Real) -> Complex:
 
 
 class _Packing:
-    """The map from radii to better ones; `radii` are those of the last centres."""
+    """The map from radii to better radii; `radii` are those of the latest centres."""
 
     def __init__(self, mesh: DiskMesh) -> None:
         self.mesh = mesh
@@ -121,7 +121,7 @@ class _Packing:
         return z
 
     def better(self, z: Complex) -> Real:
-        """Logarithms of the radii whose sectors at the centres have the areas that they should."""
+        """Return the log radii for which the sectors at the centres have the right areas."""
         F, n = self.mesh.F, self.mesh.n
         with phase("angles"):
             sides = side_lengths(np.stack([z.real, z.imag], axis=1), F)
@@ -137,7 +137,7 @@ class _Packing:
             return np.asarray(np.log(share / total) / 2)
 
     def angle_error(self, log_radii: Real) -> float:
-        """How far from 2 pi the angles of the circles' triangles are in sum, at most."""
+        """Return the largest error of the angle sum 2 pi of the circles' triangles at a vertex."""
         F = self.mesh.F
         with phase("angles"):
             R = np.exp(log_radii - log_radii.max())[F]
@@ -147,9 +147,9 @@ class _Packing:
 
 
 def _closed_ring(r: Real) -> tuple[float, Real]:
-    """The factor by which radii (B,), 1 at most, become those of a ring of circles, and its arcs.
+    """Return the factor that makes radii (B,), at most 1, those of a closed ring, and its arcs.
 
-    The circles touch the unit circle from inside and each other in turn; arcs are seen from 0.
+    The circles touch the unit circle from inside and each neighbour; arcs are seen from 0.
     """
 
     def arcs(scale: float) -> Real:
@@ -167,7 +167,7 @@ def _closed_ring(r: Real) -> tuple[float, Real]:
 
 
 def _packed(packing: _Packing, tolerance: float, most: int) -> tuple[Complex, list[float]]:
-    """Iterate to the packing: its centres, and the angle error after each step."""
+    """Iterate to the packing; return its centres, and the angle error after each step."""
     x = np.zeros(packing.mesh.n)
     points: list[Real] = []
     steps: list[Real] = []
@@ -189,7 +189,7 @@ def _packed(packing: _Packing, tolerance: float, most: int) -> tuple[Complex, li
 
 
 def _extrapolated(points: list[Real], steps: list[Real]) -> Real:
-    """Where do steps lead that shrink as these did? Anderson's mixing; the last point at first."""
+    """Return the extrapolated limit of steps (Anderson mixing); at first the last point."""
     here = points[-1]
     if len(points) < 2:
         return here

@@ -31,9 +31,9 @@ from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]
 
-#: How far out a reflected vertex may come to lie: one at the centre would go to infinity.
+#: Largest modulus of a reflected vertex; one at the centre would go to infinity.
 FARTHEST = 1e8
-#: What the public program multiplies a reflected triangle's coefficient with; exact would be 1.
+#: The public program's factor on a reflected triangle's coefficient; the exact one is 1.
 MIRRORED_SHARE = 1 / 3
 
 
@@ -51,29 +51,28 @@ def fdm(
     delaunay: bool = False,
     public_program: bool = False,
 ) -> Parameterization:
-    """Which disk map comes from correcting a harmonic one, in the half plane and by reflection?
+    """Map a disk by correcting a harmonic map, first in the half plane and then by reflection.
 
-    Faithful to the published method and to the program its authors made public: a harmonic map
-    whose boundary keeps its arc length; one correction after the Cayley transform to the upper
-    half plane; then, on the map reflected in the circle, one linear Beltrami solve and one
-    normalisation an iteration, until the mean of |mu| changes by less than `tolerance`. Taken from
-    that program where the article leaves it open: the boundary edge that goes to z = 1 has the
-    least sum of |mu| over its two ends, mu of a vertex being the mean over its triangles; a
-    reflected triangle's coefficient carries a factor 1/3; the 1 % of vertices held far out are
-    counted on the doubled surface. On Chinese Lion the published standard deviation of angles,
-    2.04, needs both of the first two (2.05 with either one left out); the third moves no printed
-    digit.
+    Faithful to the published method and to the program that its authors made public: a harmonic map
+    whose boundary keeps its arc length; one correction after the Cayley transform to the upper half
+    plane; then, on the map reflected in the circle, one linear Beltrami solve and one normalisation
+    per iteration, until the mean of abs(mu) changes by less than `tolerance`. Taken from that
+    program where the article leaves it open: the boundary edge that goes to z = 1 has the least sum
+    of abs(mu) over its two ends, with mu of a vertex the mean over its triangles; a reflected
+    triangle's coefficient carries a factor 1/3; the 1 % of vertices held far out are counted on the
+    doubled surface. On Chinese Lion the published standard deviation of angles, 2.04, needs both of
+    the first two (2.05 with either one left out); the third changes no printed digit.
 
-    Decided here: the middle of that edge is found across the cut of the argument; a start that
-    folds gives way to uniform weights; triangles that have collapsed in the plane take the
+    Decided here: the midpoint of that edge is taken across the branch cut of the argument; a start
+    that folds is replaced by uniform weights; triangles that have collapsed in the plane take the
     surface's cotangents, the limit of what their coefficients give; a vertex at the centre is
-    reflected to a modulus of 1e8. Where the last map folds, boundary vertices that changed places
-    are put in order, and patches around the folds are laid out anew (`fold_repairs` counts the
-    rounds). On meshes of a few hundred triangles, where the vertices
-    held are a large share of all, the iteration can diverge: the map returned is the iterate of the
-    least mean |mu|, and `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes
-    the weights of the intrinsic Delaunay triangulation where a solver's matrix is the surface's own
-    Laplacian: in all solves but that of the reflected map.
+    reflected to a modulus of 1e8. If the last map folds, boundary vertices that changed places are
+    put in order, and patches around the folds are laid out again (`fold_repairs` counts the
+    rounds). On meshes of a few hundred triangles, of which the held vertices are a large share, the
+    iteration can diverge: the returned map is the iterate of the least mean abs(mu), and
+    `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes the weights of the
+    intrinsic Delaunay triangulation in every solve whose matrix is the surface's own Laplacian: in
+    all but that of the reflected map.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so there is nothing to correct")
@@ -110,18 +109,19 @@ def _coefficients(mesh: DiskMesh, z: Complex) -> Complex:
 
 
 def _mean_modulus(mu: Complex) -> float:
+    """Return the mean of |mu|, with folds reversed and collapsed triangles as 1."""
     return float(np.nan_to_num(np.abs(unfolded(mu)), nan=1.0).mean())
 
 
 def _start(mesh: DiskMesh, L: sparse.csc_array) -> Complex:
-    """The harmonic map that keeps arc length; with uniform weights if that one fails."""
+    """Return the harmonic map that keeps arc length; with uniform weights if that one fails."""
     circle = arc_length_circle(mesh) * np.exp(2j * np.pi / 100)
     try:
         z = harmonic_extension(L, mesh.boundary, circle)
         if (signed_areas(z, mesh.F) > 0).all():
             return z
     except NotPositiveDefinite:
-        pass  # the uniform weights below always are
+        pass  # uniform weights, below, are always positive
     uniform = laplacian_of_weights(mesh.F, np.ones(mesh.F.shape), mesh.n)
     return harmonic_extension(uniform, mesh.boundary, circle)
 
@@ -129,9 +129,9 @@ def _start(mesh: DiskMesh, L: sparse.csc_array) -> Complex:
 def _corrected_in_half_plane(
     mesh: DiskMesh, z: Complex, L: sparse.csc_array | None, public_program: bool
 ) -> Complex:
-    """Make the map conformal but for what lies near z = 1, where it is kept ("north pole").
+    """Make the map conformal except near z = 1, where it is kept ("north pole").
 
-    L is the surface's Laplacian where that is to be solved with.
+    L is the surface's Laplacian if that is the matrix to use.
     """
     b = mesh.boundary
     p, q = _ends_of_best_edge(mesh, z)
@@ -154,7 +154,7 @@ def _corrected_in_half_plane(
 
 
 def _ends_of_best_edge(mesh: DiskMesh, z: Complex) -> tuple[complex, complex]:
-    """Where on the circle are the ends of the boundary edge with the least |mu| at them?"""
+    """Return the ends, on the circle, of the boundary edge with the least |mu| at them."""
     corners, b = mesh.F.ravel(), mesh.boundary
     mu = np.repeat(_coefficients(mesh, z), 3)
     total = np.bincount(corners, mu.real) + 1j * np.bincount(corners, mu.imag)
@@ -164,12 +164,12 @@ def _ends_of_best_edge(mesh: DiskMesh, z: Complex) -> tuple[complex, complex]:
 
 
 def _middle(p: complex, q: complex) -> complex:
-    """Return the middle of the shorter arc between two points of the unit circle."""
+    """Return the midpoint of the shorter arc between two points of the unit circle."""
     return complex(p / abs(p) * np.exp(0.5j * np.angle(q / p)))
 
 
 def _public_turn(p: complex, q: complex) -> complex:
-    """Return what the public program divides by: the angles are a and b, and it takes a + b/2."""
+    """Return the public program's divisor: for angles a and b it takes a + b/2."""
     return complex(np.exp(1j * (np.angle(p) + np.angle(q) / 2)))
 
 
@@ -180,7 +180,7 @@ def _corrected_by_reflection(
     mu: Complex,
     L: sparse.csc_array | None,
 ) -> Complex:
-    """Solve on the map and its mirror image at once, then lay the boundary on the circle."""
+    """Solve on the map and its mirror image at once, then put the boundary on the circle."""
     b = mesh.boundary
     both = np.empty(double.size, dtype=np.complex128)
     both[double.mirror] = _reflected(z)
@@ -199,7 +199,7 @@ def _corrected_by_reflection(
     z = z / max(float(np.abs(z).max()), 1.0)
     modulus = np.abs(z[b])
     if not modulus.min() > 0:
-        raise AlgorithmFailed("a boundary vertex came to lie at the centre of the map")
+        raise AlgorithmFailed("a boundary vertex is mapped to the centre")
     if L is not None:
         return harmonic_extension(L, b, z[b] / modulus)
     with phase("assembly"):
@@ -208,12 +208,13 @@ def _corrected_by_reflection(
 
 
 def _mirrored(mesh: DiskMesh, z: Complex, mu: Complex) -> Complex:
-    """Which coefficients has the map reflected in the circle, triangle by triangle?"""
+    """Return the coefficients of the map reflected in the circle, triangle by triangle."""
     turn = ((z / np.conj(_off_centre(z))) ** 2)[mesh.F].sum(axis=1)
     return np.conj(unfolded(mu)) * turn / np.maximum(np.abs(turn), np.finfo(float).tiny)
 
 
 def _off_centre(z: Complex) -> Complex:
+    """Move vertices away from the centre, to at least the inverse of `FARTHEST`."""
     z = z.copy()
     z[np.abs(z) < 1 / FARTHEST] = 1 / FARTHEST
     return z
@@ -225,5 +226,5 @@ def _reflected(z: Complex) -> Complex:
 
 
 def _largest(x: NDArray[np.float64], k: int) -> NDArray[np.int64]:
-    """The k largest entries, all but one at most."""
+    """Return the indices of the k largest entries, at most all but one."""
     return np.argsort(-x, kind="stable")[: min(k, len(x) - 1)]

@@ -26,7 +26,7 @@ from .qiem import boundary_on_circle
 
 Real = NDArray[np.float64]
 
-#: The step, as a share of the longest one at which explicit diffusion is stable.
+#: The step as a share of the largest stable step of explicit diffusion.
 SHARE = 0.9
 
 
@@ -44,19 +44,20 @@ def gu_yau(
     max_iterations: Annotated[int, Field(ge=0, le=10_000_000)] = 1_000,
     delaunay: bool = False,
 ) -> Parameterization:
-    """What does explicit diffusion of the doubled surface on the sphere reach?
+    """Map a disk by explicit diffusion of the doubled surface on the sphere.
 
-    The surface is glued to its mirror copy and mapped to the sphere; each step moves every vertex
-    against the tangential part of the Laplacian, f - dt (L f)_tangential / m, and puts it back on
-    the sphere, its mean at the middle. Slow by nature, since dt is bound by the smallest triangles:
-    that is why the quasi-implicit method (qiem) exists, whose start, centring and end it shares.
+    The surface is glued to its mirror copy and mapped to the sphere. Each step moves every vertex
+    against the tangential part of the Laplacian, f - dt (L f)_tangential / m, and projects it back
+    to the sphere, with the mean moved to the centre. The method is slow by nature, since the
+    smallest triangles limit dt: the quasi-implicit method (qiem) exists for that reason, and shares
+    its start, centring and final steps with this one.
 
-    Decided here: m is half of the diagonal of L, so that all frequencies are equally near their
-    limit, and dt is 0.9 of the stable 1. It ends when a step lowers the energy by less than
-    `tolerance` of it (`stopped`: "energy") or after `max_iterations` ("iterations"), with the map
-    reached so far: on fine meshes that is what it had to start with, a little smoothed. The circle
-    between the copies is laid on the unit circle and the interior solved for once more, as in QIEM.
-    Folds that remain are repaired as in CEM (`fold_repairs`).
+    Decided here: m is half of the diagonal of L, so that all frequencies are equally close to their
+    limit, and dt is 0.9 of the stable limit 1. The iteration ends when a step lowers the energy by
+    less than the share `tolerance` (`stopped`: "energy") or after `max_iterations` ("iterations"),
+    with the map reached so far: on fine meshes that is the start, slightly smoothed. The circle
+    between the copies is put on the unit circle and the interior is solved for once more, as in
+    QIEM. Remaining folds are repaired as in CEM (`fold_repairs`).
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")

@@ -1,4 +1,4 @@
-"""Harmonic map with the boundary laid on the circle by arc length."""
+"""Harmonic map with the boundary on the circle, spaced by arc length."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from cembench.registry import algorithm
     conformal=False,
 )
 def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
-    """What does one Dirichlet solve give when the boundary keeps its arc length?
+    """Map a disk by one Dirichlet solve, with the boundary spaced by arc length.
 
-    The cheapest map to the disk and the yardstick for all others: nothing adapts the boundary, so
+    The cheapest map to the disk, and the baseline for all others: nothing adapts the boundary, so
     it is conformal only where the arc lengths happen to be right. `delaunay` takes the weights of
-    the intrinsic Delaunay triangulation. Decided here: where cotangent weights are negative and the
-    map folds, patches around the folds are laid out anew (`fold_repairs`).
+    the intrinsic Delaunay triangulation. Decided here: if cotangent weights are negative and the
+    map folds, patches around the folds are laid out again (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     z = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))

@@ -1,4 +1,4 @@
-"""The harmonic map of a surface with holes, its holes filled for the purpose."""
+"""The harmonic map of a surface with holes, which are filled temporarily."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ from cembench.registry import algorithm
 def harmonic_filled(
     mesh: HoledMesh, *, outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None
 ) -> Parameterization:
-    """What does one Dirichlet solve give when the holes are filled first, and opened again?
+    """Map a surface with holes by one Dirichlet solve, with its holes filled temporarily.
 
-    What one does without Koebe's method, and the yardstick for it: every hole gets a fan to its
-    centroid, the outer boundary (that of the vertex `outer`, or the widest) keeps its arc length
-    on the unit circle. Nothing makes the holes round: the record's circularity says how far from
-    circles they are. Folds are mended on the filled surface (`fold_repairs`).
+    The simple alternative to Koebe's method, and the baseline for it: every hole gets a fan to its
+    centroid, and the outer boundary (that of the vertex `outer`, or the widest) keeps its arc
+    length on the unit circle. Nothing makes the holes round: the record's circularity measures how
+    far from circles they are. Folds are repaired on the filled surface (`fold_repairs`).
     """
     _, holes = mesh.outer_and_holes(outer)
     disk = filled(mesh, holes)

@@ -1,4 +1,4 @@
-"""Tutte's map: every interior vertex in the middle of its neighbours."""
+"""Tutte's map: every interior vertex is the mean of its neighbours."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from cembench.registry import algorithm
     conformal=False,
 )
 def harmonic_tutte(mesh: DiskMesh) -> Parameterization:
-    """What does one Dirichlet solve give that knows the graph of the mesh but not its geometry?
+    """Map a disk by one Dirichlet solve that uses the graph of the mesh but not its geometry.
 
-    As harmonic-circle, with the weight 1 on every edge in place of cotangents (the paper's Remark 5
-    allows any positive weights). The boundary keeps its arc length. No triangle can fold but those
-    whose corners all lie on the boundary (`fold_repairs`).
+    As harmonic-circle, with the weight 1 on every edge instead of cotangents (the paper's Remark 5
+    allows any positive weights). The boundary keeps its arc length. The only triangles that can
+    fold are those with all corners on the boundary (`fold_repairs`).
     """
     with phase("laplacian"):
         # An interior edge counts from both of its triangles.

@@ -1,4 +1,4 @@
-"""Linear disk map: the doubled surface goes to the sphere, half of it to the disk."""
+"""Linear disk map: half of a map of the doubled surface to the sphere."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ from cembench.registry import algorithm
 
 Complex = NDArray[np.complex128]
 
-#: How many vertices nearest to the south pole keep their place while the north is corrected.
+#: Number of vertices nearest to the south pole that are held while the north is corrected.
 HELD = 50
-#: How near to the south pole a vertex may lie when the sphere is projected from there.
+#: Minimal distance of a vertex from the south pole when projecting from there.
 NEAREST = 1e-8
 
 
@@ -41,24 +41,24 @@ NEAREST = 1e-8
     source="Choi & Lui, A linear formulation for disk conformal parameterization (2015)",
 )
 def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
-    """Which disk map is half of a conformal map from the doubled surface to the sphere?
+    """Map a disk by half of a conformal map of the doubled surface to the sphere.
 
-    Faithful to the published method and to the program its authors made public: the doubled
-    surface is mapped to the plane harmonically but for its most regular triangle, the two poles
+    Faithful to the published method and to the program that its authors made public: the doubled
+    surface is mapped to the plane harmonically except at its most regular triangle, the two poles
     are balanced, the distortion at the north pole is corrected with the 50 vertices nearest to the
     south pole held, a Moebius map through three boundary vertices and the projection of one half
-    give the disk, and a last solve with the boundary on the circle composes away what distortion
-    is left. A handful of linear solves, no iteration.
+    give the disk, and a last solve with the boundary on the circle removes the remaining distortion
+    by composition. A handful of linear solves, no iteration.
 
     Decided here: the first of the three boundary vertices is the one farthest from the mean vertex,
     so that the numbering plays no role, where the program takes the first of its list (on Chinese
-    Lion 242 of the 245 choices give the published digits, this one among them); the disk's width
-    is that of its boundary; a vertex at the very south pole is moved by 1e-8; triangles that have
-    collapsed in the plane take the surface's cotangents, the limit of what their coefficients
-    give. Where the last map folds, boundary vertices that changed places are put in order, and
-    patches around the folds are laid out anew (`fold_repairs` counts the rounds).
-    `delaunay` takes the weights of the intrinsic Delaunay triangulation in every solve: both linear
-    Beltrami solvers have the surface's own Laplacian as their matrix.
+    Lion 242 of the 245 choices give the published digits, this one among them); the disk's width is
+    that of its boundary; a vertex exactly at the south pole is moved by 1e-8; triangles that have
+    collapsed in the plane take the surface's cotangents, the limit of what their coefficients give.
+    If the last map folds, boundary vertices that changed places are put in order, and patches
+    around the folds are laid out again (`fold_repairs` counts the rounds). `delaunay` takes the
+    weights of the intrinsic Delaunay triangulation in every solve: both linear Beltrami solvers
+    have the surface's own Laplacian as their matrix.
     """
     return map_numbered(mesh, farthest_from_mean(mesh), delaunay=delaunay)
 
@@ -66,16 +66,17 @@ def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
 def map_numbered(
     mesh: DiskMesh, first: int, *, mirrored: bool = False, delaunay: bool = False
 ) -> Parameterization:
-    """Map by LDM with what the numbering of a mesh decides given by hand.
+    """Map by LDM with the choices that depend on the numbering of a mesh given explicitly.
 
     Parameters
     ----------
     mesh : DiskMesh
         The surface.
     first : int
-        Which vertex of the boundary loop is the first of the three, counted from 0.
+        Index in the boundary loop of the first of the three vertices, counted from 0.
     mirrored : bool
-        Whether the most regular triangle is taken from the mirror copy, where it is as regular.
+        Whether the most regular triangle is taken from the mirror copy, where it is equally
+        regular.
     delaunay : bool
         As for `ldm`.
 
@@ -109,9 +110,9 @@ def _weights(z: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArra
 def _corrected_at_north(
     double: DoubledSurface, V: NDArray[np.float64], z: Complex, L: sparse.csc_array | None
 ) -> Complex:
-    """Make the map conformal at the north pole too; the result is seen from the south pole.
+    """Make the map conformal at the north pole too; return it as projected from the south pole.
 
-    L is the doubled surface's Laplacian where that is to be solved with.
+    L is the doubled surface's Laplacian if that is the matrix to use.
     """
     near = np.abs(z)
     held = np.argsort(near, kind="stable")[: min(HELD, len(z) - 1)]
@@ -123,13 +124,13 @@ def _corrected_at_north(
 
 
 def farthest_from_mean(mesh: DiskMesh) -> int:
-    """Which vertex of the boundary loop lies farthest from the mean vertex?"""
+    """Return the index in the boundary loop of the vertex farthest from the mean vertex."""
     apart = np.linalg.norm(mesh.V[mesh.boundary] - mesh.V.mean(axis=0), axis=1)
     return int(np.argmax(apart))
 
 
 def _laid_on_disk(mesh: DiskMesh, w: Complex, first: int) -> Complex:
-    """Carry the half of the sphere that w shows to the disk, its boundary to the circle."""
+    """Map one half of the sphere, given by w, to the disk, and its boundary to the circle."""
     b = np.roll(mesh.boundary, -first)
     loop = to_sphere(w[b], "south")
     far = int(np.argmax(np.linalg.norm(loop - loop[0], axis=1)))
@@ -139,20 +140,20 @@ def _laid_on_disk(mesh: DiskMesh, w: Complex, first: int) -> Complex:
     S = to_sphere(w)
     S[:, 2] -= S[b, 2].mean()
     z = to_plane(S, "south" if S[:, 2].mean() >= 0 else "north")
-    z[~np.isfinite(z)] = 0.0  # a vertex at the pole itself; the last solve will place it
+    z[~np.isfinite(z)] = 0.0  # a vertex at the pole itself; the last solve places it
     z *= 2 / np.ptp(z.real[b])
     z -= complex(z.real[b].min(), z.imag[b].min()) + (1 + 1j)
     if polygon_area(z[b]) < 0:
         z = -np.conj(z)
     modulus = np.abs(z[b])
     if not modulus.min() > 0:
-        raise AlgorithmFailed("a boundary vertex came to lie at the centre of the disk")
+        raise AlgorithmFailed("a boundary vertex is mapped to the centre of the disk")
     z[b] /= modulus
     return z
 
 
 def _congruent(corners: NDArray[np.float64]) -> Complex:
-    """A triangle of the plane with the sides of this one (3, 3), its first about 0 on the axis."""
+    """Return a congruent planar copy of a triangle (3, 3), its first side about 0 on the axis."""
     a, b, c = corners
     length = float(np.linalg.norm(b - a))
     axis = (b - a) / length

@@ -1,4 +1,4 @@
-"""Least squares conformal map: the conformal energy minimised with a free boundary."""
+"""Least squares conformal map: minimal conformal energy with a free boundary."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from cembench.registry import algorithm
     source="Levy, Petitjean, Ray & Maillot 2002; Desbrun, Meyer & Alliez 2002",
 )
 def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
-    """Which free-boundary map has the least conformal energy once two vertices are pinned?
+    """Map a disk with a free boundary and least conformal energy, with two vertices pinned.
 
     E_C = E_D - A (Eq. 7) is a quadratic form in (u, v); pinning two vertices makes it positive
     definite, and one Cholesky solve minimises it. Decided here: the pins are the boundary vertex
-    farthest from the mean vertex and the boundary vertex farthest from that one, laid at -1 and 1;
-    the image is then scaled to area pi, so that its energies stand beside those of a disk, though
-    its angles are lower for want of a boundary condition. Where negative cotangent weights fold the
-    interior, patches around the folds are laid out anew (`fold_repairs`); where that does not help,
-    as with a boundary that crosses itself, folds stay.
+    farthest from the mean vertex and the boundary vertex farthest from that one, at -1 and 1; the
+    image is then scaled to area pi, so that its energies can be compared with those of a disk,
+    although its angle errors are lower for lack of a boundary condition. If negative cotangent
+    weights fold the interior, patches around the folds are laid out again (`fold_repairs`); if that
+    does not help, as with a boundary that crosses itself, folds remain.
     """
     pins = far_apart(mesh)
     uv = pinned_map(laplacian(mesh, delaunay=delaunay), mesh.boundary, pins)

@@ -30,15 +30,15 @@ Real = NDArray[np.float64]
     conformal=False,
 )
 def mean_value(mesh: DiskMesh) -> Parameterization:
-    """What do weights give that know the geometry and are always positive?
+    """Map a disk by mean value weights, which use the geometry and are always positive.
 
-    As harmonic-circle, with the weight (tan(a / 2) + tan(b / 2)) / |ij| from i to j, a and b the
-    angles at i beside that edge. They are positive, so that nothing folds but triangles whose
-    corners all lie on the boundary, and exact on flat surfaces; they are not symmetric, so this is
-    no minimum of an energy. The boundary keeps its arc length.
+    As harmonic-circle, with the weight (tan(a / 2) + tan(b / 2)) / l_ij from i to j, a and b the
+    angles at i on either side of that edge. The weights are positive, so that only triangles with
+    all corners on the boundary can fold, and they reproduce flat surfaces exactly. They are not
+    symmetric, so the map does not minimise an energy. The boundary keeps its arc length.
 
-    Decided here: the matrix is not symmetric, so that the shared Cholesky class cannot factor it;
-    it is factored by SuperLU with an ordering for symmetric patterns. Folds are mended as in LSCM
+    Decided here: the matrix is not symmetric, so the shared Cholesky class cannot factor it;
+    SuperLU factors it with an ordering for symmetric patterns. Folds are repaired as in LSCM
     (`fold_repairs`).
     """
     if not len(mesh.interior):
@@ -64,11 +64,12 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
 
 
 def _factored(A: sparse.csc_array) -> linalg.SuperLU:
+    """Factor the matrix of mean value weights."""
     try:
         return linalg.splu(
             A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
-    except RuntimeError as error:  # all that SuperLU raises
+    except RuntimeError as error:  # the only error of SuperLU
         raise AlgorithmFailed(
             "the mean value weights make a matrix that cannot be factored; the mesh has triangles "
             "too thin for them"
@@ -76,14 +77,14 @@ def _factored(A: sparse.csc_array) -> linalg.SuperLU:
 
 
 def _weights(mesh: DiskMesh) -> sparse.csr_array:
-    """The mean value weight from i to j, (n, n)."""
+    """Return the mean value weights (n, n) from i to j."""
     F = mesh.F
     dots, double_area = corner_products(mesh.V, F)
     after, before = F[:, [1, 2, 0]], F[:, [2, 0, 1]]
     to_after = np.linalg.norm(mesh.V[after] - mesh.V[F], axis=2)
     to_before = np.linalg.norm(mesh.V[before] - mesh.V[F], axis=2)
     # tan(a / 2) = sin a / (1 + cos a) = (1 - cos a) / sin a, multiplied by the sides' lengths; the
-    # second where the angle is above 90 degrees, so that nothing cancels.
+    # second form for angles above 90 degrees, to avoid cancellation.
     sides, sine = to_after * to_before, double_area[:, None]
     tangent = np.where(dots > 0, sine, sides - dots) / np.where(dots > 0, sides + dots, sine)
     i = np.concatenate([F.ravel(), F.ravel()])

@@ -28,8 +28,8 @@ from cembench.registry import algorithm
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-#: The time step: where it starts, what it is multiplied by after a step and after a failed one,
-#: the share of its theoretical bound that it may reach, and where it counts as zero.
+#: The time step: its initial value, its factors after a step and after a failed step, its limit as
+#: a share of its theoretical bound, and the value below which it counts as zero.
 FIRST, GROWTH, CUT, SHARE, LEAST = 0.1, 1.5, 0.5, 0.9, 1e-6
 
 
@@ -46,26 +46,26 @@ def qiem(
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 200,
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which disk map is half of the limit of the heat flow of the doubled surface on the sphere?
+    """Map a disk by half of the limit of the heat flow of the doubled surface on the sphere.
 
     A quasi-implicit heat flow in the manner of Huang et al.: the surface is glued to its mirror
-    copy and mapped to the sphere, df/dt = -(L f)_tangential, by steps
-    (I + dt (L - D)) f_new = f_old with D the diagonal of <L f, f> at the old map. The matrix
-    changes at every step, its pattern does not. The start is the planar map that is harmonic but
-    for the most regular triangle, on the sphere with its poles balanced.
+    copy and mapped to the sphere, df/dt = -(L f)_tangential, by steps (I + dt (L - D)) f_new =
+    f_old with D the diagonal of <L f, f> at the old map. The matrix changes in every step, its
+    pattern does not. The start is the planar map that is harmonic except at the most regular
+    triangle, on the sphere with balanced poles.
 
-    Decided here: the mass matrix is the identity. dt starts at 0.1, grows by half after each step,
-    and is halved, the step being repeated, where the energy would rise or the matrix is not
-    positive definite; it stays below 0.9 n / sum(D), beyond which the matrix never is. The flow
-    has converged when, dt having met such a limit, a step lowers the energy by less than
-    `tolerance` of it. After each step the points are put on the sphere and their mean at its middle
-    by a Moebius map; to subtract the mean and divide by the norm does that to first order, but
-    raises the energy of uneven maps. The circle between the copies is turned to a parallel, its
-    half projected from the far pole and scaled to the unit disk, the boundary laid on the circle
-    and the interior solved for once more, which settles the crowded regions that the flow is slow
-    to reach. Folds that remain are repaired as in FDM (`fold_repairs`). The energies recorded are
-    half of the sphere's, less 2 pi. `delaunay` takes the weights of the intrinsic Delaunay
-    triangulation.
+    Decided here: the mass matrix is the identity. dt starts at 0.1 and grows by half after each
+    step. If the energy would rise or the matrix is not positive definite, dt is halved and the step
+    repeated. dt stays below 0.9 n / sum(D), above which the matrix is never positive definite. The
+    flow has converged when, after dt has met such a limit, a step lowers the energy by less than
+    the share `tolerance`. After each step the points are projected to the sphere and their mean is
+    moved to the centre by a Moebius map; subtracting the mean and dividing by the norm does so to
+    first order, but raises the energy of uneven maps. The circle between the copies is turned to a
+    parallel, its half is projected from the far pole and scaled to the unit disk, the boundary is
+    put on the circle and the interior is solved for once more, which settles the crowded regions
+    that the flow reaches slowly. Remaining folds are repaired as in FDM (`fold_repairs`). The
+    recorded energies are half of the sphere's, minus 2 pi. `delaunay` takes the weights of the
+    intrinsic Delaunay triangulation.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
@@ -89,7 +89,7 @@ def qiem(
 def _flow(
     L: sparse.csc_array, S: Real, tolerance: float, max_iterations: int
 ) -> tuple[Real, list[float]]:
-    """Let the heat flow run to its limit; the map S (n, 3) there, and the energy of every step."""
+    """Run the heat flow to its limit; return the map S (n, 3) and the energy of every step."""
     step = _Step(L)
     mass = np.ones(len(S))
     S = moebius_centred(S, mass)
@@ -136,7 +136,7 @@ class _Step:
         self._cholesky: Cholesky | None = None
 
     def __call__(self, S: Real, D: Real, dt: float) -> Real | None:
-        """(I + dt (L - D)) x = S; None where the matrix is not positive definite."""
+        """Return x with (I + dt (L - D)) x = S; None if the matrix is not positive definite."""
         with phase("assembly"):
             self._A.data[:] = dt * self._L.data
             self._A.data[self._diagonal] += 1 - dt * D
@@ -151,7 +151,7 @@ class _Step:
 
 
 def _centred(S: Real | None, mass: Real) -> Real | None:
-    """On the sphere, the centre of mass at its middle; None where that cannot be."""
+    """Project to the sphere with the centre of mass at its centre; None if that fails."""
     if S is None:
         return None
     norms = np.linalg.norm(S, axis=1, keepdims=True)
@@ -164,7 +164,7 @@ def _centred(S: Real | None, mass: Real) -> Real | None:
 
 
 def boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
-    """Turn the boundary's circle to a parallel, project it from the pole beyond it, scale."""
+    """Turn the boundary's circle to a parallel, project from the opposite pole, and scale."""
     loop = S[mesh.boundary]
     turn = np.linalg.svd(loop - loop.mean(axis=0), full_matrices=False)[2].T
     loop = loop @ turn
@@ -177,5 +177,5 @@ def boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
         z = np.conj(z)
     modulus = np.abs(z)
     if not (np.isfinite(modulus).all() and modulus.min() > 0):
-        raise AlgorithmFailed("the boundary's image on the sphere is no curve that has an inside")
+        raise AlgorithmFailed("the boundary's image on the sphere is not a curve with an inside")
     return z / modulus

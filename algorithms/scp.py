@@ -26,12 +26,12 @@ from cembench.registry import algorithm
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Apply = Callable[[Complex], Complex]
-#: What a map is weighed by: boundary vertices alike or by length, or all vertices by area.
+#: The weights of a map's size: boundary vertices equal or by length, or all vertices by area.
 Weights = Literal["boundary", "length", "area"]
 
-#: Vectors that are iterated together: convergence is by the ratio of the first and last value.
+#: Vectors iterated together; convergence depends on the ratio of the first and last eigenvalue.
 BLOCK = 6
-#: A flat surface has a second map without energy; so much of the mean diagonal is added then.
+#: Share of the mean diagonal that is added for flat surfaces, which have a second null vector.
 SHIFT = 1e-11
 
 
@@ -50,21 +50,22 @@ def scp(
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 100,
     delaunay: bool = False,
 ) -> Parameterization:
-    """Which free-boundary map has the least conformal energy for its size, none pinned?
+    """Map a disk with a free boundary and least conformal energy for its size, without pins.
 
-    E_C (Eq. 7) is a Hermitian form in the map; its smallest eigenvalue but that of the constants
-    has the map as its vector. The size is the sum of |z|^2 over the boundary, as in the paper,
-    over the boundary by length, or over the surface by area as libigl has it (`weights`). With the
-    first two the interior is eliminated: (S - M) z = lambda W z on the boundary alone, S the Schur
-    complement of the Laplacian, M the area.
+    E_C (Eq. 7) is a Hermitian form in the map; the map is the eigenvector of the smallest
+    eigenvalue other than that of the constants. The size is the sum of abs(z)^2 over the boundary,
+    as in the paper, over the boundary by length, or over the surface by area as in libigl
+    (`weights`). With the first two the interior is eliminated: (S - M) z = lambda W z on the
+    boundary alone, with S the Schur complement of the Laplacian and M the area.
 
-    It is not the map of least angle errors: E_C weighs |mu|^2 by the image's scale squared, so it
-    gives up a little in many triangles for a lot in few large ones.
+    It is not the map of least angle error: E_C weighs abs(mu)^2 by the square of the image's scale,
+    so it accepts slightly larger errors in many triangles for much smaller ones in a few large
+    ones.
 
     Decided here: inverse iteration with six vectors and one factor, dense up to 5,000 boundary
     vertices, ends when the vector is within about `tolerance` of its limit: its residual over the
-    gap to the next eigenvalue (`eigenvalue`, `residual`, `sweeps`). The image is scaled to area
-    pi, and folds inside are mended as in LSCM (`fold_repairs`).
+    gap to the next eigenvalue (`eigenvalue`, `residual`, `sweeps`). The image is scaled to area pi,
+    and folds inside are repaired as in LSCM (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     b = mesh.boundary
@@ -88,7 +89,7 @@ def scp(
 
 
 def _weights(mesh: DiskMesh, weights: Weights, at: NDArray[np.int64]) -> Real:
-    """W (k,) at these vertices: 1 in the mean, so that eigenvalues can be compared."""
+    """Return W (k,) at these vertices, with mean 1 so that eigenvalues can be compared."""
     W = np.zeros(mesh.n)
     if weights == "area":
         W[:] = mixed_vertex_areas(mesh)
@@ -102,7 +103,7 @@ def _weights(mesh: DiskMesh, weights: Weights, at: NDArray[np.int64]) -> Real:
 
 
 def _dense_form(S: Real, W: Real) -> tuple[Apply, Apply]:
-    """H = S - M with 2 E_C = z^* H z, and how to solve with it up to constants."""
+    """Return H = S - M with 2 E_C = z^* H z, and a solver for it up to constants."""
     k = np.arange(len(S))
     H = S.astype(np.complex128)
     after = (k + 1) % len(S)
@@ -120,7 +121,7 @@ def _dense_form(S: Real, W: Real) -> tuple[Apply, Apply]:
 
 
 def _sparse_form(L: sparse.csc_array, b: NDArray[np.int64], W: Real) -> tuple[Apply, Apply]:
-    """The same over all vertices, in real numbers: (u, v) in place of u + i v."""
+    """Return the same over all vertices in real numbers: (u, v) instead of u + i v."""
     n = L.shape[0]
     Q = conformal_energy_form(L, b)
     kept = np.delete(np.arange(2 * n), [b[-1], b[-1] + n])
@@ -143,21 +144,21 @@ def _sparse_form(L: sparse.csc_array, b: NDArray[np.int64], W: Real) -> tuple[Ap
 
 
 def _shift(H: Any, W: Real) -> Real:
-    """What is added to the diagonal of H where it has a null vector beside the constants."""
+    """Return what is added to the diagonal of H if it has a null vector besides the constants."""
     return np.asarray(SHIFT * float(np.abs(H.diagonal()).mean()) * W)
 
 
 def _least(
     H: Apply, solve: Apply, W: Real, tolerance: float, most: int
 ) -> tuple[Complex, float, float, int]:
-    """The eigenvector of H z = value W z with the least value but that of the constants.
+    """Return the eigenvector of H z = value W z for the least value except that of the constants.
 
     Subspace iteration with the inverse, and Rayleigh quotients in the subspace.
     """
     share = W / W.sum()
     k = np.flatnonzero(W)
     X = np.zeros((len(W), min(BLOCK, len(k) - 1)), dtype=np.complex128)
-    # Turns about the boundary, forth and back: the disk's own modes.
+    # Rotations around the boundary in both directions: the modes of the disk.
     turns = np.arange(1, X.shape[1] + 1)
     X[k] = np.exp(2j * np.pi * np.outer(np.arange(len(k)) / len(k), turns))
     for iteration in range(1, most + 1):

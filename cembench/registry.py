@@ -1,10 +1,11 @@
-"""Which algorithms, surfaces and datasets are there, and what do they promise?
+"""The registry of algorithms, surfaces and datasets, and what each of them promises.
 
-A decorator only marks a function with its :class:`Algorithm` or :class:`Surface`; nothing happens
-at import. A :class:`Registry` is then collected from entry points (``cembench.algorithms``,
-``cembench.surfaces``, ``cembench.datasets``: the built-in ones are found no differently from
-anybody's) and from plug-ins named by the user, a file or ``module:name``. A dataset needs no mark:
-it is a :class:`cembench.mesh.datasets.Dataset`, an object at module level, or a tuple of them.
+A decorator only marks a function with its :class:`Algorithm` or :class:`Surface`; nothing is
+registered at import. A :class:`Registry` is then collected from entry points
+(``cembench.algorithms``, ``cembench.surfaces``, ``cembench.datasets``; the built-in ones are found
+in the same way as third-party ones) and from plug-ins that the user names: a file or
+``module:name``. A dataset needs no mark: it is a :class:`cembench.mesh.datasets.Dataset`, an object
+at module level, or a tuple of them.
 """
 
 from __future__ import annotations
@@ -35,39 +36,39 @@ from cembench.core.program import Library, Program, checked_program, found_words
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
-#: What an algorithm maps to; tables never mix these without saying so.
-#: An atlas has UVs for corners, not for vertices: the surface is cut into islands.
+#: The kinds of image that an algorithm can produce; tables always keep them apart.
+#: An atlas has UVs at corners, not at vertices: the surface is cut into islands.
 Target = Literal["disk", "free boundary", "circular holes", "atlas"]
 
-#: Finds named places on a mesh of a surface family: name -> vertex, counted from 0.
+#: Finds the named landmarks of a family's mesh: name -> vertex, counted from 0.
 Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
-#: From a surface's vertices (n, 3) to the image (n,) of each under its conformal map.
+#: Maps a surface's vertices (n, 3) to their images (n,) under its exact conformal map.
 ExactMap = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
-#: The steps that an algorithm passes through on a mesh, each as it is done.
+#: Yields the steps of an algorithm on a mesh, each as soon as it is done.
 Steps = Callable[..., Iterator[MapStep]]
 
 _MARK = "__cembench__"
-#: Whole numbers of this size fit no array, whatever range a parameter declares.
+#: Integers of this size do not fit into arrays, whatever range a parameter declares.
 LARGEST = 2**63
 C = TypeVar("C", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """A keyword argument of a registered function: name, type with its range, default."""
+    """A keyword argument of a registered function: name, type with range, default."""
 
     name: str
     annotation: Any
     default: Any
 
     def parse(self, value: Any, owner: str) -> Any:
-        """Read a value, also from text as ``-p NAME=VALUE`` gives it.
+        """Return a value as the parameter's type; text is converted, as from ``-p NAME=VALUE``.
 
         Raises
         ------
         ParameterError
-            A value of the wrong type or outside the declared range.
+            The value has the wrong type or is outside the declared range.
 
         """
         try:
@@ -88,23 +89,25 @@ class Parameter:
 
 @dataclass(frozen=True)
 class _Registered:
+    """The common fields of registered algorithms and surface families."""
+
     name: str
     title: str
     function: Callable[..., Any]
     parameters: tuple[Parameter, ...]
     origin: str
     notes: str
-    #: The module that declares it, which is where the decorator stands, and the file of that.
+    #: The module and the file that contain the decorator.
     module: str
     file: Path | None
 
     def arguments(self, given: Mapping[str, Any]) -> dict[str, Any]:
-        """All keyword arguments of a call: the given ones checked, the others at their defaults.
+        """Return all keyword arguments of a call: given ones checked, others at their defaults.
 
         Raises
         ------
         ParameterError
-            An unknown name, or a value that :meth:`Parameter.parse` refuses.
+            A name is unknown, or :meth:`Parameter.parse` refuses a value.
 
         """
         known = {p.name: p for p in self.parameters}
@@ -122,26 +125,26 @@ class _Registered:
 
 @dataclass(frozen=True)
 class Algorithm(_Registered):
-    """An algorithm and what it promises: see :func:`algorithm`."""
+    """A registered algorithm and what it promises; see :func:`algorithm`."""
 
     target: Target = "disk"
     mesh_type: type[TriangleMesh] = DiskMesh
     source: str = ""
     steps: Steps | None = None
     usual: bool = True
-    #: Whether its maps tend to conformal ones as triangles shrink; `validate` holds it to that.
+    #: Whether its maps converge to conformal ones under refinement; `validate` checks that.
     conformal: bool = True
-    #: The external program that it is, if any; its function is never called then.
+    #: The external program to run, if any; the function is then never called.
     program: Program | None = None
-    #: The library of others that its function calls, if any.
+    #: The third-party library that its function calls, if any.
     library: Library | None = None
-    #: Its map depends on the triangles alone, not on the coordinates.
+    #: Whether its map depends on the triangles alone, not on the coordinates.
     combinatorial: bool = False
 
 
 @dataclass(frozen=True)
 class Surface(_Registered):
-    """A surface family: see :func:`surface_family`."""
+    """A registered surface family; see :func:`surface_family`."""
 
     source: str = ""
     paper_row: str = ""
@@ -165,39 +168,57 @@ def algorithm(
 ) -> Callable[[C], C]:
     """Declare a function ``(mesh, *, parameters) -> Parameterization`` as an algorithm.
 
+    The annotation of the first argument, `DiskMesh`, `HoledMesh` or `TriangleMesh`, says which
+    surfaces the algorithm accepts. Parameters are keyword-only and have a type and a default;
+    ``Annotated[int, Field(ge=0)]`` declares a range.
+
     Parameters
     ----------
     name : str
-        What the command line calls it.
+        Name on the command line.
     title : str
-        What a table's heading calls it.
-    target : "disk", "free boundary", "circular holes" or "atlas"
-        The class of its image; an atlas is returned as an `Atlas`.
+        Name in table headings.
+    target : {"disk", "free boundary", "circular holes", "atlas"}
+        The kind of image; an atlas is returned as an `Atlas`.
     source : str
-        Where it was published.
+        Where the method was published.
     notes : str
-        What it is faithful to, and what it had to decide; default: the docstring's second part.
+        What the code is faithful to and what it had to decide (default: the docstring after its
+        first line).
     steps : callable, optional
         Takes a mesh, `sweeps` and `outer`, and yields every :class:`MapStep` on the way to the map.
     usual : bool
-        Whether a run in which no algorithms are named measures it.
+        Whether a run measures it when no algorithms are named.
     conformal : bool
-        Whether its maps tend to conformal ones as the triangles shrink; false for a method that
-        does not promise that, of which `validate` tells the rates without judging them.
+        Whether its maps converge to conformal ones under refinement. If false, `validate` reports
+        the rates without judging them.
     library : Library, optional
-        The library of others whose map it is: tables name it, and its version is recorded.
+        The third-party library that computes the map; tables name it, and its version is recorded.
     combinatorial : bool
-        Whether its map depends on the triangles alone, so that another shape has the same one: what
-        another method returns unchanged for another shape is taken for a kept result.
+        Whether the map depends on the triangles alone, so that another shape with the same
+        triangles has the same map. Any other method that returns an unchanged map for a changed
+        shape is suspected of returning a stored result.
 
-    The annotation of the first argument, `DiskMesh` or `HoledMesh`, tells which surfaces it takes.
-    Parameters are keyword-only with a type and a default; ``Annotated[int, Field(ge=0)]`` states a
-    range.
+    Returns
+    -------
+    callable
+        A decorator that marks the function and returns it unchanged.
 
     Raises
     ------
     RegistryError
-        A declaration that cannot be right: unknown target, missing types or defaults.
+        The declaration is invalid: an unknown target, or missing types or defaults.
+
+    Examples
+    --------
+    >>> from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+    >>> from cembench.conformal.laplacian import laplacian
+    >>> from cembench.core.parameterization import Parameterization
+    >>> @algorithm("mine", title="Mine", target="disk")
+    ... def mine(mesh: DiskMesh) -> Parameterization:
+    ...     "Map a disk with the boundary spaced by arc length."
+    ...     circle = arc_length_circle(mesh)
+    ...     return Parameterization(harmonic_extension(laplacian(mesh), mesh.boundary, circle))
 
     """
     place = _place(sys._getframe(1))
@@ -229,31 +250,44 @@ def external_program(
     notes: str = "",
     **how: Any,
 ) -> Callable[[C], C]:
-    """Declare a program of any language as an algorithm.
+    """Declare a program in any language as an algorithm.
 
-    The decorated function is never called: its signature says which surfaces the program takes and
-    which parameters its command has, and its docstring what it is.
+    The decorated function is never called. Its signature says which surfaces the program accepts
+    and which parameters its command has; its docstring describes the program.
 
     Parameters
     ----------
-    name, title, target, source, notes
-        As for :func:`algorithm`; tables add to the title that it is an external program.
+    name : str
+        Name on the command line.
+    title : str
+        Name in table headings, which add that it is an external program.
+    target : {"disk", "free boundary", "circular holes", "atlas"}
+        The kind of image.
     command : str
-        As a shell would read it, with ``{input}``, ``{output}`` and ``{PARAMETER}``; no shell does.
-        Files of the declaring file's folder may be named without it.
+        The command in shell notation, with ``{input}``, ``{output}`` and ``{PARAMETER}``; it is not
+        run by a shell. Files in the folder of the declaring file may be named without their path.
+    source : str
+        Where the method was published.
+    notes : str
+        As for :func:`algorithm`.
     **how
-        The other fields of :class:`cembench.core.program.Program`, `version` as one text.
+        The other fields of :class:`cembench.core.program.Program`, with `version` as one string.
+
+    Returns
+    -------
+    callable
+        A decorator that marks the function and returns it unchanged.
 
     Raises
     ------
     RegistryError
-        A declaration that cannot be right.
+        The declaration is invalid.
 
     Examples
     --------
     >>> @external_program("mine", title="Mine", target="disk", command="mine {input} {output}")
     ... def mine(mesh: DiskMesh) -> None:
-    ...     "Does what mine does."
+    ...     "Map a disk with the program `mine`."
 
     """
     place = _place(sys._getframe(1))
@@ -270,20 +304,20 @@ def external_program(
 def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
     """Return the algorithm that a command line declares, without parameters.
 
-    It takes disks; for circular holes surfaces with holes, for an atlas any surface.
+    It accepts disks; for circular holes surfaces with holes, for an atlas any surface.
 
     Parameters
     ----------
     declared : mapping
-        `command` and, as far as they are given, `name`, `target` and the fields of
+        `command` and optionally `name`, `target` and the fields of
         :class:`cembench.core.program.Program`.
     folder : Path
-        Where the files lie that it names without a path.
+        Folder of the files that are named without a path.
 
     Raises
     ------
     RegistryError
-        It cannot be right.
+        The declaration is invalid.
 
     """
     given = dict(declared)
@@ -304,23 +338,23 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
 
 
 def _of_disks(mesh: DiskMesh) -> None:
-    """Stand for a program that takes disks."""
+    """Provide the signature of a program that maps disks."""
 
 
 def _of_holes(mesh: HoledMesh) -> None:
-    """Stand for a program that takes surfaces with holes."""
+    """Provide the signature of a program that maps surfaces with holes."""
 
 
 def _of_any(mesh: TriangleMesh) -> None:
-    """Stand for a program that cuts any surface."""
+    """Provide the signature of a program that cuts and maps any surface."""
 
 
-#: By target, where it is not disks.
+#: By target; other targets take disks.
 _TAKES = {"circular holes": _of_holes, "atlas": _of_any}
 
 
 def _program_name(command: str) -> str:
-    """Return what a command is called by: its program, or the script that an interpreter runs."""
+    """Return a short name for a command: its program, or the script that an interpreter runs."""
     words = [Path(word) for word in command.split()]
     script = next((word for word in words[1:] if word.suffix in (".py", ".m", ".sh", ".js")), None)
     return (script or next(iter(words), Path("program"))).stem or "program"
@@ -336,6 +370,7 @@ def _program_of(
     folder: Path,
     how: Mapping[str, Any],
 ) -> Algorithm:
+    """Return the algorithm that runs an external program."""
     known = [one.name for one in fields(Program) if one.name != "command"]
     unknown = [key for key in how if key not in known]
     if unknown:
@@ -356,6 +391,7 @@ def _algorithm_of(
     title: str,
     about: Mapping[str, Any],
 ) -> Algorithm:
+    """Return the algorithm that a function and its declaration make."""
     if about["target"] not in get_args(Target):
         raise RegistryError(
             f"algorithm {name!r}: target {about['target']!r} is unknown; "
@@ -393,18 +429,49 @@ def surface_family(
 ) -> Callable[[C], C]:
     """Declare a function ``(faces, *, seed, parameters) -> TriangleMesh`` as a surface family.
 
-    `faces` is the number of triangles asked for; it has a default. `paper_row` is the model of the
-    paper's Table 1 that the surface stands for, if any: the profiles are made of those. `landmarks`
-    finds named vertices, such as the tip of a nose, on a mesh that the function made, of any size.
-    `kept` takes the same arguments and tells the file in which the surface lies once it has been
-    made; where the surface would be another one, so is the file. `exact_map` is its conformal map
-    to the unit disk, for holed surfaces with round holes, where that is known in closed form for
-    the default parameters; it is one of many, up to a Moebius map.
+    `faces` is the requested number of triangles and has a default; `seed` is optional.
+
+    Parameters
+    ----------
+    name : str
+        Name on the command line.
+    title : str
+        Name in table headings.
+    source : str
+        Where the shape comes from.
+    notes : str
+        Remarks (default: the docstring after its first line).
+    paper_row : str
+        The model in the paper's Table 1 that the surface stands for, if any; the profiles consist
+        of these surfaces.
+    landmarks : callable, optional
+        Returns the named vertices, such as the tip of a nose, of a mesh of any size that the
+        function made.
+    kept : callable, optional
+        Takes the same arguments and returns the path at which the made surface is cached; different
+        surfaces have different paths.
+    exact_map : callable, optional
+        The conformal map to the unit disk, or to the unit disk with round holes, if it is known in
+        closed form for the default parameters; unique up to a Moebius map.
+
+    Returns
+    -------
+    callable
+        A decorator that marks the function and returns it unchanged.
 
     Raises
     ------
     RegistryError
-        Missing types or defaults.
+        Types or defaults are missing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> @surface_family("my-square", title="My square")
+    ... def my_square(faces: int = 2) -> DiskMesh:
+    ...     "A unit square in the plane z = 0."
+    ...     V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    ...     return DiskMesh(V, [[0, 1, 2], [0, 2, 3]])
 
     """
     place = _place(sys._getframe(1))
@@ -433,6 +500,7 @@ def surface_family(
 def _signature(
     name: str, function: Callable[..., Any], positional: str | None = None
 ) -> tuple[dict[str, Any], tuple[Parameter, ...]]:
+    """Return the type hints of a function, and its keyword parameters."""
     try:
         hints = typing.get_type_hints(_annotated(function), include_extras=True)
         signature = inspect.signature(function)
@@ -454,7 +522,7 @@ def _signature(
 
 
 def _annotated(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Return what has the annotations of a callable that need not be a function."""
+    """Return the object that holds the annotations of a callable."""
     if isinstance(function, functools.partial):
         return _annotated(function.func)
     if isinstance(function, type) or inspect.isroutine(function):
@@ -464,9 +532,10 @@ def _annotated(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _place(frame: FrameType) -> tuple[str, Path | None]:
-    """Return the module and the file of a frame: of what calls a decorator.
+    """Return the module and file of a frame, that of the decorator's caller.
 
-    The decorated function cannot tell: a decorator below may have put one of another file there.
+    The decorated function cannot be asked: an inner decorator may have replaced it by a function
+    from another file.
     """
     module, file = (frame.f_globals.get(key) for key in ("__name__", "__file__"))
     return str(module), None if file is None else Path(file).absolute()
@@ -488,44 +557,44 @@ def _set_mark(function: Callable[..., Any], spec: _Registered) -> None:
 
 
 def _notes(function: Callable[..., Any]) -> str:
-    """Return everything in the docstring after its first line."""
+    """Return the docstring of a function after its first line."""
     written = inspect.getdoc(_annotated(function)) or ""
     return written.partition("\n")[2].strip()
 
 
 @dataclass(frozen=True)
 class Registry:
-    """The algorithms, surfaces and datasets that can be named."""
+    """The known algorithms, surfaces and datasets, by name."""
 
     algorithms: Mapping[str, Algorithm] = field(default_factory=dict)
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     datasets: Mapping[str, Dataset] = field(default_factory=dict)
-    #: Algorithms of others, libraries and programs, that need not be on this machine: they are run
-    #: only where they are named.
+    #: Third-party libraries and programs, which need not be installed: they run only if they are
+    #: named.
     peers: Mapping[str, Algorithm] = field(default_factory=dict)
-    #: Files of models that can be fetched but are no surfaces.
+    #: Files of models, which can be fetched but are not surfaces themselves.
     parts: Mapping[str, Dataset] = field(default_factory=dict)
 
     @property
     def usual_algorithms(self) -> list[str]:
-        """The names of the algorithms that are measured where none are named."""
+        """Return the names of the algorithms that are measured by default."""
         return [name for name, spec in self.algorithms.items() if spec.usual]
 
     def algorithm(self, name: str) -> Algorithm:
-        """The algorithm of this name; :class:`RegistryError` lists the known ones."""
+        """Return the algorithm of this name; :class:`RegistryError` lists the known ones."""
         return _look_up("algorithm", {**self.peers, **self.algorithms}, name)
 
     def surface(self, name: str) -> Surface:
-        """The surface of this name; :class:`RegistryError` lists the known ones."""
+        """Return the surface of this name; :class:`RegistryError` lists the known ones."""
         return _look_up("surface", self.surfaces, name)
 
     def dataset(self, name: str) -> Dataset:
-        """The dataset of this name; :class:`RegistryError` lists the known ones."""
+        """Return the dataset of this name; :class:`RegistryError` lists the known ones."""
         return _look_up("dataset", self.datasets, name)
 
     @property
     def groups(self) -> dict[str, list[Dataset]]:
-        """The datasets and the parts of models by group, in the order in which they are listed."""
+        """Return the datasets and parts of models by group, in the order of their listing."""
         found: dict[str, list[Dataset]] = {}
         for dataset in (*self.datasets.values(), *self.parts.values()):
             if dataset.group:
@@ -533,7 +602,7 @@ class Registry:
         return found
 
     def group(self, name: str) -> list[Dataset]:
-        """The datasets of this group; :class:`RegistryError` lists the known ones."""
+        """Return the datasets of this group; :class:`RegistryError` lists the known groups."""
         if name not in self.groups:
             known = ", ".join(self.groups) or "none"
             raise RegistryError(f"unknown group of datasets {name!r}; known: {known}.")
@@ -548,9 +617,9 @@ _GROUPS: Mapping[type, str] = {
     Surface: "cembench.surfaces",
     Dataset: "cembench.datasets",
 }
-#: Entry points of algorithms that `cembench run` leaves out unless they are named.
+#: Entry points of algorithms that `cembench run` measures only if they are named.
 PEERS = "cembench.peers"
-#: How a plug-in begins that is a command line: the rest is its declaration as JSON.
+#: Prefix of a plug-in that is a command line; its declaration follows as JSON.
 COMMAND = "command:"
 
 
@@ -568,12 +637,17 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     Parameters
     ----------
     plugins : iterable of str
-        Each the path of a Python file, or ``module:name``.
+        Each is the path of a Python file, or ``module:name``.
+
+    Returns
+    -------
+    Registry
+        Everything that was found, by name.
 
     Raises
     ------
     RegistryError
-        A name declared twice, a plug-in that cannot be imported or that declares nothing.
+        A name is declared twice, or a plug-in cannot be imported or declares nothing.
 
     """
     installed = _installed()
@@ -588,6 +662,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
 
 @functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
+    """Return the registry of all entry points."""
     found = _all_datasets()
     surfaces = {name: dataset for name, dataset in found.items() if dataset.part is None}
     parts = {name: dataset for name, dataset in found.items() if dataset.part is not None}
@@ -596,7 +671,7 @@ def _installed() -> Registry:
 
 
 def _all_datasets() -> dict[str, Dataset]:
-    """The datasets of all entry points: each is one, or a tuple of them under a name of its own."""
+    """Return the datasets of all entry points; each holds one dataset or a tuple of them."""
     known: dict[str, Dataset] = {}
     for entry in sorted(entry_points(group=_GROUPS[Dataset]), key=lambda entry: entry.name):
         loaded = _load_entry(entry)
@@ -615,9 +690,9 @@ def _all_declared(kind: type[R], group: str = "") -> dict[str, R]:
 
 
 def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
-    """As ``load_registry(plugins).algorithm(name)``, importing nothing else that is installed.
+    """Return ``load_registry(plugins).algorithm(name)`` without importing other installed plug-ins.
 
-    A process that measures one algorithm starts sooner so, and holds no more than it needs.
+    A process that measures one algorithm starts faster this way and needs less memory.
     """
     for entry in entry_points(group=_GROUPS[Algorithm], name=name):
         return _declared_at(entry, Algorithm)
@@ -631,6 +706,7 @@ def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
 
 
 def _declared_at(entry: Any, kind: type[R]) -> R:
+    """Return what an entry point declares; :class:`RegistryError` if it is something else."""
     loaded = _load_entry(entry)
     spec = getattr(loaded, _MARK, loaded)
     if not isinstance(spec, kind) or spec.name != entry.name:
@@ -641,8 +717,8 @@ def _declared_at(entry: Any, kind: type[R]) -> R:
             else f"decorate it with @{_DECORATORS[kind]}({entry.name!r}, ...)"
         )
         raise RegistryError(
-            f"entry point {entry.name} = {entry.value!r} of group {entry.group!r} is no {noun} of "
-            f"that name; {remedy}."
+            f"entry point {entry.name} = {entry.value!r} of group {entry.group!r} is not the "
+            f"{noun} of that name; {remedy}."
         )
     return spec
 
@@ -667,7 +743,7 @@ def _add(known: dict[str, Any], spec: _Registered | Dataset) -> None:
 
 
 def declared_by(plugin: str) -> list[_Registered]:
-    """Return what a file declares, or a single ``module:name``, or a command line."""
+    """Return what a plug-in declares: a file, a ``module:name`` or a command line."""
     if plugin.startswith(COMMAND):
         declared = json.loads(plugin.removeprefix(COMMAND))
         return [program_from(declared, Path(declared.pop("folder", "")))]
@@ -683,7 +759,7 @@ def declared_by(plugin: str) -> list[_Registered]:
         specs = [getattr(module, name)]
     else:
         raise RegistryError(f"plug-in {plugin!r} is neither a Python file (*.py) nor module:name.")
-    # Only what is declared there, not what it imports from elsewhere.
+    # Only what the file itself declares, not what it imports.
     marks = [_mark_of(value) for value in specs]
     found = [spec for spec in marks if spec and (name or spec.module == module.__name__)]
     if not found:
@@ -695,6 +771,7 @@ def declared_by(plugin: str) -> list[_Registered]:
 
 
 def _import_file(path: Path) -> ModuleType:
+    """Import a Python file as a module."""
     if not path.is_file():
         raise RegistryError(f"plug-in {str(path)!r}: there is no such file.")
     name = f"cembench_plugin_{path.stem}"
@@ -702,7 +779,7 @@ def _import_file(path: Path) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # so that its functions can look up their own annotations
+    sys.modules[name] = module  # so that annotations of its functions can be resolved
     try:
         with _importing(str(path)):
             spec.loader.exec_module(module)
@@ -719,10 +796,10 @@ def _import_module(module: str, plugin: str) -> ModuleType:
 
 @contextmanager
 def _importing(plugin: str) -> Iterator[None]:
-    """Make one error of whatever an import raises; what it prints goes to standard error.
+    """Turn any import error into one kind of error, and send what is printed to standard error.
 
-    An interrupt is the user's: that a plug-in raises one is found out where it is loaded first
-    (:mod:`cembench.running.plugins`).
+    An interrupt belongs to the user. A plug-in that raises one itself is caught where it is loaded
+    first (:mod:`cembench.running.plugins`).
     """
     try:
         with _standard_output_apart():
@@ -738,9 +815,9 @@ def _importing(plugin: str) -> Iterator[None]:
 
 @contextmanager
 def _standard_output_apart() -> Iterator[None]:
-    """Let standard output go to standard error, also what is not written by Python."""
+    """Redirect standard output to standard error, including output from C code."""
     with ExitStack() as back:
-        with suppress(AttributeError, OSError, ValueError):  # there may be none, or a closed one
+        with suppress(AttributeError, OSError, ValueError):  # it may be missing or closed
             sys.stdout.flush()
             kept = os.dup(1)
             back.callback(os.close, kept)
@@ -751,7 +828,7 @@ def _standard_output_apart() -> Iterator[None]:
 
 
 def _mark_of(value: Any) -> _Registered | None:
-    """Return the mark of an object of a plug-in, which may answer anything to being asked."""
+    """Return the mark of a plug-in's object, whose attribute access may do anything."""
     try:
         mark = getattr(value, _MARK, None)
     except Exception:

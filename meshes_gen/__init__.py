@@ -1,1 +1,1 @@
-"""Generated surfaces, one family a file, found by the entry points ``cembench.surfaces``."""
+"""Generated surfaces, one family per file, found by the entry points ``cembench.surfaces``."""

@@ -19,7 +19,7 @@ from .implicit import (
 
 
 def human_brain_body(seed: int = 0) -> Body:
-    """A hemisphere, front to the left (-x), its flat side away; `seed` sets the folds."""
+    """A brain hemisphere, front to the left (-x), flat side away; `seed` sets the folds."""
     folds = Noise(seed + 7, 0.52, waves=40, spread=0.15)
     bends = [Noise(seed + 20 + d, 0.60, waves=12) for d in range(3)]
 
@@ -33,12 +33,12 @@ def human_brain_body(seed: int = 0) -> Body:
         return lobe + 0.12 * bump(p, (0.9, -0.1, -0.75), (0.5, 0.6, 0.4))
 
     def f(p: Real) -> Real:
-        # Folds run along the hull's normals: none can close over a hollow.
+        # Folds run along the hull's normals, so none can close over a hollow.
         q = to_surface(hull, p, 0.01, 0.3, rounds=3)
         n = folds(q + 0.08 * np.stack([b(q) for b in bends], axis=1))
-        # A groove along every nodal line of the noise; the crests between them stay round.
+        # A groove along every nodal line of the noise; the ridges between them stay round.
         groove = 0.15 * np.exp(-((n / 0.50) ** 2)) - 0.03
-        plain = bump(p, (0.60, -0.1, -0.62), (0.62, 0.55, 0.36))  # under the little brain
+        plain = bump(p, (0.60, -0.1, -0.62), (0.62, 0.55, 0.36))  # under the cerebellum
         d = hull(p) + groove * (1 - np.clip(1.5 * plain, 0, 1))
         place = np.array([0.74, -0.26, -0.66])
         axis = (p - place) / (0.50, 0.44, 0.32)

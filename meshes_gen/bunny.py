@@ -18,7 +18,7 @@ from .implicit import (
 
 
 def stanford_bunny_body(seed: int = 0) -> Body:
-    """The solid of the bunny, looking to the left (-x); `seed` sets its fur."""
+    """A sitting bunny, facing left (-x); `seed` sets its fur."""
     lumps, fur = Noise(seed, 0.34, waves=24), Noise(seed + 1, 0.14, waves=24)
 
     def f(p: Real) -> Real:

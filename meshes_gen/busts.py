@@ -23,7 +23,7 @@ from .implicit import (
 
 
 def nefertiti_body(seed: int = 0) -> Body:
-    """A slender neck under a face with a tall crown, flat on top; coarse enough for 562 faces."""
+    """A slender neck under a face with a tall flat-topped crown; coarse enough for 562 faces."""
     person = Person(jaw=0.86, nose=1.0, nose_width=0.9, lips=1.2, eyes=1.0, cheeks=0.9)
     head = Head(person, NEUTRAL, ears=False, neck=False)
     lean = 0.01 * np.sin(seed)
@@ -50,11 +50,11 @@ def nefertiti_body(seed: int = 0) -> Body:
 
 
 def david_head_body(seed: int = 0) -> Body:
-    """A young man's head under thick curls, cut through the neck."""
+    """A young man's head with thick curls, cut through the neck."""
     person = Person(jaw=1.02, nose=1.1, nose_width=1.0, lips=1.1, eyes=1.15, brow=1.4)
     head = Head(person, Expression(brows=(-0.04, -0.04)))
     rng = np.random.default_rng(seed + 3)
-    # Locks: short bent tubes spread evenly (golden angle) over the hairy part of the skull.
+    # Locks: short bent tubes, spread evenly (golden angle) over the hairy part of the skull.
     k = np.arange(150)
     z = 1 - 2 * (k + 0.5) / 150
     angle = k * np.pi * (3 - np.sqrt(5))
@@ -119,7 +119,7 @@ def bimba_statue_body(seed: int = 0) -> Body:
 
 
 def knit_cap_man_body(seed: int = 0) -> Body:
-    """A bearded man with a knit cap: turned-up rim, pompon, and every stitch a bump."""
+    """A bearded man with a knit cap: turned-up rim, pompon, and a bump for every stitch."""
     person = Person(
         jaw=1.08, nose=1.15, nose_width=1.2, lips=0.95, eyes=0.95, brow=1.3, cheeks=1.05
     )

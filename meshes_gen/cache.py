@@ -1,7 +1,8 @@
-"""Surfaces made once: a cache keyed by everything that they depend on.
+"""A cache of generated surfaces, keyed by everything that they depend on.
 
-A reader sees a whole file or none; two processes that make the same surface at once both succeed,
-and the later one wins. What cannot be read back (a half-written or damaged file) counts as absent.
+A reader sees a complete file or none. Two processes that make the same surface at once both
+succeed, and the later one wins. A file that cannot be read (incomplete or damaged) counts as
+absent.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from cembench.core.notices import Notice, NoticeKind, notice_of_old
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-#: Raise this when a generator's result changes: every cached surface is then made anew.
+#: Increase this if a generator's result changes: every cached surface is then made again.
 GENERATOR_VERSION = 1
 
 M = TypeVar("M", bound=TriangleMesh)
@@ -38,7 +39,10 @@ def _version(package: str) -> str | None:
 
 
 def content_key(name: str, parameters: Mapping[str, Any]) -> str:
-    """The key of a surface: generator version, name, parameters and library versions; 32 digits."""
+    """Return the key of a surface, 32 digits.
+
+    It depends on the generator version, the name, the parameters and the library versions.
+    """
     libraries = ("numpy", "scipy", "scikit-image", "pymeshlab")
     content = {
         "generator": GENERATOR_VERSION,
@@ -51,16 +55,16 @@ def content_key(name: str, parameters: Mapping[str, Any]) -> str:
 
 
 def place_of(name: str, parameters: Mapping[str, Any]) -> Path:
-    """The file in which the surface of this name and parameters lies once it has been made."""
+    """Return the cache file of the surface with this name and these parameters."""
     return cache_directory() / "surfaces" / f"{file_name(name)}-{content_key(name, parameters)}.npz"
 
 
 def cached(
     mesh_type: type[M], name: str, parameters: Mapping[str, Any], make: Callable[[], M]
 ) -> M:
-    """The surface of this name and parameters: from the cache, else made by `make` and kept.
+    """Return the surface with this name and these parameters, from the cache or made by `make`.
 
-    A cache that cannot be written to is done without.
+    If the cache cannot be written to, the surface is not cached.
     """
     path = place_of(name, parameters)
     mesh = read(mesh_type, path)
@@ -72,7 +76,7 @@ def cached(
 
 
 def read(mesh_type: type[M], path: Path) -> M | None:
-    """The mesh in a file, checked; None if there is none or it is damaged."""
+    """Return the checked mesh in a file; None if there is none or it is damaged."""
     try:
         with path.open("rb") as file, np.load(file, allow_pickle=False) as data:
             V, F = data["V"], data["F"]
@@ -80,7 +84,7 @@ def read(mesh_type: type[M], path: Path) -> M | None:
             notices = _notices(data)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
-    # The mesh passed its checks when it was written; the hash says that it is the same one.
+    # The mesh passed its checks when it was written; the hash confirms that it is unchanged.
     mesh = mesh_type.trusted(V, F.astype(np.int64), name, notices)
     if mesh.hash != digest:
         return None
@@ -90,7 +94,7 @@ def read(mesh_type: type[M], path: Path) -> M | None:
 
 
 def _notices(data: Mapping[str, Any]) -> tuple[Notice, ...]:
-    """Return the notices of a file; ValueError for an unknown kind or another number of kinds."""
+    """Return the notices of a file; ValueError for an unknown kind or inconsistent numbers."""
     texts = [str(text) for text in data["notices"]]
     if "notice_kinds" not in data:
         return tuple(map(notice_of_old, texts))
@@ -99,7 +103,7 @@ def _notices(data: Mapping[str, Any]) -> tuple[Notice, ...]:
 
 
 def write(mesh: TriangleMesh, path: Path) -> None:
-    """Write a mesh whole or not at all."""
+    """Write a mesh completely or not at all."""
     if mesh.n > np.iinfo(np.int32).max:
         raise MeshError(
             f"{mesh.name} has {mesh.n} vertices; the cache holds at most "

@@ -1,7 +1,7 @@
-"""The twenty stand-ins, one for each row of the paper's Table 2, and what is known of them.
+"""The twenty stand-ins, one for each row of the paper's Table 2, with their landmarks.
 
-Each is a function ``(faces, *, seed, delaunay) -> DiskMesh`` whose default size is its row's; the
-result comes from the cache (:mod:`meshes_gen.cache`) once it has been made.
+Each is a function ``(faces, *, seed, delaunay) -> DiskMesh`` whose default size is that of its row;
+the result is cached (:mod:`meshes_gen.cache`).
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from .rows import ROWS
 from .statues import isis_statue_body, statue_of_liberty_body
 from .vessels import bourbon_bottle_body, chinese_vase_body
 
-#: Smallest and largest count of triangles that can be asked for.
+#: Smallest and largest number of triangles that can be requested.
 Faces = Annotated[int, Field(ge=400, le=4_000_000)]
 Seed = Annotated[int, Field(ge=0)]
 
-#: The solid that each stand-in is cut from, by the seed.
+#: The function that makes the solid of each stand-in from a seed.
 BODIES: Mapping[str, Callable[[int], Body]] = {
     "nefertiti": nefertiti_body,
     "cowboy-hat": cowboy_hat_body,
@@ -62,24 +62,24 @@ BODIES: Mapping[str, Callable[[int], Body]] = {
     "knit-cap-man": knit_cap_man_body,
 }
 
-#: How often a solid was changed, where it was: its surfaces are then made anew, the others not.
+#: Revisions of changed solids: only their cached surfaces are made again.
 REVISIONS = {"ho-pouting-face": 1, "liu-pouting-face": 1}
 
 
 def stand_in(
     name: str, faces: int | None = None, *, seed: int = 0, delaunay: bool = True
 ) -> DiskMesh:
-    """The stand-in for a row, with its row's counts or, with `faces`, at any size.
+    """Return the stand-in for a row, with the row's counts or with about `faces` triangles.
 
-    `seed` sets whatever is random in its shape; with ``delaunay=False`` about 5 % of the interior
+    `seed` sets the random details of its shape; with ``delaunay=False`` about 5 % of the interior
     edges are not Delaunay.
 
     Raises
     ------
     RegistryError
-        An unknown name; the message lists the known ones.
+        The name is unknown; the message lists the known names.
     MeshError
-        So few triangles that the surface is no disk.
+        There are so few triangles that the surface is not a disk.
 
     """
     if name not in ROWS:
@@ -94,7 +94,7 @@ def stand_in(
 
 
 def _content(name: str, faces: int, seed: int, delaunay: bool) -> dict[str, Any]:
-    """All that decides what a stand-in looks like."""
+    """Return everything that determines the shape of a stand-in."""
     content = {
         "faces": faces,
         "seed": seed,
@@ -104,7 +104,7 @@ def _content(name: str, faces: int, seed: int, delaunay: bool) -> dict[str, Any]
     return content | {"revision": REVISIONS[name]} if name in REVISIONS else content
 
 
-#: Which person makes which expression in the stand-ins that are faces.
+#: Person and expression of each stand-in that is a face.
 FACES = {
     "ho-pouting-face": (HO, "pouting"),
     "ho-neutral-face": (HO, "neutral"),
@@ -116,7 +116,7 @@ FACES = {
 
 
 def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
-    """Which vertex is the nose tip, an eye corner, a mouth corner of this face?
+    """Return the vertices of the landmarks of a face: nose tip, corners of eyes and mouth, lips.
 
     Keys: nose_tip, eye_inner_right, eye_outer_right, eye_inner_left, eye_outer_left,
     mouth_corner_right, mouth_corner_left, and lips_right, lips_middle, lips_left on the line where
@@ -138,6 +138,7 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
 
 
 def _registered(name: str) -> Callable[..., DiskMesh]:
+    """Return the stand-in for a row as a registered surface family."""
     row = ROWS[name]
 
     def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:

@@ -1,4 +1,4 @@
-"""What `cembench doctor` should know of the generators."""
+"""Findings about the generators for `cembench doctor`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from . import remesh
 
 
 def remeshing_finding() -> InstallationFinding:
-    """Are surfaces remeshed the usual way here, and if not, what should be installed?"""
+    """Return whether the preferred remeshing filter is available, and how to install it."""
     filter_ = "pymeshlab's filter meshing_isotropic_explicit_remeshing"
     if remesh.has_remeshing_filter():
         return InstallationFinding("remeshing", True, filter_, required=False)

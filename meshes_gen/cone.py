@@ -15,7 +15,7 @@ from .disk_grid import disk_grid
 
 
 def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex128]:
-    """The cone's conformal map to the unit disk: the slant length to the power 1 / sin(angle)."""
+    """Return the cone's conformal map to the unit disk: slant length ** (1 / sin(angle))."""
     slant = np.linalg.norm(V, axis=1)
     around = np.arctan2(V[:, 1], V[:, 0])
     return slant ** (1 / np.sin(np.deg2rad(angle))) * np.exp(1j * around)
@@ -27,7 +27,7 @@ def cone(
     *,
     angle: Annotated[float, Field(gt=0, lt=90)] = 30.0,
 ) -> DiskMesh:
-    """A round cone of slant length 1; `angle` in degrees between its axis and its side.
+    """A round cone of slant length 1, with `angle` in degrees between its axis and its side.
 
     Its exact conformal map to the unit disk is :func:`exact_map`.
     """

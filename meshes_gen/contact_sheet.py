@@ -1,4 +1,4 @@
-"""Pictures of surfaces: one shaded thumbnail, or a sheet of many."""
+"""Thumbnails of surfaces: a single one, or a sheet of many."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cembench.drawing.clay import draw_clay
 from cembench.drawing.scene import framed
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-#: From where each surface is seen (x, y, z); figures look along -y.
+#: Viewing direction of each surface (x, y, z); figures look along -y.
 VIEWS: Mapping[str, tuple[float, float, float]] = {
     "left-hand": (0.15, -1.0, 0.1),
     "stanford-bunny": (-0.45, -1.0, 0.3),
@@ -37,9 +37,9 @@ def thumbnail(
     view: Sequence[float] = DEFAULT_VIEW,
     size: int = 480,
 ) -> None:
-    """Draw the shaded surface into a PNG.
+    """Draw the shaded surface into a PNG file.
 
-    `view` is the direction from the surface to the eye, z up; `size` in pixels.
+    `view` is the direction from the surface to the eye, z up; `size` is in pixels.
     """
     eye = np.asarray(view, dtype=float) / np.linalg.norm(view)
     right = np.cross((0, 0, 1.0), eye)
@@ -52,7 +52,7 @@ def thumbnail(
 def contact_sheet(
     meshes: Mapping[str, TriangleMesh], path: Path, *, columns: int = 5, size: int = 420
 ) -> Path:
-    """Draw all `meshes` on one sheet, their names and counts below them; the path of the PNG."""
+    """Draw all `meshes` on one sheet with names and counts; return the path of the PNG file."""
     from matplotlib import image
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

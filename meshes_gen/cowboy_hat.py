@@ -8,7 +8,7 @@ from .implicit import Body, Real, bump, join, meet
 
 
 def cowboy_hat_body(seed: int = 0) -> Body:
-    """The solid of the hat, open where the head goes in; `seed` only turns the creases slightly."""
+    """A cowboy hat, open at the head; `seed` only turns the creases slightly."""
     tilt = 0.02 * np.sin(seed)
 
     def brim(p: Real) -> Real:

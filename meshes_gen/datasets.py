@@ -1,4 +1,4 @@
-"""Real meshes that can be fetched: what `real_meshes.tsv` lists, and the ICT face model's files."""
+"""Real meshes that can be fetched: those in `real_meshes.tsv`, and the ICT face model."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from .ict_model import EXPRESSIONS, IDENTITIES, NEUTRAL, model_folder, read_smal
 
 _RAW = "https://raw.githubusercontent.com"
 _ICT = f"{_RAW}/ICT-VGL/ICT-FaceKit/da5f95a607f5e6b37755b38d3385d7f2853732e5/FaceXModel"
-#: Bytes of one of the model's files, about: they are text of the same numbers of lines.
+#: Approximate bytes of one model file; all are text files with the same number of lines.
 _ICT_SIZE = 2_558_000
 
 
 def dataset_of(row: Mapping[str, str]) -> Dataset:
-    """Return the dataset of a row of `real_meshes.tsv`; empty cells are not known."""
+    """Return the dataset of a row of `real_meshes.tsv`; empty cells mean unknown."""
     first, _, last = row["polygons"].partition("-")
     vertices, _, triangles = row["arrays"].partition(",")
     return Dataset(
@@ -47,9 +47,9 @@ def _real_meshes() -> tuple[Dataset, ...]:
 
 
 def _ict_file(name: str) -> Dataset:
-    """Return a file of the ICT face model, which is kept as small arrays.
+    """Return the dataset of one file of the ICT face model, which is kept as small arrays.
 
-    Most of their checksums are not known here; a file must have the model's polygons.
+    Most of the checksums are not known here; a file must have the polygons of the model.
     """
     kept = partial(_ict_place, name)
     part = Part(kept, small_arrays, lambda path: read_small(path) is not None)

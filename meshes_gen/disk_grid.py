@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 
 def disk_grid(faces: int) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
-    """Points and triangles of r concentric rings, ring k with 6 k points: 6 r^2 triangles.
+    """Return points z (n,) and triangles F (m, 3) of r concentric rings, ring k with 6 k points.
 
-    The number of triangles is the nearest possible to `faces`. Counter-clockwise, Delaunay up to
-    rounding, well-conditioned in the sense of Definition 1. Returns z (n,) complex, F (m, 3).
+    The number of triangles, 6 r^2, is as close as possible to `faces`. The triangulation is
+    counter-clockwise, Delaunay up to rounding, and well-conditioned in the sense of Definition 1.
     """
     rings = max(2, round(np.sqrt(faces / 6)))
     k = np.repeat(np.arange(1, rings + 1), 6 * np.arange(1, rings + 1))

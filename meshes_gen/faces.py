@@ -13,12 +13,12 @@ EXPRESSIONS = {"neutral": NEUTRAL, "smile": SMILE, "pouting": POUTING, "wry": WR
 
 
 def mask(p: Real) -> Real:
-    """Positive on the face: from the hairline to under the chin, back to the ears."""
+    """Return a field that is positive on the face: hairline to under the chin, back to the ears."""
     return -ellipsoid(p, (0, -0.62, -0.10), (0.92, 0.72, 1.12))
 
 
 def face_body(person: Person, expression: Expression, seed: int = 0) -> Body:
-    """The solid of a person's head with an expression, cut to the face."""
+    """A person's face with an expression, cut out of the head."""
     head = Head(person, expression, ears=False)
     f: Field = with_skin(head, person.skin_seed + seed)
     return Body(f, mask, (-0.95, -1.30, -1.60), (0.95, 0.35, 1.25), 170)

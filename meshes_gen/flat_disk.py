@@ -1,4 +1,4 @@
-"""The flat unit disk, optionally stretched: every conformal map of it is known."""
+"""The flat unit disk, optionally stretched; all of its conformal maps are known."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from .implicit import Body, Noise, Real, bump, ellipsoid, halfspace, join, sphere, tube
 
-#: Toes from the big one: base, joint, tip (toes point along -y), radii.
+#: Toes from the big toe on: base, joint, tip (toes point along -y), radii.
 TOES = [
     ((-0.20, -0.85, 0.20), (-0.22, -1.18, 0.17), (-0.21, -1.42, 0.135), (0.15, 0.125, 0.12)),
     ((0.00, -0.92, 0.20), (-0.01, -1.24, 0.22), (0.00, -1.42, 0.10), (0.10, 0.085, 0.080)),
@@ -17,7 +17,7 @@ TOES = [
 
 
 def foot_body(seed: int = 0) -> Body:
-    """The solid of the foot and the shin; `seed` sets the unevenness of the skin."""
+    """A left foot with the shin; `seed` sets the unevenness of the skin."""
     skin, fine = Noise(seed, 0.30), Noise(seed + 1, 0.10)
 
     def f(p: Real) -> Real:

@@ -29,7 +29,7 @@ RADII = {
 
 
 def left_hand_body(seed: int = 0) -> Body:
-    """The solid of the left hand; `seed` sets the unevenness of the skin."""
+    """A left hand; `seed` sets the unevenness of the skin."""
     broad, fine = Noise(seed, 0.35), Noise(seed + 1, 0.09)
 
     def f(p: Real) -> Real:

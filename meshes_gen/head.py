@@ -1,7 +1,7 @@
 """A parametric human head: one person, many expressions.
 
-Units of about 9 cm: the face looks along -y, z is up, x = 0 is the plane of symmetry; the head is
-1.5 wide, from the chin at z = -1.15 to the crown at z = 1.1.
+Units are about 9 cm. The face looks along -y, z is up, and x = 0 is the plane of symmetry. The head
+is 1.5 wide, from the chin at z = -1.15 to the crown at z = 1.1.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from .implicit import (
 
 @dataclass(frozen=True)
 class Person:
-    """What stays the same whatever face is made: proportions, relative to an average of 1."""
+    """A person's proportions, relative to an average of 1; the same for all expressions."""
 
     jaw: float = 1.0
     nose: float = 1.0
@@ -42,7 +42,7 @@ class Person:
 
 @dataclass(frozen=True)
 class Expression:
-    """What the muscles do: zero is neutral. Lengths in the head's units.
+    """The action of the facial muscles; zero is neutral. Lengths are in the head's units.
 
     `corners` raises the mouth's (right, left) corner, `width` moves both outwards, `pout` pushes
     the lips forward, `shift` moves the mouth sideways, `cheeks` raises the cheeks, `brows` the
@@ -66,13 +66,13 @@ WRY = Expression(
 )
 
 
-#: How much of its outermost part the groove between pouting lips keeps.
+#: Share of its outermost part that the groove between pouting lips keeps.
 SHORTENED = 0.5
 
 
 @dataclass(frozen=True)
 class Head:
-    """The field of a head, and where its landmarks are."""
+    """The implicit field of a head, and its landmarks."""
 
     person: Person = Person()
     expression: Expression = NEUTRAL
@@ -81,7 +81,7 @@ class Head:
     _cache: dict[str, NDArray[np.float64]] = field(default_factory=dict, compare=False, repr=False)
 
     def skull(self, p: Real) -> Real:
-        """The head without features."""
+        """Return the field of the head without features."""
         j = self.person.jaw
         d = ellipsoid(p, (0, 0.15, 0.30), (0.76, 0.94, 0.80))
         d = join(d, ellipsoid(p, (0, -0.20, -0.33), (0.57 * j, 0.58, 0.78)), 0.25)
@@ -89,13 +89,13 @@ class Head:
         return join(d, ellipsoid(p, (0, -0.02, -0.72), (0.54 * j, 0.40, 0.28)), 0.25)
 
     def front(self, x: float, z: float) -> float:
-        """The y at which a ray from the front meets the skull at (x, z)."""
+        """Return the y at which a ray from the front meets the skull at (x, z)."""
         y = np.linspace(-1.6, 0.2, 3601)
         d = self.skull(np.stack([np.full_like(y, x), y, np.full_like(y, z)], axis=1))
         return float(y[np.argmax(d < 0)])
 
     def _mouth(self) -> Real:
-        """Five points along the line where the lips meet, right corner to left; (5, 3)."""
+        """Return five points along the line where the lips meet, right corner to left; (5, 3)."""
         e = self.expression
         half = 0.245 * self.person.lips + e.width
         x = e.shift + half * np.array([-1, -0.55, 0, 0.55, 1])
@@ -107,7 +107,7 @@ class Head:
 
     @cached_property
     def _points(self) -> dict[str, NDArray[np.float64]]:
-        # Whole or not at all: fields are evaluated on several threads.
+        # Assigned at once, since fields are evaluated on several threads.
         P, c = self.person, dict[str, NDArray[np.float64]]()
         c["mouth"] = self._mouth()
         for s, side in ((-1, "right"), (1, "left")):
@@ -122,9 +122,9 @@ class Head:
         return c
 
     def __call__(self, p: Real) -> Real:
-        """The head at points p (n, 3)."""
+        """Return the field at points p (n, 3)."""
         d = self.skull(p)
-        # Features are local: the sums with them change nothing farther away.
+        # Features are local: adding them changes nothing farther away.
         front = (p[:, 1] < -0.2) & (p[:, 2] < 0.55) & (p[:, 2] > -1.35)
         if front.any():
             d[front] = self._features(p[front], d[front])
@@ -141,7 +141,7 @@ class Head:
         return d
 
     def _features(self, p: Real, d: Real) -> Real:
-        """The skull's field d at p with cheeks, brows, eyes, nose and mouth."""
+        """Add cheeks, brows, eyes, nose and mouth to the skull's field d at p."""
         P, e, c = self.person, self.expression, self._points
         for s, side in ((-1, "right"), (1, "left")):
             eye = c[f"eye_{side}"]
@@ -162,7 +162,7 @@ class Head:
         return self._lips(p, d, c["mouth"])
 
     def front_cached(self, x: float, z: float) -> float:
-        """:meth:`front`, remembered."""
+        """Return :meth:`front`, cached."""
         key = f"front {x} {z}"
         if key not in self._cache:
             self._cache[key] = np.array(self.front(x, z))
@@ -181,7 +181,7 @@ class Head:
         inwards = np.array([0, 0.02, 0])
         upper = line + inwards + np.outer([0.0, 0.9, 0.75, 0.9, 0.0], [0, 0, thick])
         lower = line + inwards - np.outer([0.0, 0.8, 1.1, 0.8, 0.0], [0, 0, thick])
-        if self.expression.pout > 0:  # the flesh behind lips pushed forward
+        if self.expression.pout > 0:  # the tissue behind lips that are pushed forward
             d = join(d, tube(p, line + (0, 0.10, 0), 1.3 * thick, 0.03), 0.12)
         d = join(d, tube(p, upper, radii, 0.03), 0.04)
         d = join(d, tube(p, lower, 1.1 * radii, 0.03), 0.04)
@@ -191,10 +191,10 @@ class Head:
         return carve(d, groove, 0.025)
 
     def _between_lips(self) -> Real:
-        """Five points along the groove between the lips, right corner to left; (5, 3).
+        """Return five points along the groove between the lips, right corner to left; (5, 3).
 
-        Where the lips are pushed forward their ends close over the mouth's line: the groove stops
-        before, or it would run on below them as a tunnel.
+        If the lips are pushed forward, their ends close over the mouth's line. The groove ends
+        before that; otherwise it would continue below them as a tunnel.
         """
         line = self._points["mouth"].copy()
         if self.expression.pout > 0:
@@ -209,7 +209,7 @@ class Head:
         return carve(d, hollow, 0.04)
 
     def landmarks(self) -> dict[str, NDArray[np.float64]]:
-        """Points near the surface: nose tip, corners of eyes and mouth, lips; (3,) each."""
+        """Return points near the surface: nose tip, corners of eyes and mouth, lips; (3,) each."""
         c, P, mouth = self._points, self.person, self._between_lips()
         found = {
             "nose_tip": c["tip"] + (0, -0.085 * P.nose_width, 0),
@@ -227,6 +227,6 @@ class Head:
 
 
 def with_skin(head: Field, seed: int, amplitude: float = 0.0025) -> Field:
-    """The same head with the unevenness of skin, seeded."""
+    """Return the same head with seeded unevenness of the skin."""
     broad, fine = Noise(seed, 0.30), Noise(seed + 1, 0.10)
     return lambda p: head(p) - amplitude * (broad(p) + 0.4 * fine(p))

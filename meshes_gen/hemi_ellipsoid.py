@@ -23,7 +23,8 @@ def hemi_ellipsoid(
 ) -> DiskMesh:
     """The half z >= 0 of the ellipsoid with semi-axes x, y, z.
 
-    No elementary formula gives its map; a fine triangulation is the reference for coarse ones.
+    No elementary formula for its conformal map is known; a fine triangulation is the reference for
+    coarse ones.
     """
     hemisphere = spherical_cap(faces)
     V = hemisphere.V * np.array([x, y, z])

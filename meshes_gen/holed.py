@@ -1,4 +1,4 @@
-"""Surfaces with holes: a spherical cap with 1 to 8, and Ho's face with three."""
+"""Surfaces with holes: a spherical cap with 1 to 8 holes, and Ho's face with three."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CAP, PLACE, HOLE = 100.0, 55.0, 14.0
 
 
 def hole_centres(holes: int) -> NDArray[np.float64]:
-    """Where are the holes of the cap? Unit vectors (holes, 3), evenly about the pole."""
+    """Return the centres of the cap's holes: unit vectors (holes, 3), evenly around the pole."""
     turn = 2 * np.pi * np.arange(holes) / holes
     polar = np.deg2rad(PLACE)
     return np.stack(
@@ -33,7 +33,7 @@ def hole_centres(holes: int) -> NDArray[np.float64]:
 
 
 def holed_cap_body(holes: int) -> Body:
-    """The unit sphere cut by the rim's plane and one plane a hole."""
+    """The unit sphere, cut by the rim's plane and one plane per hole."""
     centres = hole_centres(holes)
 
     def keep(p: Real) -> Real:
@@ -47,7 +47,7 @@ def holed_cap_body(holes: int) -> Body:
 
 
 def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """The cap's map to the unit disk with round holes: stereographic, from the south pole."""
+    """Return the cap's map to the unit disk with round holes: stereographic projection."""
     return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(CAP) / 2)
 
 
@@ -59,7 +59,7 @@ def holed_cap(
     *,
     holes: Annotated[int, Field(ge=1, le=8)] = 3,
 ) -> HoledMesh:
-    """A spherical cap of 100 degrees with `holes` round holes evenly about its pole.
+    """A spherical cap of 100 degrees with `holes` round holes, evenly around its pole.
 
     Stereographic projection, :func:`exact_map`, takes it to the unit disk with round holes.
     """
@@ -86,7 +86,7 @@ def ho_face_with_holes(
     *,
     seed: Annotated[int, Field(ge=0)] = 0,
 ) -> HoledMesh:
-    """Ho's neutral face with three holes: the eyes and the mouth are cut out."""
+    """Ho's neutral face with three holes at the eyes and the mouth."""
     head = Head(HO, NEUTRAL, ears=False)
     marks = head.landmarks()
     eyes = [(marks[f"eye_inner_{s}"] + marks[f"eye_outer_{s}"]) / 2 for s in ("right", "left")]

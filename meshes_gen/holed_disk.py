@@ -1,4 +1,4 @@
-"""The flat unit disk with round holes: its own image, whatever the method."""
+"""The flat unit disk with round holes, which is its own image for every method."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from cembench.registry import surface_family
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-#: Distance of inner points from the circles, in edge lengths.
+#: Distance of interior points from the circles, in edge lengths.
 CLEAR = 0.6
-#: The golden angle, by which one hole is turned from the one before.
+#: The golden angle between successive holes.
 TURN = np.pi * (3 - np.sqrt(5))
 
 
@@ -30,7 +30,7 @@ def holed_disk(
 ) -> HoledMesh:
     """The unit disk with `holes` round holes on a spiral, warped by z + `bend` z^2.
 
-    The warp is conformal, so the disk with round holes is the image, up to a Moebius map.
+    The warp is conformal, so the image is the disk with round holes, up to a Moebius map.
     """
     k = np.arange(holes)
     centres = 0.75 * np.sqrt((k + 0.5) / holes) * np.exp(1j * TURN * k)
@@ -43,15 +43,16 @@ def holed_disk(
 
 
 def disk_with_holes(centres: Complex, radii: Real, faces: int) -> tuple[Real, NDArray[np.int64]]:
-    """V (n, 3) and F of the flat unit disk less round holes, with about so many triangles.
+    """Return V (n, 3) and F of the flat unit disk with round holes, with about `faces` triangles.
 
-    A triangular lattice inside, even points on the circles, triangulated by Delaunay.
+    A triangular lattice inside and evenly spaced points on the circles, in a Delaunay
+    triangulation.
     """
     centres, radii = np.asarray(centres, dtype=complex), np.asarray(radii, dtype=float)
     h = np.sqrt(np.pi * (1 - (radii**2).sum()) * 4 / np.sqrt(3) / faces)
     z, rim = _points(centres, radii, h)
     F = Delaunay(np.stack([z.real, z.imag], axis=1)).simplices.astype(np.int64)
-    # Triangles with all corners on one hole fill it.
+    # Triangles with all corners on one hole lie inside it.
     F = F[(rim[F] != rim[F[:, :1]]).any(axis=1) | (rim[F[:, 0]] <= 0)]
     areas = np.imag(np.conj(z[F[:, 1]] - z[F[:, 0]]) * (z[F[:, 2]] - z[F[:, 0]]))
     F = np.where((areas > 0)[:, None], F, F[:, ::-1])
@@ -59,7 +60,7 @@ def disk_with_holes(centres: Complex, radii: Real, faces: int) -> tuple[Real, ND
 
 
 def _points(centres: Complex, radii: Real, h: float) -> tuple[Complex, NDArray[np.int64]]:
-    """Points (n,), and on which circle each lies: 0 the unit circle, k a hole, -1 none."""
+    """Return points (n,) and their circles: 0 for the unit circle, k for a hole, -1 for none."""
     circles, rim = [], []
     for k, (c, r) in enumerate([(0j, 1.0), *zip(centres, radii, strict=True)]):
         count = max(12, round(2 * np.pi * r / h))

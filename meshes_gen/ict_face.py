@@ -1,4 +1,4 @@
-"""Faces of the ICT face model: as many as one wants, with exact correspondence between them."""
+"""Faces of the ICT face model, in any number and in exact correspondence."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Part = Literal["face", "narrow", "head", "disk"]
 
-#: How many of the expressions that are there a random one mixes.
+#: Number of available expressions that a random expression mixes.
 MIXED = 3
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How many of the model's first polygons and vertices a part has, and of what kind it is."""
+    """The number of the model's first polygons and vertices that form a part, and its mesh type."""
 
     polygons: int
     vertices: int
@@ -38,14 +38,14 @@ class Extent:
     kind: type[TriangleMesh]
 
 
-#: The holes of the first three are the eyes and the mouth; the disk has their sockets.
+#: The first three have holes at the eyes and the mouth; the disk has sockets instead.
 PARTS: Mapping[str, Extent] = {
     "narrow": Extent(6_560, 6_706, 13_120, HoledMesh),
     "face": Extent(9_230, 9_409, 18_460, HoledMesh),
     "head": Extent(11_144, 11_248, 22_288, HoledMesh),
     "disk": Extent(14_034, 14_062, 28_068, DiskMesh),
 }
-#: Twenty of the model's 68 landmarks, the most telling first: vertices of every part.
+#: Twenty of the model's 68 landmarks, most important first; they are vertices of every part.
 LANDMARKS: Mapping[str, int] = {
     "nose_tip": 4_857,
     "eye_outer_right": 1_507,
@@ -77,7 +77,7 @@ class Triangulation:
     Parameters
     ----------
     kept : int64 (n,)
-        The model's vertices that its vertices are.
+        The model's vertex that each vertex is.
     F : int64 (m, 3)
         Triangles.
 
@@ -90,7 +90,7 @@ class Triangulation:
 def landmarks(mesh: TriangleMesh) -> dict[str, int]:
     """Return the vertex of each landmark on a sample of any part and size.
 
-    On a decimated one it is the vertex that lies nearest on the neutral face.
+    On a decimated sample it is the vertex that is nearest on the neutral face.
     """
     if (mesh.n, mesh.m) in [(one.vertices, one.triangles) for one in PARTS.values()]:
         return dict(LANDMARKS)
@@ -98,7 +98,7 @@ def landmarks(mesh: TriangleMesh) -> dict[str, int]:
         made = triangulation(name, mesh.m)
         if np.array_equal(made.F, mesh.F):
             return landmarks_of(made)
-    raise ParameterError(f"{mesh.name} is no sample of the ICT face model, so it has no landmarks.")
+    raise ParameterError(f"{mesh.name} has no landmarks: it is not a sample of the ICT face model.")
 
 
 def landmarks_of(made: Triangulation) -> dict[str, int]:
@@ -124,22 +124,22 @@ def ict_face(
     expression: str = "neutral",
     part: Part = "disk",
 ) -> TriangleMesh:
-    """A face of a statistical model of scanned people: another one for each seed.
+    """A face of a statistical model of scanned people; each seed gives another face.
 
-    Every sample of a part has the same triangles, and a vertex is the same place on all of them.
-    `part` "disk" is the head with eye and mouth sockets, one boundary at the neck (28,068
-    triangles); "head", "face" and "narrow" end at the eyes and the mouth, three holes (22,288,
-    18,460 and 13,120). `faces` below that decimates the neutral face (with pymeshlab) and takes the
-    vertices that are left from the sample: they correspond all the same, also between different
-    numbers of `faces`.
+    Every sample of a part has the same triangles, and a vertex is the same anatomical point on all
+    of them. `part` "disk" is the head with eye and mouth sockets and one boundary at the neck
+    (28,068 triangles); "head", "face" and "narrow" end at the eyes and the mouth, with three holes
+    (22,288, 18,460 and 13,120). A smaller `faces` decimates the neutral face (with pymeshlab) and
+    takes the remaining vertices from the sample; these correspond too, even between different
+    values of `faces`.
 
-    The identity's coefficients are independent standard normal numbers, as the model has it; the
-    k-th goes to identity k, also where others are missing. `expression` is "neutral", "random"
-    (three of those that are there, with weights between 0 and 1), or names as published, with
+    The identity's coefficients are independent standard normal numbers, as the model prescribes;
+    the k-th belongs to identity k, even if others are missing. `expression` is "neutral", "random"
+    (three of the available expressions, with weights between 0 and 1), or published names with
     weights: "jawOpen", "mouthSmile" for both sides, "mouthSmile_L:0.5+jawOpen:0.3".
 
-    The model's files are fetched once (``cembench fetch --group ict-face``) or lie in the folder
-    `CEMBENCH_ICT_FACE`; with some of the modes missing the faces vary less.
+    The model's files are fetched once (``cembench fetch --group ict-face``), or are in the folder
+    `CEMBENCH_ICT_FACE`. If some of the modes are missing, the faces vary less.
     """
     extent, model = PARTS[part], load_model()
     made = triangulation(part, faces)
@@ -155,7 +155,7 @@ def sample(model: FaceModel, seed: int, expression: str = "neutral") -> Real:
     Raises
     ------
     ParameterError
-        An expression that is unknown or not there, or a weight that is not between 0 and 1.
+        The expression is unknown or not available, or a weight is not between 0 and 1.
 
     """
     coefficients = np.random.default_rng([seed, 0]).standard_normal(len(IDENTITIES))
@@ -169,12 +169,12 @@ def sample(model: FaceModel, seed: int, expression: str = "neutral") -> Real:
 
 
 def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict[str, float]:
-    """Return the weight of each published expression in one that a user names.
+    """Return the weight of each published expression in an expression as users write it.
 
     Raises
     ------
     ParameterError
-        An expression that is unknown or not there, or a weight that is not between 0 and 1.
+        The expression is unknown or not available, or a weight is not between 0 and 1.
 
     """
     if expression == "neutral":
@@ -191,9 +191,9 @@ def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict
         sides = [one for one in (name, f"{name}_L", f"{name}_R") if one in model.expressions]
         if not sides:
             known = name in EXPRESSIONS or f"{name}_L" in EXPRESSIONS
-            why = "is not among the files that are there" if known else "is unknown"
+            why = "is not among the available files" if known else "is unknown"
             raise ParameterError(
-                f"ict-face: expression {name!r} {why}; there are: neutral, random"
+                f"ict-face: expression {name!r} {why}; available are: neutral, random"
                 f"{''.join(f', {one}' for one in sorted(model.expressions))}."
             )
         found |= dict.fromkeys(sides, weight)
@@ -201,6 +201,7 @@ def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict
 
 
 def _weight(given: str, expression: str) -> float:
+    """Return a weight between 0 and 1 from text."""
     try:
         weight = float(given)
     except ValueError:
@@ -215,10 +216,10 @@ def _weight(given: str, expression: str) -> float:
 
 @functools.lru_cache(maxsize=16)
 def triangulation(part: str, faces: int) -> Triangulation:
-    """Return the triangles of a part, decimated to about `faces` where it has more.
+    """Return the triangles of a part, decimated to about `faces` if it has more.
 
-    Edges of the neutral face are collapsed to one of their ends (quadric error metric), so that
-    what is left are vertices of the model.
+    Edges of the neutral face are collapsed to one of their ends (quadric error metric), so the
+    remaining vertices are vertices of the model.
 
     Raises
     ------
@@ -236,15 +237,15 @@ def triangulation(part: str, faces: int) -> Triangulation:
 
 
 def _decimated(V: Real, F: Ints, faces: int) -> tuple[Ints, Ints]:
-    """Collapse edges to one of their ends; return the vertices that are left, and triangles."""
+    """Collapse edges to one of their ends; return the remaining vertices and the triangles."""
     require(Extra.STANDINS, "an ICT face of fewer triangles", "pymeshlab")
-    import pymeshlab  # slow to load
+    import pymeshlab  # slow to import
 
     meshes = pymeshlab.MeshSet(verbose=False)
     meshes.add_mesh(pymeshlab.Mesh(V, F))
     meshes.meshing_decimation_quadric_edge_collapse(
         targetfacenum=faces,
-        optimalplacement=False,  # the vertices that stay are vertices of the model
+        optimalplacement=False,  # the remaining vertices are vertices of the model
         preserveboundary=True,
         preservenormal=True,
         preservetopology=True,
@@ -252,5 +253,5 @@ def _decimated(V: Real, F: Ints, faces: int) -> tuple[Ints, Ints]:
     made = meshes.current_mesh()
     made.compact()
     apart, kept = KDTree(V).query(made.vertex_matrix())
-    assert apart.max() == 0, "a vertex of the decimated face is none of the model's"
+    assert apart.max() == 0, "a vertex of the decimated face is not a vertex of the model"
     return kept.astype(np.int64), made.face_matrix().astype(np.int64)

@@ -1,9 +1,9 @@
-"""The files of the ICT face model: read once, kept as small arrays.
+"""The files of the ICT face model, read once and kept as small arrays.
 
 The model (Li et al., "Learning formation of physically-based face attributes", CVPR 2020; MIT) is
-published as OBJ files of one topology: a neutral face, 100 identities and 53 expressions, each the
-neutral face moved by one mode. `CEMBENCH_ICT_FACE` names a folder with those files, or some of
-them; without it they lie where ``cembench fetch --group ict-face`` puts them.
+published as OBJ files with one topology: a neutral face, 100 identities and 53 expressions, each
+the neutral face moved by one mode. `CEMBENCH_ICT_FACE` names a folder with all or some of these
+files; otherwise they are where ``cembench fetch --group ict-face`` puts them.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cembench.mesh.obj_reader import read_obj
 Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Overrides the folder in which the model's files lie.
+#: Environment variable for the folder of the model's files.
 FOLDER_VARIABLE = "CEMBENCH_ICT_FACE"
 NEUTRAL = "generic_neutral_mesh"
 IDENTITIES = tuple(f"identity{k:03d}" for k in range(100))
@@ -43,18 +43,18 @@ _SINGLE = (
     "jawForward jawLeft jawOpen jawRight mouthClose mouthFunnel mouthLeft mouthPucker mouthRight "
     "mouthRollLower mouthRollUpper mouthShrugLower mouthShrugUpper"
 )
-#: As published; those of one side end with _L or _R, the person's own left and right.
+#: Published names; those of one side end with _L or _R, the person's own left and right.
 EXPRESSIONS = tuple(
     sorted([f"{name}_{side}" for name in _PAIRS.split() for side in "LR"] + _SINGLE.split())
 )
-#: What every published file has, and what of it is kept: the skin with mouth and eye sockets.
+#: Counts of every published file, and those that are kept: skin with mouth and eye sockets.
 VERTICES, POLYGONS = 26_719, 26_384
 KEPT_VERTICES, KEPT_POLYGONS = 14_062, 14_034
 
 
 @dataclass(frozen=True)
 class FaceModel:
-    """The neutral face, and how each mode that is there moves it.
+    """The neutral face, and the displacement of each available mode.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class FaceModel:
     corners, sizes : int64
         Its polygons, as in a :class:`cembench.mesh.soup.Soup`.
     identities, expressions : mapping of str to float64 (14062, 3)
-        What a coefficient of 1 adds; only those whose files are there.
+        Displacement for a coefficient of 1; only modes whose files are available.
 
     """
 
@@ -75,12 +75,12 @@ class FaceModel:
 
 
 def model_folder() -> Path:
-    """Return where the model's files lie, or would: `CEMBENCH_ICT_FACE`, or the cache."""
+    """Return the folder of the model's files: `CEMBENCH_ICT_FACE`, or the cache."""
     return Path(os.environ.get(FOLDER_VARIABLE) or cache_directory() / "ict-face")
 
 
 def load_model() -> FaceModel:
-    """Return the model with the modes that are there.
+    """Return the model with the available modes.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def load_model() -> FaceModel:
 
 @functools.lru_cache(maxsize=2)
 def _loaded(folder: Path, there: tuple[tuple[str, int], ...]) -> FaceModel:
-    """Load what is there: names of files, and when they were changed last."""
+    """Load the available files, given as names with modification times."""
     stems = {Path(name).stem for name, _ in there}
 
     def found(names: tuple[str, ...]) -> list[str]:
@@ -137,19 +137,19 @@ def _arrays(folder: Path, name: str) -> tuple[Real, Ints, Ints]:
     found = read_small(kept)
     if found is None:
         content = small_arrays(published)
-        with suppress(RecordError):  # a cache that cannot be written to is done without
+        with suppress(RecordError):  # the cache cannot be written to
             write_bytes(kept, content)
         found = _of_bytes(content)
     return found
 
 
 def small_arrays(published: Path) -> bytes:
-    """Return what is kept of a published file: an NPZ of 0.4 MB for 2.6 MB of text.
+    """Return the kept part of a published file: an NPZ of 0.4 MB for 2.6 MB of text.
 
     Raises
     ------
     DatasetError
-        The file is not one of the model's, or not whole.
+        The file is not part of the model, or is incomplete.
 
     """
     try:
@@ -178,7 +178,7 @@ def small_arrays(published: Path) -> bytes:
 
 
 def read_small(path: Path) -> tuple[Real, Ints, Ints] | None:
-    """Return the arrays of a kept file; None if it is not there, not whole, or another file."""
+    """Return the arrays of a kept file; None if it is missing, incomplete or another file."""
     try:
         return _of_bytes(path.read_bytes())
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):

@@ -1,4 +1,4 @@
-"""Solids as the negative set of a function: primitives, smooth unions, seeded noise.
+"""Solids as negative sets of functions: primitives, smooth unions, seeded noise.
 
 Contract: a field f takes points (n, 3) and returns (n,), negative inside, roughly a signed distance
 (slope near 1), so that a few Newton steps along its gradient reach the surface f = 0.
@@ -16,22 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 Real = NDArray[np.float64]
 Field = Callable[[Real], Real]
 
-#: Points evaluated at once: the temporaries stay in the processor's cache.
+#: Points evaluated at once; temporary arrays then stay in the processor's cache.
 CHUNK = 32_768
 
 
 @dataclass(frozen=True)
 class Body:
-    """The surface ``f = 0`` where ``keep >= 0``: a disk if `keep` cuts a closed surface once.
+    """The surface ``f = 0`` where ``keep >= 0``; a disk if `keep` cuts a closed surface once.
 
     Parameters
     ----------
-    f : field
-        The solid, negative inside.
-    keep : field
-        Positive where the surface stays; its zero set is the boundary curve.
-    lower, upper : (3,) floats
-        A box that holds the whole solid, with room to spare where it is not cut.
+    f : callable
+        The field of the solid, negative inside.
+    keep : callable
+        A field that is positive where the surface is kept; its zero set is the boundary curve.
+    lower, upper : float (3,)
+        A box that holds the whole solid, with a margin where it is not cut.
     cells : int
         Cells of the first sampling grid along the longest side of the box.
     loops : int
@@ -53,7 +53,7 @@ class Body:
 
 
 def evaluate(f: Field, p: Real) -> Real:
-    """What is f at the points p (n, 3)? The same as ``f(p)``, in chunks, on two threads."""
+    """Return f at points p (n, 3), like ``f(p)`` but in chunks on two threads."""
     if len(p) <= CHUNK:
         return f(p)
     chunks = [p[k : k + CHUNK] for k in range(0, len(p), CHUNK)]
@@ -65,19 +65,19 @@ _TETRAHEDRON = np.array([[1, -1, -1], [-1, -1, 1], [-1, 1, -1], [1, 1, 1]], dtyp
 
 
 def gradient(f: Field, p: Real, step: float) -> Real:
-    """The gradient of f at p (n, 3), by differences over a tetrahedron of half-width `step`."""
+    """Return the gradient of f at p (n, 3), from a tetrahedron of half-width `step`."""
     return value_and_gradient(f, p, step)[1]
 
 
 def value_and_gradient(f: Field, p: Real, step: float) -> tuple[Real, Real]:
-    """The field and its gradient at p, from four values: the mean is f up to step squared."""
+    """Return the field and its gradient at p from four values; f is correct to order step^2."""
     values = [evaluate(f, p + step * k) for k in _TETRAHEDRON]
     slope = sum(v[:, None] * k for v, k in zip(values, _TETRAHEDRON, strict=True))
     return np.mean(values, axis=0), slope / (4 * step)
 
 
 def to_surface(f: Field, p: Real, step: float, reach: float, rounds: int = 4) -> Real:
-    """Where do the points p (n, 3) meet f = 0, along the gradient, at most `reach` a round?"""
+    """Move points p (n, 3) along the gradient to f = 0, by at most `reach` per round."""
     p = p.copy()
     active = np.arange(len(p))
     for _ in range(rounds):
@@ -93,7 +93,7 @@ def to_surface(f: Field, p: Real, step: float, reach: float, rounds: int = 4) ->
 
 
 def to_curve(f: Field, g: Field, p: Real, step: float, reach: float, rounds: int = 6) -> Real:
-    """Where do the points p (n, 3) meet the curve f = g = 0, by the shortest way?"""
+    """Move points p (n, 3) to the curve f = g = 0 by the shortest way."""
     for _ in range(rounds):
         a, b = gradient(f, p, step), gradient(g, p, step)
         fa, fb = evaluate(f, p), evaluate(g, p)
@@ -108,12 +108,12 @@ def to_curve(f: Field, g: Field, p: Real, step: float, reach: float, rounds: int
 
 
 def sphere(p: Real, centre: ArrayLike, radius: float) -> Real:
-    """Signed distance to a sphere."""
+    """Return the signed distance to a sphere."""
     return np.linalg.norm(p - np.asarray(centre), axis=1) - radius
 
 
 def rotation(axis: str, degrees: float) -> Real:
-    """The matrix that turns by `degrees` about the axis "x", "y" or "z"."""
+    """Return the matrix that rotates by `degrees` about the axis "x", "y" or "z"."""
     c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
     i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
     R = np.eye(3)
@@ -122,7 +122,7 @@ def rotation(axis: str, degrees: float) -> Real:
 
 
 def ellipsoid(p: Real, centre: ArrayLike, radii: ArrayLike, turn: Real | None = None) -> Real:
-    """Distance to an ellipsoid to first order; `turn` rotates it about its centre."""
+    """Return the first-order distance to an ellipsoid, rotated by `turn` about its centre."""
     q = p - np.asarray(centre)
     if turn is not None:
         q = q @ turn
@@ -133,7 +133,7 @@ def ellipsoid(p: Real, centre: ArrayLike, radii: ArrayLike, turn: Real | None = 
 
 
 def cone(p: Real, a: ArrayLike, b: ArrayLike, ra: float, rb: float) -> Real:
-    """Distance to a capsule from a to b whose radius goes from ra to rb."""
+    """Return the distance to a capsule from a to b whose radius goes from ra to rb."""
     start, axis = np.asarray(a, dtype=np.float64), np.subtract(b, a)
     q = p - start
     t = np.clip(q @ axis / (axis @ axis), 0, 1)
@@ -141,7 +141,7 @@ def cone(p: Real, a: ArrayLike, b: ArrayLike, ra: float, rb: float) -> Real:
 
 
 def tube(p: Real, points: ArrayLike, radii: ArrayLike, k: float = 0.0) -> Real:
-    """Distance to a chain of :func:`cone` through points (j, 3), joined with smoothness k."""
+    """Return the distance to a chain of :func:`cone` through points (j, 3), joined over k."""
     c = np.asarray(points, dtype=np.float64)
     r = np.broadcast_to(np.asarray(radii, dtype=np.float64), (len(c),))
     parts = [cone(p, c[i], c[i + 1], float(r[i]), float(r[i + 1])) for i in range(len(c) - 1)]
@@ -152,14 +152,14 @@ def tube(p: Real, points: ArrayLike, radii: ArrayLike, k: float = 0.0) -> Real:
 
 
 def box(p: Real, centre: ArrayLike, half: ArrayLike, rounding: float = 0.0) -> Real:
-    """Signed distance to a box with rounded edges."""
+    """Return the signed distance to a box with rounded edges."""
     q = np.abs(p - np.asarray(centre)) - (np.asarray(half) - rounding)
     outside = np.linalg.norm(np.maximum(q, 0), axis=1)
     return outside + np.minimum(q.max(axis=1), 0) - rounding
 
 
 def ring(p: Real, centre: ArrayLike, normal: ArrayLike, radius: float, thick: float) -> Real:
-    """Signed distance to a torus."""
+    """Return the signed distance to a torus."""
     n = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
     q = p - np.asarray(centre)
     along = q @ n
@@ -168,29 +168,29 @@ def ring(p: Real, centre: ArrayLike, normal: ArrayLike, radius: float, thick: fl
 
 
 def join(a: Real, b: Real, k: float) -> Real:
-    """The union of two solids, rounded over a distance k."""
+    """Return the union of two solids, rounded over a distance k."""
     h = np.maximum(k - np.abs(a - b), 0) / k
     return np.minimum(a, b) - h * h * k / 4
 
 
 def meet(a: Real, b: Real, k: float) -> Real:
-    """The intersection of two solids, rounded over a distance k."""
+    """Return the intersection of two solids, rounded over a distance k."""
     return -join(-a, -b, k)
 
 
 def carve(a: Real, b: Real, k: float) -> Real:
-    """Solid a without solid b, rounded over a distance k."""
+    """Return solid a minus solid b, rounded over a distance k."""
     return meet(a, -b, k)
 
 
 def bump(p: Real, centre: ArrayLike, width: ArrayLike) -> Real:
-    """A Gaussian of height 1 about `centre`, for pushing a surface in or out."""
+    """Return a Gaussian of height 1 about `centre`, for pushing a surface in or out."""
     q = (p - np.asarray(centre)) / np.asarray(width)
     return np.exp(-(q * q).sum(axis=1))
 
 
 def halfspace(normal: ArrayLike, offset: float) -> Field:
-    """The field that is positive on the side of the plane that `normal` points to."""
+    """Return the field that is positive on the side of a plane that `normal` points to."""
     n = np.asarray(normal, dtype=np.float64) / np.linalg.norm(normal)
     return lambda p: p @ n - offset
 
@@ -198,7 +198,7 @@ def halfspace(normal: ArrayLike, offset: float) -> Field:
 class Noise:
     """Smooth noise of about unit amplitude: plane waves of random direction and phase.
 
-    `wavelength` is the mean one, in units of the points; the same seed gives the same noise.
+    `wavelength` is the mean wavelength in units of the points; the same seed gives the same noise.
     """
 
     def __init__(self, seed: int, wavelength: float, waves: int = 12, spread: float = 0.3) -> None:
@@ -211,5 +211,5 @@ class Noise:
         self._scale = np.sqrt(2 / waves)
 
     def __call__(self, p: Real) -> Real:
-        """The noise at points p (n, 3)."""
+        """Return the noise at points p (n, 3)."""
         return self._scale * np.sin(p @ self._k + self._phase).sum(axis=1)

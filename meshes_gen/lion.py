@@ -20,7 +20,7 @@ from .implicit import (
 
 
 def _curl(p: Real, centre: Real, outward: Real, radius: float, hand: int) -> Real:
-    """A button with a spiral groove, like the curls of a stone lion's mane."""
+    """Return a button with a spiral groove, like the curls of a stone lion's mane."""
     q = p - centre
     w = outward / np.linalg.norm(outward)
     u = np.cross(w, (0.2, 0.3, 1.0))
@@ -33,7 +33,7 @@ def _curl(p: Real, centre: Real, outward: Real, radius: float, hand: int) -> Rea
 
 
 def chinese_lion_body(seed: int = 0) -> Body:
-    """The solid of the lion's head, cut flat behind the mane; `seed` sets the stone's wear."""
+    """A lion's head, cut flat behind the mane; `seed` sets the wear of the stone."""
     wear = Noise(seed + 1, 0.25)
     curls = []
     for ring, (count, reach, back, size) in enumerate(
@@ -107,5 +107,5 @@ def chinese_lion_body(seed: int = 0) -> Body:
 
 
 def box_tooth(p: Real, x: float) -> Real:
-    """A front tooth under the upper lip."""
+    """Return a front tooth under the upper lip."""
     return ellipsoid(p, (x, -0.93, -0.50), (0.045, 0.05, 0.07))

@@ -1,4 +1,4 @@
-"""Splits, collapses and flips of many edges at once, the steps that remeshing is made of.
+"""Splits, collapses and flips of many edges at once, the building blocks of remeshing.
 
 Every operation takes and returns arrays V (n, 3), F (m, 3) of an oriented manifold and works on an
 independent set of edges: no two of them touch the same triangle, so their order does not matter.
@@ -18,10 +18,10 @@ Faces = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Edges:
-    """All edges with the triangles at them.
+    """All edges with their triangles.
 
-    `ends` (k, 2) in the direction of the first triangle; `face` and `corner` (k, 2) the triangles
-    and which of their corners lies opposite; the second is -1 on the boundary.
+    `ends` (k, 2) in the direction of the first triangle; `face` and `corner` (k, 2) are the
+    triangles and their opposite corners; the second is -1 on the boundary.
     """
 
     ends: Faces
@@ -30,12 +30,12 @@ class Edges:
 
     @property
     def on_boundary(self) -> NDArray[np.bool_]:
-        """Which edges have a single triangle?"""
+        """Whether each edge has a single triangle."""
         return self.face[:, 1] < 0
 
 
 def edges_of(F: Faces, n: int) -> Edges:
-    """Which edges have the triangles F, and what lies at each side of them?"""
+    """Return the edges of the triangles F, with the triangles on each side."""
     m = len(F)
     tail = F[:, [1, 2, 0]].ravel()
     head = F[:, [2, 0, 1]].ravel()
@@ -56,7 +56,7 @@ def edges_of(F: Faces, n: int) -> Edges:
 
 
 def boundary_mask(F: Faces, n: int) -> NDArray[np.bool_]:
-    """Which of the n vertices lie on the boundary?"""
+    """Whether each of the n vertices is on the boundary."""
     edges = edges_of(F, n)
     mask = np.zeros(n, dtype=bool)
     mask[edges.ends[edges.on_boundary]] = True
@@ -64,20 +64,20 @@ def boundary_mask(F: Faces, n: int) -> NDArray[np.bool_]:
 
 
 def compact(V: Real, F: Faces) -> tuple[Real, Faces]:
-    """The same mesh without vertices that no triangle uses."""
+    """Return the same mesh without unused vertices."""
     used = np.zeros(len(V), dtype=bool)
     used[F] = True
     return V[used], (np.cumsum(used) - 1)[F]
 
 
 def area_vectors(V: Real, F: Faces) -> Real:
-    """Normals of the triangles, as long as twice their areas; (m, 3)."""
+    """Return normals of the triangles, with length twice their area; (m, 3)."""
     a, b, c = (V[F[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
 
 def vertex_normals(V: Real, F: Faces) -> Real:
-    """Unit normals at the vertices, weighted by area; (n, 3)."""
+    """Return unit normals at the vertices, weighted by area; (n, 3)."""
     N = area_vectors(V, F)
     total = np.stack(
         [
@@ -90,7 +90,7 @@ def vertex_normals(V: Real, F: Faces) -> Real:
 
 
 def mean_of_neighbours(V: Real, F: Faces) -> Real:
-    """The mean of each vertex's neighbours; boundary neighbours count half. Shape (n, 3)."""
+    """Return the mean of each vertex's neighbours (n, 3); boundary neighbours count half."""
     n = len(V)
     total = np.zeros((n, 3))
     count = np.zeros(n)
@@ -104,7 +104,7 @@ def mean_of_neighbours(V: Real, F: Faces) -> Real:
 
 
 def _ranks(priority: Real) -> NDArray[np.int64]:
-    """1 for the lowest priority, and so on; ties broken by position."""
+    """Return ranks from 1 for the lowest priority; ties are broken by position."""
     ranks = np.empty(len(priority), dtype=np.int64)
     ranks[np.argsort(priority, kind="stable")] = np.arange(1, len(priority) + 1)
     return ranks
@@ -113,10 +113,10 @@ def _ranks(priority: Real) -> NDArray[np.int64]:
 def split(
     V: Real, F: Faces, edges: Edges, chosen: NDArray[np.int64], priority: Real
 ) -> tuple[Real, Faces]:
-    """Halve those of the `chosen` edges that are first by `priority` in both their triangles."""
+    """Split those `chosen` edges that have the first `priority` in both of their triangles."""
     rank = _ranks(priority)
     face, corner, ends = edges.face[chosen], edges.corner[chosen], edges.ends[chosen]
-    best = np.zeros(len(F) + 1, dtype=np.int64)  # the last is for face -1
+    best = np.zeros(len(F) + 1, dtype=np.int64)  # the last entry is for face -1
     for side in range(2):
         np.maximum.at(best, face[:, side], rank)
     best[-1] = 0
@@ -142,10 +142,10 @@ def collapse(
     length: Real,
     most: int | None = None,
 ) -> tuple[Real, Faces]:
-    """Contract an independent set of the `chosen` edges, the shortest by `length` first.
+    """Collapse an independent set of the `chosen` edges, the shortest by `length` first.
 
-    An edge stays if contracting it would change the topology, turn a triangle over, or join two
-    boundary vertices across the interior. At most `most` edges go.
+    An edge stays if its collapse would change the topology, reverse a triangle, or join two
+    boundary vertices across the interior. At most `most` edges are collapsed.
     """
     n = len(V)
     bound = np.zeros(n, dtype=bool)
@@ -178,7 +178,7 @@ def collapse(
     b = bound[ends]
     one = b[:, 0] != b[:, 1]
     where[one] = V[np.where(b[one, 0], ends[one, 0], ends[one, 1])]
-    # No triangle may turn over or become a sliver.
+    # No triangle may be reversed or become a sliver.
     owner = np.full(n, -1)
     owner[ends[:, 0]] = owner[ends[:, 1]] = np.arange(len(ends))
     own = owner[F]
@@ -210,14 +210,14 @@ def collapse(
 
 
 def _cotangents(V: Real, p: Faces, i: Faces, j: Faces) -> Real:
-    """The cotangent at p of the triangle p i j."""
+    """Return the cotangent at p of the triangle p i j."""
     u, v = V[i] - V[p], V[j] - V[p]
     return (u * v).sum(axis=1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-300)
 
 
 @dataclass(frozen=True)
 class Quads:
-    """Interior edges i j with the corners p (in the first triangle) and q opposite to them."""
+    """Interior edges i j with their opposite corners p (in the first triangle) and q."""
 
     i: Faces
     j: Faces
@@ -226,15 +226,15 @@ class Quads:
     face: Faces
 
     def weight(self, V: Real) -> Real:
-        """Cotangent sums: negative where the edge is not Delaunay."""
+        """Return cotangent sums, negative if the edge is not Delaunay."""
         return _cotangents(V, self.p, self.i, self.j) + _cotangents(V, self.q, self.j, self.i)
 
     def flipped_weight(self, V: Real) -> Real:
-        """The same sums for the other diagonal p q."""
+        """Return the same sums for the other diagonal p q."""
         return _cotangents(V, self.i, self.p, self.q) + _cotangents(V, self.j, self.q, self.p)
 
     def folds(self, V: Real) -> NDArray[np.bool_]:
-        """Would the other diagonal fold the surface over?"""
+        """Whether the other diagonal would fold the surface."""
         T = (V[self.p], V[self.i], V[self.q], V[self.j])
         old0, old1 = np.cross(T[1] - T[0], T[3] - T[0]), np.cross(T[3] - T[2], T[1] - T[2])
         new0, new1 = np.cross(T[1] - T[0], T[2] - T[0]), np.cross(T[2] - T[0], T[3] - T[0])
@@ -247,21 +247,21 @@ class Quads:
         return folded
 
     def take(self, k: NDArray[np.int64] | NDArray[np.bool_]) -> Quads:
-        """Some of them."""
+        """Return a selection of them."""
         return Quads(self.i[k], self.j[k], self.p[k], self.q[k], self.face[k])
 
 
 def quads_of(F: Faces, edges: Edges) -> Quads:
-    """The two triangles at every interior edge."""
+    """Return the two triangles at every interior edge."""
     inner = ~edges.on_boundary
     (i, j), face, corner = edges.ends[inner].T, edges.face[inner], edges.corner[inner]
     return Quads(i, j, F[face[:, 0], corner[:, 0]], F[face[:, 1], corner[:, 1]], face)
 
 
 def flip(F: Faces, quads: Quads, priority: Real, edges: Edges, n: int) -> tuple[Faces, Faces]:
-    """Turn an independent set of edges, highest priority first; also the triangles that changed.
+    """Flip an independent set of edges, highest priority first; also return the changed triangles.
 
-    An edge stays where its other diagonal is an edge already.
+    An edge stays if its other diagonal already is an edge.
     """
     key = np.sort(np.minimum(*edges.ends.T) * n + np.maximum(*edges.ends.T))
     new = np.minimum(quads.p, quads.q) * n + np.maximum(quads.p, quads.q)
@@ -274,7 +274,7 @@ def flip(F: Faces, quads: Quads, priority: Real, edges: Edges, n: int) -> tuple[
         np.maximum.at(best, quads.face[:, side], rank)
     wins = (best[quads.face] == rank[:, None]).all(axis=1)
     quads, new = quads.take(wins), new[wins]
-    once = np.unique(new, return_index=True)[1]  # two flips must not make the same edge
+    once = np.unique(new, return_index=True)[1]  # two flips must not create the same edge
     quads = quads.take(np.sort(once))
     F = F.copy()
     F[quads.face[:, 0]] = np.stack([quads.p, quads.i, quads.q], axis=1)
@@ -285,10 +285,10 @@ def flip(F: Faces, quads: Quads, priority: Real, edges: Edges, n: int) -> tuple[
 def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
     """Flip edges until (nearly) all are Delaunay: no cotangent weight is negative.
 
-    An edge whose flip would fold the surface, or double an edge, stays.
+    An edge stays if its flip would fold the surface or duplicate an edge.
     """
     n = len(V)
-    # After the first round, only what lies about the last changes.
+    # After the first round, only look around the latest changes.
     active, near = np.arange(len(F)), np.ones(n, dtype=bool)
     for _ in range(rounds):
         part = F[active]
@@ -297,7 +297,7 @@ def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
         weight = quads.weight(V)
         bad = weight < -1e-10
         quads, weight = quads.take(bad), weight[bad]
-        # All edges at p must be in sight, or the other diagonal may be an edge unseen.
+        # All edges at p must be included, or an existing edge p q could be missed.
         better = near[quads.p] & (quads.flipped_weight(V) > weight + 1e-9) & ~quads.folds(V)
         quads, weight = quads.take(better), weight[better]
         if not len(weight):
@@ -316,7 +316,7 @@ def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
 
 
 def subdivide(V: Real, F: Faces) -> tuple[Real, Faces]:
-    """Cut every triangle into four at the midpoints of its edges."""
+    """Divide every triangle into four at the midpoints of its edges."""
     edges = edges_of(F, len(V))
     at = np.empty(F.shape, dtype=np.int64)  # the midpoint opposite to each corner
     middle = len(V) + np.arange(len(edges.ends))

@@ -11,10 +11,10 @@ Complex = NDArray[np.complex128]
 
 
 def rectangle_grid(faces: int, aspect: float) -> tuple[Complex, NDArray[np.int64]]:
-    """Points and triangles of the rectangle 0 <= x <= aspect, 0 <= y <= 1, about `faces` of them.
+    """Return points and about `faces` triangles of the rectangle 0 <= x <= aspect, 0 <= y <= 1.
 
-    Squares with alternating diagonals, an even number each way, so that every corner has a diagonal
-    and with it an interior neighbour (Definition 1). Counter-clockwise.
+    Squares with alternating diagonals, an even number in each direction, so that every corner has a
+    diagonal and therefore an interior neighbour (Definition 1). Counter-clockwise.
     """
     rows = max(2, 2 * round(np.sqrt(faces / (2 * aspect)) / 2))
     columns = max(2, 2 * round(faces / (2 * rows) / 2))
@@ -38,13 +38,13 @@ def rectangle_grid(faces: int, aspect: float) -> tuple[Complex, NDArray[np.int64
 
 
 def rectangle_to_disk(z: Complex, aspect: float) -> Complex:
-    """The conformal map of that rectangle to the unit disk, its centre to the origin.
+    """Return the conformal map of that rectangle to the unit disk, with its centre at the origin.
 
     Jacobi's sn maps the rectangle (-K, K) x (0, K') to the upper half-plane; aspect = 2 K / K'.
-    Exact for aspects between about 1/5 and 20.
+    Accurate for aspects between about 1/5 and 20.
     """
 
-    def off(t: float) -> float:  # t is the logarithm of the complementary parameter's odds
+    def off(t: float) -> float:  # t is the logit of the complementary parameter
         m1 = 1 / (1 + np.exp(t))
         return float(2 * ellipkm1(m1) / ellipkm1(1 / (1 + np.exp(-t))) - aspect)
 
@@ -64,7 +64,7 @@ def rectangle_to_disk(z: Complex, aspect: float) -> Complex:
     out = np.empty(len(z), dtype=np.complex128)
     half = sn(np.where(lower, w, w.real + 1j * (K1 - w.imag)))
     image = (half - middle) / (half - np.conj(middle))
-    # Reflection in the middle line is complex conjugation of the image, turned by its direction.
+    # Reflection in the middle line conjugates the image, up to a rotation.
     edge = sn(np.array([0.5j * K1 + 0.3 * K]))[0]
     direction = (edge - middle) / (edge - np.conj(middle))
     direction /= abs(direction)

@@ -1,10 +1,10 @@
-"""From an implicit solid to a disk of given counts.
+"""From an implicit solid to a disk with given counts.
 
 Marching cubes, a clean cut along ``keep = 0``, isotropic remeshing (pymeshlab's filter, or local
-operations alone where the filter is missing), then: the boundary resampled to its count, the
-triangles to theirs, everything kept on the surface by Newton steps, and Delaunay flips. Large
-counts are reached by subdividing a mesh of at most :data:`BASE` triangles, back to the surface each
-time, so fine detail of the solid appears as the mesh becomes fine enough to hold it.
+operations alone if the filter is missing); then the boundary is resampled to its count and the
+triangles to theirs, with all vertices kept on the surface by Newton steps, and Delaunay flips.
+Large counts are reached by subdividing a mesh of at most :data:`BASE` triangles, projected back to
+the surface each time, so that fine detail of the solid appears once the mesh can represent it.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from .tunnels import plugged, plugs_for
 
 M = TypeVar("M", bound=TriangleMesh)
 
-#: Largest count that is remeshed directly; beyond it, subdivision.
+#: Largest count that is remeshed directly; above it, meshes are subdivided.
 BASE = 110_000
 
-#: Which share of the interior edges `delaunay=False` leaves not Delaunay.
+#: Share of the interior edges that `delaunay=False` makes non-Delaunay.
 NON_DELAUNAY = 0.05
 
-#: What the notices say where pymeshlab's filter is missing.
+#: The notice for a missing pymeshlab filter.
 FALLBACK_NOTE = Notice(
     NoticeKind.REMESHED_WITHOUT_FILTER,
     "remeshed by local operations alone: pymeshlab's isotropic remeshing filter is missing "
@@ -60,7 +60,7 @@ FALLBACK_NOTE = Notice(
 
 @lru_cache(maxsize=1)
 def has_remeshing_filter() -> bool:
-    """Can pymeshlab remesh here? Its plug-ins vanish silently where libOpenGL is missing."""
+    """Whether pymeshlab can remesh; its plug-ins vanish silently without libOpenGL."""
     if missing(Extra.STANDINS, "pymeshlab"):
         return False
     try:
@@ -76,7 +76,7 @@ def has_remeshing_filter() -> bool:
 
 
 def sample(body: Body) -> tuple[Real, Real, float]:
-    """The field on a grid: values, lower corner, spacing.
+    """Return a field on a grid: values, lower corner, spacing.
 
     Away from the surface, where only the sign matters, values come from a grid four times coarser.
     """
@@ -102,9 +102,10 @@ def sample(body: Body) -> tuple[Real, Real, float]:
 
 
 def march(body: Body) -> tuple[Real, Faces, Body, float]:
-    """The surface f = 0 by marching cubes, oriented outwards, cut where ``keep = 0``.
+    """Return the surface f = 0 by marching cubes, oriented outwards, cut where ``keep = 0``.
 
-    Tunnels a few cells wide are plugged. Also the body with its plugs, and the grid's spacing.
+    Tunnels a few cells wide are plugged. Also returns the body with its plugs, and the grid
+    spacing.
     """
     require(Extra.STANDINS, "making this surface", "skimage")
     values, lower, spacing = sample(body)
@@ -130,7 +131,7 @@ def march(body: Body) -> tuple[Real, Faces, Body, float]:
 
 
 def _remove_strays(values: Real, spacing: float) -> None:
-    """Fill bubbles and drop islands, in place: they are no part of the surface."""
+    """Fill bubbles and drop islands in place, since they are not part of the surface."""
     for inside in (True, False):
         labels, count = ndimage.label(values < 0 if inside else values >= 0)
         if count > 1:
@@ -141,6 +142,7 @@ def _remove_strays(values: Real, spacing: float) -> None:
 
 
 def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
+    """Return the surface of sampled values by marching cubes, cut by the body's `keep`."""
     from skimage.measure import marching_cubes
 
     V, F, _, _ = marching_cubes(values, 0.0)  # type: ignore[no-untyped-call] # has no type hints
@@ -156,9 +158,9 @@ def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple
 def cut(
     V: Real, F: Faces, keep: Field, settle: Callable[[Real], Real], spacing: float
 ) -> tuple[Real, Faces]:
-    """The part of the mesh with ``keep >= 0``, ending in vertices on ``keep = 0``.
+    """Return the part of the mesh with ``keep >= 0``, with boundary vertices on ``keep = 0``.
 
-    Vertices close to the cut are moved onto it by `settle` first, so that it leaves no splinters.
+    Vertices close to the cut are first moved onto it by `settle`, to avoid slivers.
     """
     g = evaluate(keep, V)
     close = np.flatnonzero(np.abs(g) < 0.25 * spacing)
@@ -203,7 +205,7 @@ def cut(
 
 
 def largest_piece(V: Real, F: Faces) -> tuple[Real, Faces]:
-    """The connected component with the most vertices."""
+    """Return the connected component with the most vertices."""
     count, label = topology.components(F, len(V))
     if count > 1:
         F = F[label[F[:, 0]] == np.bincount(label).argmax()]
@@ -215,17 +217,17 @@ def largest_piece(V: Real, F: Faces) -> tuple[Real, Faces]:
 
 @dataclass
 class Shape:
-    """What keeps vertices on the surface: inside on f = 0, the boundary also on keep = 0."""
+    """Keeps vertices on the surface: interior ones on f = 0, boundary ones also on keep = 0."""
 
     body: Body
     step: float
 
     def settle(self, p: Real, reach: float) -> Real:
-        """Points of the boundary curve near p."""
+        """Return points of the boundary curve near p."""
         return to_curve(self.body.f, self.body.keep, p, self.step, reach)
 
     def project(self, V: Real, F: Faces, reach: float, rounds: int = 3) -> Real:
-        """All vertices back to where they belong, none moving more than `reach` a round."""
+        """Return all vertices projected back, none moving by more than `reach` per round."""
         rim = boundary_mask(F, len(V))
         V = V.copy()
         V[~rim] = to_surface(self.body.f, V[~rim], self.step, reach, rounds)
@@ -234,12 +236,12 @@ class Shape:
 
 
 def edge_length(area: float, faces: int) -> float:
-    """The edge of an equilateral triangle, `faces` of which have this area."""
+    """Return the edge length of equilateral triangles, `faces` of which have this area."""
     return float(np.sqrt(4 * area / (np.sqrt(3) * faces)))
 
 
 def relax(V: Real, F: Faces, shape: Shape, reach: float, strength: float = 0.6) -> Real:
-    """Even out the vertices along the surface; those of the boundary along the boundary."""
+    """Even out the vertices along the surface, and boundary vertices along the boundary."""
     n = len(V)
     edges = edges_of(F, n)
     ends = edges.ends[edges.on_boundary]
@@ -256,7 +258,7 @@ def relax(V: Real, F: Faces, shape: Shape, reach: float, strength: float = 0.6) 
 
 
 class Sizes:
-    """Wanted edge length: `inside` far from the boundary, `rim` on it, graded between them."""
+    """Target edge length: `inside` far from the boundary, `rim` on it, graded between them."""
 
     def __init__(self, V: Real, F: Faces, inside: float, rim: float) -> None:
         self.inside, self.rim = inside, rim
@@ -265,13 +267,13 @@ class Sizes:
         self._reach = 4 * max(abs(rim - inside), 0.25 * min(rim, inside))
 
     def at(self, p: Real) -> Real:
-        """Wanted length at points (k, 3)."""
+        """Return the target length at points (k, 3)."""
         d, _ = self._tree.query(p)
         return self.inside + (self.rim - self.inside) * np.exp(-d / self._reach)
 
 
 def resize(V: Real, F: Faces, shape: Shape, sizes: Sizes) -> tuple[Real, Faces]:
-    """One round of splits, collapses, flips and relaxation towards the wanted lengths."""
+    """Do one round of splits, collapses, flips and relaxation towards the target lengths."""
     for _ in range(3):
         edges = edges_of(F, len(V))
         ratio = _length(V, edges.ends) / sizes.at(V[edges.ends].mean(axis=1))
@@ -297,13 +299,13 @@ def _length(V: Real, ends: Faces) -> Real:
 
 
 def perimeter(V: Real, F: Faces) -> float:
-    """Length of the boundary."""
+    """Return the length of the boundary."""
     edges = edges_of(F, len(V))
     return float(_length(V, edges.ends[edges.on_boundary]).sum())
 
 
 def area(V: Real, F: Faces) -> float:
-    """Area of the surface."""
+    """Return the area of the surface."""
     return 0.5 * float(np.linalg.norm(area_vectors(V, F), axis=1).sum())
 
 
@@ -331,9 +333,9 @@ def to_boundary_count(V: Real, F: Faces, boundary: int, shape: Shape) -> tuple[R
 def to_face_count(
     V: Real, F: Faces, faces: int, shape: Shape, sizes: Sizes | None = None
 ) -> tuple[Real, Faces]:
-    """Split long or collapse short interior edges until there are `faces` triangles, or one more.
+    """Split or collapse interior edges until there are `faces` triangles, or one more.
 
-    The boundary stays as it is.
+    The boundary is unchanged.
     """
     for _ in range(60):
         surplus = (len(F) - faces) // 2
@@ -357,7 +359,7 @@ def to_face_count(
 
 
 def split_chords(V: Real, F: Faces) -> tuple[Real, Faces]:
-    """Split interior edges between two boundary vertices, which Definition 1 does not like."""
+    """Split interior edges between two boundary vertices, which violate Definition 1."""
     for _ in range(5):
         edges = edges_of(F, len(V))
         rim = boundary_mask(F, len(V))
@@ -369,10 +371,10 @@ def split_chords(V: Real, F: Faces) -> tuple[Real, Faces]:
 
 
 def split_stuck(V: Real, F: Faces, rounds: int = 20) -> tuple[Real, Faces]:
-    """Split the few edges that are not Delaunay but cannot be flipped: creases, doubled diagonals.
+    """Split the few non-Delaunay edges that cannot be flipped: creases, duplicate diagonals.
 
-    Halving an edge makes the angles opposite to it smaller; each costs two triangles. Without them
-    every weight is positive and no harmonic map to a circle folds (Tutte).
+    Halving an edge makes its opposite angles smaller, at the cost of two triangles. Without such
+    edges every weight is positive and no harmonic map to a circle folds (Tutte).
     """
     for _ in range(rounds):
         edges = edges_of(F, len(V))
@@ -386,7 +388,7 @@ def split_stuck(V: Real, F: Faces, rounds: int = 20) -> tuple[Real, Faces]:
 
 
 def flip_ears(F: Faces, n: int) -> Faces:
-    """Give every boundary vertex an interior neighbour: flip the edge that cuts it off."""
+    """Give every boundary vertex an interior neighbour by flipping the edge that cuts it off."""
     edges = edges_of(F, n)
     rim = np.bincount(edges.face[edges.on_boundary, 0], minlength=len(F))
     if not (rim > 1).any():
@@ -400,7 +402,7 @@ def flip_ears(F: Faces, n: int) -> Faces:
 
 
 def pymeshlab_remesh(V: Real, F: Faces, length: float, rounds: int = 6) -> tuple[Real, Faces]:
-    """Isotropic explicit remeshing to this edge length by pymeshlab."""
+    """Return an isotropic explicit remesh with this edge length, by pymeshlab."""
     import pymeshlab
 
     meshes = pymeshlab.MeshSet(verbose=False)
@@ -416,7 +418,7 @@ def pymeshlab_remesh(V: Real, F: Faces, length: float, rounds: int = 6) -> tuple
 def remesh(
     V: Real, F: Faces, faces: int, boundary: int, shape: Shape, use_pymeshlab: bool
 ) -> tuple[Real, Faces]:
-    """A mesh of the same surface with these counts, the interior as even as they allow."""
+    """Return a mesh of the same surface with these counts, as even inside as they allow."""
     target = edge_length(area(V, F), faces)
     if use_pymeshlab:
         V, F = pymeshlab_remesh(V, F, target)
@@ -425,7 +427,7 @@ def remesh(
     for k in range(7):
         sizes = Sizes(V, F, inside, perimeter(V, F) / boundary)
         V, F = resize(V, F, shape, sizes)
-        # The rounds of collapse and split do not hit the count by themselves.
+        # The rounds of collapses and splits do not reach the exact count by themselves.
         inside *= float(np.clip(np.sqrt(len(F) / faces), 0.7, 1.4))
         if k >= 2 and abs(len(F) / faces - 1) < 0.02:
             break
@@ -449,18 +451,18 @@ def mesh_of(
     seed: int = 0,
     use_pymeshlab: bool | None = None,
 ) -> M:
-    """The surface of `body` with `faces` triangles and `boundary` boundary vertices in all.
+    """Return the surface of `body` with `faces` triangles and `boundary` boundary vertices in all.
 
     `mesh_type` is DiskMesh for a body with one boundary loop, HoledMesh for more. The counts are
-    met exactly, up to one triangle where their parities disagree and two for each edge that has to
-    be split because it cannot be flipped (some ten in a million). With ``delaunay=False`` about 5 %
-    of the interior edges, chosen with `seed`, are turned so that they are not Delaunay. The mesh's
-    notices say whether pymeshlab's filter was missing; `use_pymeshlab` overrides the check for it.
+    exact, up to one triangle if their parities disagree and two for each edge that has to be split
+    because it cannot be flipped (about ten in a million). With ``delaunay=False`` about 5 % of the
+    interior edges, chosen by `seed`, are flipped to be non-Delaunay. The mesh's notices say whether
+    pymeshlab's filter was missing; `use_pymeshlab` overrides that check.
 
     Raises
     ------
     MeshError
-        The surface has not the topology asked for: too few triangles for its features.
+        The surface has the wrong topology: there are too few triangles for its features.
 
     """
     use = has_remeshing_filter() if use_pymeshlab is None else use_pymeshlab
@@ -490,14 +492,14 @@ def mesh_of(
         return mesh_type.from_arrays(V, F, name=name, notices=() if use else (FALLBACK_NOTE,))
     except MeshError as error:
         raise MeshError(
-            f"{name} with {faces} faces came out unusable: {error} Ask for more faces."
+            f"{name} with {faces} faces is unusable: {error} Ask for more faces."
         ) from error
 
 
 def break_delaunay(V: Real, F: Faces, seed: int, share: float = NON_DELAUNAY) -> Faces:
-    """Turn edges, chosen with `seed`, until about `share` of the interior ones are not Delaunay.
+    """Flip edges, chosen by `seed`, until about `share` of the interior ones are not Delaunay.
 
-    Mild cases first, as in scanned meshes: the two angles opposite to the edge sum to little more
+    Mild cases first, as in scanned meshes: the two angles opposite to the edge sum to slightly more
     than 180 degrees.
     """
     rng = np.random.default_rng(seed)

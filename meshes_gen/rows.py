@@ -1,4 +1,4 @@
-"""The twenty rows of the paper's Table 2: what each stand-in has to match."""
+"""The twenty rows of the paper's Table 2, which the stand-ins match."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class Row:
 
     @property
     def boundary(self) -> int:
-        """Boundary vertices of a disk with these counts (Euler characteristic 1)."""
+        """Number of boundary vertices of a disk with these counts (Euler characteristic 1)."""
         return 2 * self.vertices - self.faces - 2
 
     def boundary_at(self, faces: int) -> int:
-        """Boundary vertices at another size: they grow as the square root of the triangles.
+        """Return the number of boundary vertices at another size; it grows as the root of `faces`.
 
-        Of the parity that a disk with so many triangles has.
+        Its parity is that required of a disk with this many triangles.
         """
         count = max(12, round(self.boundary * float(np.sqrt(faces / self.faces))))
         return count + (count - faces) % 2

@@ -1,7 +1,7 @@
-"""Sheets that are a rectangle in isothermal coordinates: cylinder, Swiss roll, catenoid.
+"""Sheets that are rectangles in isothermal coordinates: cylinder, Swiss roll, catenoid.
 
-Each is conformal to a rectangle whose aspect is known, so :func:`exact_map` gives its conformal map
-to the disk in closed form.
+Each is conformal to a rectangle of known aspect, so :func:`exact_map` gives its conformal map to
+the disk in closed form.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def cylinder_sheet(
     angle: Annotated[float, Field(gt=0, lt=360)] = 270.0,
     height: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 2.0,
 ) -> DiskMesh:
-    """Part of a cylinder of radius 1: `angle` degrees of it, of this `height`.
+    """Part of a cylinder of radius 1, `angle` degrees wide and of this `height`.
 
     It unrolls to a rectangle; :func:`exact_map` with aspect ``angle in radians / height`` is its
     conformal map to the disk.
@@ -49,7 +49,7 @@ def swiss_roll(
     turns: Annotated[float, Field(gt=0, le=10)] = 2.5,
     aspect: Annotated[float, Field(ge=0.25, le=16)] = 6.0,
 ) -> DiskMesh:
-    """A rectangle of this `aspect` (length over width) rolled up along a spiral of arc length.
+    """A rectangle of this `aspect` (length over width), rolled up along a spiral of arc length.
 
     It unrolls without stretching, so :func:`exact_map` with the same aspect is its conformal map.
     """
@@ -72,7 +72,7 @@ def catenoid_sheet(
     angle: Annotated[float, Field(gt=0, lt=360)] = 270.0,
     height: Annotated[float, Field(gt=0, le=6)] = 2.0,
 ) -> DiskMesh:
-    """`angle` degrees of the catenoid of waist 1 between z = -height/2 and height/2.
+    """The catenoid of waist radius 1, `angle` degrees of it, between z = -height/2 and height/2.
 
     Its usual coordinates are isothermal: :func:`exact_map` with aspect ``angle in radians /
     height`` is its conformal map to the disk.
@@ -84,7 +84,7 @@ def catenoid_sheet(
 
 
 def ring_map(V: NDArray[np.float64]) -> Complex:
-    """The conformal map of the catenoid ring to an annulus, its waist to the unit circle."""
+    """Return the conformal map of the catenoid ring to an annulus, its waist to the unit circle."""
     return np.exp(-V[:, 2] + 1j * np.arctan2(V[:, 1], V[:, 0]))
 
 
@@ -92,26 +92,26 @@ def ring_map(V: NDArray[np.float64]) -> Complex:
 def catenoid_ring(
     faces: Faces = 20_000, *, height: Annotated[float, Field(gt=0, le=6)] = 1.0
 ) -> HoledMesh:
-    """The whole catenoid of waist 1 between z = -height/2 and height/2: a ring, one hole.
+    """The catenoid of waist radius 1 between z = -height/2 and height/2: a ring with one hole.
 
-    Conformal to the annulus ``1 < |w| < exp(height)``: :func:`ring_map`.
+    Conformal to the annulus ``1 < |w| < exp(height)`` by :func:`ring_map`.
     """
     z, F = rectangle_grid(faces, 2 * np.pi / height)
     u, v = height * z.real, height * (z.imag - 0.5)
     rows = int(np.count_nonzero(z.real == 0))
-    n = len(z) - rows  # the last column is the first
+    n = len(z) - rows  # the last column equals the first
     F = F % n
     V = np.stack([np.cosh(v) * np.cos(u), np.cosh(v) * np.sin(u), v], axis=1)[:n]
     return HoledMesh.from_arrays(V, F, name="catenoid-ring")
 
 
 def exact_map(faces: int, aspect: float) -> Complex:
-    """The conformal map to the disk of a sheet made with this count and aspect, vertex by vertex.
+    """Return the conformal map to the disk of a sheet with this count and aspect, by vertex.
 
     Raises
     ------
     ParameterError
-        An aspect for which the elliptic functions lose their digits.
+        The elliptic functions lose their digits at this aspect.
 
     """
     if not 0.2 <= aspect <= 20:

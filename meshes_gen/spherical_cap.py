@@ -15,7 +15,7 @@ from .disk_grid import disk_grid
 
 
 def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:
-    """The cap's conformal map to the unit disk: stereographic projection from the south pole."""
+    """Return the cap's conformal map to the unit disk: stereographic from the south pole."""
     return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(angle) / 2)
 
 

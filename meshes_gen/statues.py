@@ -22,7 +22,7 @@ from .implicit import (
 
 
 def _placed(head: Head, p: Real, at: tuple[float, float, float], scale: float) -> Real:
-    """A head of another size at another place."""
+    """Return a head scaled and moved to another place."""
     q = (p - np.asarray(at)) / scale
     far = np.linalg.norm(q - (0, 0.1, -0.2), axis=1) - 1.9
     d = far * scale + 0.3 * scale
@@ -33,7 +33,7 @@ def _placed(head: Head, p: Real, at: tuple[float, float, float], scale: float) -
 
 
 def statue_of_liberty_body(seed: int = 0) -> Body:
-    """A robed woman: torch in the raised right hand, tablet in the left arm, crown with rays."""
+    """A robed woman: torch raised in the right hand, tablet in the left arm, crown with rays."""
     head = Head(Person(jaw=0.98, nose=1.0), NEUTRAL, ears=False, neck=False)
     folds = Noise(seed + 4, 1.3)
     flame = Noise(seed + 6, 0.22)
@@ -120,7 +120,7 @@ def isis_statue_body(seed: int = 0) -> Body:
         right = [(-0.62, 0.18, 2.72), (-0.66, 0.02, 2.02), (-0.18, -0.42, 2.12)]
         left = [(0.62, 0.18, 2.72), (0.68, 0.0, 2.02), (0.30, -0.60, 1.86)]
         d = join(d, ellipsoid(p, (0, -0.22, 1.92), (0.60, 0.44, 0.36)), 0.10)
-        # The robe under the thighs, and between arms and chest: no gap to see through.
+        # The robe under the thighs and between arms and chest leaves no gap.
         d = join(d, box(p, (0, -0.48, 0.75), (0.40, 0.50, 0.72), 0.1), 0.10)
         for s in (-1, 1):
             d = join(d, ellipsoid(p, (0.46 * s, 0.08, 2.28), (0.22, 0.24, 0.50)), 0.10)

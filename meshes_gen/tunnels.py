@@ -1,4 +1,4 @@
-"""Where is a surface that should be a disk pierced, and how is it plugged?
+"""Find and plug the tunnels of a surface that should be a disk.
 
 Parts of a solid that nearly touch leave tunnels a few grid cells wide. Each is found as a short
 loop that bounds nothing (tree-cotree decomposition, Eppstein 2003) and closed with a small ball.
@@ -25,7 +25,7 @@ class Plug:
     radius: float
 
     def add(self, p: Real, d: Real) -> Real:
-        """The values d of a field at p, with the ball joined on."""
+        """Return the values d of a field at p, joined with the ball."""
         off = p - self.centre
         near = np.abs(off).max(axis=1) < 2.5 * self.radius
         if near.any():
@@ -36,7 +36,7 @@ class Plug:
 
 
 def plugged(f: Field, plugs: tuple[Plug, ...]) -> Field:
-    """The field f with the plugs joined on."""
+    """Return the field f joined with the plugs."""
     if not plugs:
         return f
 
@@ -50,7 +50,7 @@ def plugged(f: Field, plugs: tuple[Plug, ...]) -> Field:
 
 
 def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
-    """Loops of vertices that generate what a disk would not have, shortest first.
+    """Return loops that generate the homology that a disk would not have, shortest first.
 
     They are short as seen from the vertex `root` (default: the highest).
     """
@@ -65,7 +65,7 @@ def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
     )
     in_tree = (before[i] == j) | (before[j] == i)
     free = np.flatnonzero(~in_tree)
-    # The dual tree takes the edges of long loops, so that short loops are left over.
+    # The dual tree takes the edges of long loops, so that short loops remain.
     weight = -(distance[i] + distance[j] + length)
     weight = weight - weight.min() + 1
     outside = np.where(edges.face[:, 1] < 0, m, edges.face[:, 1])
@@ -81,7 +81,7 @@ def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
 
 
 def _loop(before: NDArray[np.int32], u: int, v: int) -> Faces:
-    """The vertices of the edge u v and the tree paths from its ends to where they meet."""
+    """Return the edge u v with the tree paths from its ends to where they meet, as vertices."""
     paths = []
     for k in (u, v):
         path = [k]
@@ -92,10 +92,10 @@ def _loop(before: NDArray[np.int32], u: int, v: int) -> Faces:
 
 
 def plugs_for(V: Real, F: Faces, spacing: float, largest: float) -> tuple[Plug, ...]:
-    """Balls for the tunnels no wider than `largest`, on a surface sampled with this spacing."""
+    """Return balls for the tunnels no wider than `largest`, on a surface sampled at `spacing`."""
     loops = tunnels(V, F)
     plugs = _plugs(V, loops, spacing, largest)
-    if not plugs and loops:  # seen from nearer by, a loop may be shorter
+    if not plugs and loops:  # seen from closer, a loop may be shorter
         for start in loops[:3]:
             for root in start[:: max(1, len(start) // 5)]:
                 plugs = _plugs(V, tunnels(V, F, int(root)), spacing, largest)
@@ -105,6 +105,7 @@ def plugs_for(V: Real, F: Faces, spacing: float, largest: float) -> tuple[Plug, 
 
 
 def _plugs(V: Real, loops: list[Faces], spacing: float, largest: float) -> tuple[Plug, ...]:
+    """Return balls that close narrow loops and do not touch each other."""
     plugs: list[Plug] = []
     for loop in loops:
         points = V[loop]

@@ -1,4 +1,4 @@
-"""Vessels: a vase with relief, a square bottle. Both stand closed and are open at the mouth."""
+"""Vessels: a vase with relief, a square bottle. Both are closed solids, open at the mouth."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from .implicit import Body, Noise, Real, box, carve, halfspace, join, meet, ring
 
 
 def revolve(p: Real, profile: NDArray[np.float64]) -> Real:
-    """About the distance to a surface of revolution about z; `profile` (k, 2) rows of z, radius."""
+    """Return about the distance to a surface of revolution; rows of `profile` are (z, radius)."""
     radius = PchipInterpolator(profile[:, 0], profile[:, 1])
     z = np.clip(p[:, 2], profile[0, 0], profile[-1, 0])
     slope = np.clip(radius.derivative()(z), -3, 3)
@@ -38,7 +38,7 @@ def chinese_vase_body(seed: int = 0) -> Body:
             d = d - out * np.exp(-(((z - height) / 0.06) ** 2))
         d = d - 0.045 * np.cos(12 * angle) * np.exp(-(((z - 2.25) / 0.16) ** 4))
         d = meet(d, -z, 0.05)
-        for s in (-1, 1):  # lugs on the neck, not pierced: the surface stays a disk
+        for s in (-1, 1):  # lugs on the neck without holes, so the surface stays a disk
             lug = ring(p, (0.36 * s, 0, 2.72), (0, 1, 0), 0.13, 0.085)
             d = join(
                 d,

@@ -1,4 +1,4 @@
-"""What the angles of a flat triangulation must satisfy, and vertices from angles."""
+"""The constraints on the angles of a flat triangulation, and vertices from angles."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ Complex = NDArray[np.complex128]
 
 
 class Angles:
-    """The constraints on the angles of a mesh, and the pattern of what is solved.
+    """The constraints on the angles of a mesh, and the pattern of the linear systems.
 
-    Angles are (m, 3) in radians, as the corners of `mesh.F`. Unknowns that are left when triangles
-    are eliminated: for every interior vertex a multiplier of its sum and one of its wheel.
+    Angles are (m, 3) in radians, as the corners of `mesh.F`. After eliminating the triangles the
+    unknowns are, for every interior vertex, one multiplier of its angle sum and one of its wheel.
     """
 
     def __init__(self, mesh: DiskMesh) -> None:
@@ -37,7 +37,7 @@ class Angles:
         self.k = len(mesh.interior)
         self._cholesky: Cholesky | None = None
         with phase("assembly"):
-            # Of each triangle the six rows: the sums at its corners, then the wheels.
+            # The six rows of each triangle: the sums at its corners, then the wheels.
             self._rows = np.concatenate([self.number[mesh.F], self.number[mesh.F]], axis=1)
             self._rows[:, 3:] += np.where(self._rows[:, 3:] >= 0, self.k, 0)
             i = np.repeat(self._rows, 6, axis=1).ravel()
@@ -53,7 +53,7 @@ class Angles:
 
     @property
     def wanted(self) -> Real:
-        """The surface's own angles, round every interior vertex scaled to 2 pi in sum."""
+        """The surface's own angles, scaled to sum to 2 pi around every interior vertex."""
         F = self.mesh.F
         own = np.deg2rad(corner_angles(self.mesh.V, F))
         share = np.ones(self.mesh.n)
@@ -62,12 +62,12 @@ class Angles:
         return np.asarray(own * share[F])
 
     def at_vertices(self, values: Real) -> Real:
-        """Sum values (m, 3) of corners at each interior vertex, (k,)."""
+        """Return the sums of corner values (m, 3) at the interior vertices, (k,)."""
         total = np.bincount(self.mesh.F.ravel(), values.ravel(), self.mesh.n)
         return np.asarray(total[self.mesh.interior], dtype=np.float64)
 
     def residuals(self, angles: Real) -> tuple[Real, Real, Real]:
-        """What is missing to each triangle's pi (m,), vertex's 2 pi (k,), wheel's 0 (k,)."""
+        """Return the residuals of triangles, pi (m,), of vertices, 2 pi (k,), of wheels, 0 (k,)."""
         log_sine = np.log(np.sin(angles))
         # Seen from a corner, the sine of the next corner over that of the one before.
         wheel = np.roll(log_sine, -1, axis=1) - np.roll(log_sine, 1, axis=1)
@@ -78,17 +78,18 @@ class Angles:
         )
 
     def told(self, angles: Real) -> dict[str, float]:
-        """The largest residual of each kind, as extras."""
+        """Return the largest residual of each kind, as extras."""
         names = ("triangle_residual", "vertex_residual", "wheel_residual")
         found = zip(names, self.residuals(angles), strict=True)
         return {name: float(np.abs(r).max()) for name, r in found}
 
     def step(self, angles: Real, D: Real, gradient: Real) -> tuple[Real, Real]:
-        """One Newton step on the constraints, linear in the angles at `angles`.
+        """Return one Newton step on the constraints, linearised at `angles`.
 
-        Minimise e^T D^-1 e / 2 + gradient e over all e that meet the constraints to first order:
-        e = D (C^T y - gradient), with the triangles' multipliers eliminated first, as each has
-        three corners of its own; the rest is one symmetric positive definite system.
+        Minimise e^T D^-1 e / 2 + gradient e over all e that satisfy the constraints to first order:
+        e = D (C^T y - gradient). The multipliers of triangles are eliminated first, since each
+        triangle has three corners of its own; what remains is one symmetric positive definite
+        system.
 
         Returns
         -------
@@ -106,7 +107,7 @@ class Angles:
         triangle, vertex, wheel = self.residuals(angles)
         with phase("assembly"):
             cot = 1 / np.tan(angles)
-            # How the six rows of a triangle depend on its three angles, (m, 6, 3).
+            # Derivatives of the six rows of a triangle by its three angles, (m, 6, 3).
             J = np.zeros((len(angles), 6, 3))
             for c in range(3):
                 J[:, c, c] = 1.0
@@ -134,7 +135,7 @@ class Angles:
         except NotPositiveDefinite as error:
             thin = np.rad2deg(float(np.minimum(angles, np.pi - angles).min()))
             raise AlgorithmFailed(
-                f"the angles' constraints cannot be told apart in doubles ({error}): the sharpest "
+                f"the angles' constraints are dependent in doubles ({error}): the sharpest "
                 f"angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
             ) from None
         y = self._cholesky.solve(b)
@@ -145,13 +146,13 @@ class Angles:
         return e, y[self.k :]
 
     def _sum(self, values: Real) -> Real:
-        """Sum values (m, 6) of the triangles' rows over the rows, (2 k,)."""
+        """Return the sums of the triangles' row values (m, 6) per row, (2 k,)."""
         there = self._rows >= 0
         return np.bincount(self._rows[there], values[there], 2 * self.k).astype(np.float64)
 
 
 def kept_positive(angles: Real, e: Real) -> tuple[Real, float]:
-    """Take a step, or so much of it that every angle keeps a tenth of itself; and the share."""
+    """Take a step, cut so that every angle keeps a tenth of itself; also return the share taken."""
     with np.errstate(divide="ignore"):
         room = np.where(e < 0, -0.9 * angles / e, np.inf).min()
         upper = np.where(e > 0, 0.9 * (np.pi - angles) / e, np.inf).min()
@@ -162,9 +163,9 @@ def kept_positive(angles: Real, e: Real) -> tuple[Real, float]:
 def placed(
     mesh: DiskMesh, angles: Real, told: dict[str, Any], *, iterations: int = 0
 ) -> Parameterization:
-    """Vertices from angles: least squares conformal, each triangle's shape that of its angles."""
+    """Place vertices by least squares conformal maps of triangles with these angles."""
     with phase("assembly"):
-        # Shapes need angles that sum to pi, also where a step was cut.
+        # A triangle's angles must sum to pi, even if a step was cut.
         weights = 0.5 / np.tan(angles * (np.pi / angles.sum(axis=1, keepdims=True)))
         L = laplacian_of_weights(mesh.F, weights, mesh.n)
     uv = pinned_map(L, mesh.boundary, far_apart(mesh))

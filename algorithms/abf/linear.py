@@ -19,18 +19,19 @@ from .constraints import Angles, kept_positive, placed
     usual=False,
 )
 def abf_linear(mesh: DiskMesh) -> Parameterization:
-    """Which angles of a flat triangulation are nearest to the surface's, to first order?
+    """Find the flat triangulation with the angles nearest to the surface's, to first order.
 
-    The relative changes of all angles are least in squares, subject to the sums of triangles, pi,
-    and of interior vertices, 2 pi, and to the logarithms of the wheels round interior vertices, all
-    linear at the surface's own angles, scaled to 2 pi round each interior vertex. The triangles are
-    eliminated; one symmetric solve with two unknowns an interior vertex is left. The vertices are
-    then placed by least squares (LSCM with the shapes that the angles give, a second solve).
+    The relative changes of all angles are minimal in least squares, subject to the angle sums of
+    triangles, pi, and of interior vertices, 2 pi, and to the logarithms of the wheels around
+    interior vertices, all linearised at the surface's own angles, scaled to sum to 2 pi around each
+    interior vertex. The triangles are eliminated, which leaves one symmetric solve with two
+    unknowns per interior vertex. The vertices are then placed by least squares (LSCM with triangle
+    shapes given by the angles, a second solve).
 
-    Decided here: of a step that would take an angle below a tenth of itself only that share is
-    taken (`step`). `triangle_residual`, `vertex_residual` (radians) and `wheel_residual` (of the
-    logarithm) are what is left of the constraints, since a step is linear. Folds inside are mended
-    as in LSCM (`fold_repairs`).
+    Decided here: a step that would take an angle below a tenth of itself is shortened (`step` is
+    the share taken). `triangle_residual`, `vertex_residual` (radians) and `wheel_residual` (of the
+    logarithm) are what remains of the constraints, since the step is linear. Folds inside are
+    repaired as in LSCM (`fold_repairs`).
     """
     problem = Angles(mesh)
     wanted = problem.wanted

@@ -14,7 +14,7 @@ from cembench.registry import algorithm
 
 from .constraints import Angles, kept_positive, placed
 
-#: The curvature of the Lagrangian that a corner keeps at least, as a share of that of its error.
+#: Minimal curvature of the Lagrangian at a corner, as a share of that of its error.
 LEAST_CURVATURE = 0.3
 
 
@@ -31,20 +31,20 @@ def abf_plus_plus(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-8,
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 50,
 ) -> Parameterization:
-    """Which angles of a flat triangulation are nearest to the surface's?
+    """Find the flat triangulation with the angles nearest to the surface's.
 
-    Minimise the sum of (angle - wanted)^2 / wanted^2, subject to the sums of triangles, pi, and of
-    interior vertices, 2 pi, and to the wheels round interior vertices, by Newton's method on the
-    Lagrangian. Its Hessian is diagonal: it and the triangles are eliminated, and each step is one
-    symmetric solve with two unknowns an interior vertex, of one analysed pattern. The vertices are
-    then placed by least squares, as in abf-linear.
+    Minimise the sum of (angle - wanted)^2 / wanted^2, subject to the angle sums of triangles, pi,
+    and of interior vertices, 2 pi, and to the wheels around interior vertices, by Newton's method
+    on the Lagrangian. Its Hessian is diagonal. Eliminating it and the triangles leaves one
+    symmetric solve per step, with two unknowns per interior vertex and one analysed pattern. The
+    vertices are then placed by least squares, as in abf-linear.
 
-    Decided here: wheels are taken as logarithms, which leaves their second derivatives diagonal;
-    of these only so much is kept that every entry stays above 0.3 of the error's own; a step is
-    cut where an angle would fall below a tenth of itself. It ends when all constraints, radians and
-    logarithms, are within `tolerance` (`triangle_residual`, `vertex_residual`, `wheel_residual`)
-    and the last step changed no angle by more than 1e-4 of itself, and fails after
-    `max_iterations`. Folds inside are mended as in LSCM (`fold_repairs`).
+    Decided here: wheels are taken as logarithms, which keeps their second derivatives diagonal;
+    these are limited so that every entry of the Hessian stays above 0.3 of the error's own; a step
+    is cut if an angle would fall below a tenth of itself. The iteration ends when all constraints,
+    in radians and logarithms, are within `tolerance` (`triangle_residual`, `vertex_residual`,
+    `wheel_residual`) and the last step changed no angle by more than 1e-4 of itself, and fails
+    after `max_iterations`. Folds inside are repaired as in LSCM (`fold_repairs`).
     """
     problem = Angles(mesh)
     wanted = problem.wanted

@@ -23,7 +23,7 @@ from .yamabe import YamabeBoundary
 
 Real = NDArray[np.float64]
 
-#: Boundary lengths may differ by this factor; beyond it the boundary counts as crowded.
+#: Largest ratio of boundary lengths; above it the boundary is too crowded.
 CROWDED = 1e13
 
 
@@ -42,20 +42,20 @@ def bff(
     gauge: Gauge = "boundary",
     delaunay: bool = False,
 ) -> Parameterization:
-    """Map to the disk by a boundary whose exterior angles are in proportion to its lengths.
+    """Map to the disk with exterior angles of the boundary in proportion to its lengths.
 
     The exterior angles k~ of a flat image and the log scale u of its boundary depend on each other
-    linearly, k~ = k - L_bi L_ii^-1 Omega + S u with S the Schur complement of the Laplacian.
-    A circle has k~_i = 2 pi (l~_i-1 + l~_i) / (2 sum l~): from u = 0 on, u and the lengths
-    l~_ij = l_ij exp((u_i + u_j) / 2) are found from each other in turn, on the boundary alone. One
-    factorisation, interior first, serves all sweeps and the Dirichlet solve at the end.
+    linearly, k~ = k - L_bi L_ii^-1 Omega + S u with S the Schur complement of the Laplacian. A
+    circle has k~_i = 2 pi (l~_i-1 + l~_i) / (2 sum l~). Starting from u = 0, u and the lengths
+    l~_ij = l_ij exp((u_i + u_j) / 2) are computed from each other in turn, on the boundary alone.
+    One factorisation, interior first, serves all sweeps and the Dirichlet solve at the end.
 
     Decided here: after each sweep the vertices are put on the circle with arcs in proportion to l~,
-    which have just those exterior angles, and a Moebius map brings them into the `gauge` of
-    direct-cem: sweeps alone drift through Moebius images and do not end. They end when no arc
-    changes by more than the share `tolerance` (`sweeps`, `change`), or with a failure after
-    `max_sweeps`; each takes about half of the error away. The interior is the harmonic extension
-    of both coordinates. `gauss_bonnet` is how far the natural k~ (u = 0) are from 2 pi in sum.
+    which have exactly those exterior angles, and a Moebius map moves them into the `gauge` of
+    direct-cem, since sweeps alone drift through Moebius images and never end. The sweeps end when
+    no arc changes by more than the share `tolerance` (`sweeps`, `change`), and fail after
+    `max_sweeps`; each removes about half of the error. The interior is the harmonic extension of
+    both coordinates. `gauss_bonnet` is the distance of the sum of the natural k~ (u = 0) from 2 pi.
     Folds are repaired as in CEM (`fold_repairs`).
     """
     yamabe = YamabeBoundary(mesh, delaunay=delaunay)
@@ -74,14 +74,14 @@ def bff(
 
 
 def _turns(lengths: Real) -> Real:
-    """Exterior angles of the polygon on a circle with these arcs, in radians."""
+    """Return the exterior angles, in radians, of the polygon on a circle with these arcs."""
     return np.asarray(np.pi * (lengths + np.roll(lengths, 1)) / lengths.sum())
 
 
 def _circular(
     yamabe: YamabeBoundary, weights: Real, tolerance: float, most: int
 ) -> tuple[CircleDomain, int, float]:
-    """The circle's arcs that go with exterior angles in proportion; the sweeps, the last change."""
+    """Return arcs whose exterior angles are in proportion; the sweeps and the last change."""
     domain = in_gauge(CircleDomain.of_arcs(yamabe.lengths), weights)
     for sweep in range(1, most + 1):
         u = yamabe.scale(_turns(domain.arcs))
@@ -89,13 +89,13 @@ def _circular(
             raise AlgorithmFailed(
                 f"the boundary is too crowded: in sweep {sweep} its scale differs by a factor of "
                 f"exp({np.ptp(u):.3g}) between its vertices, beyond what numbers can hold. "
-                "direct-cem keeps its vertices apart"
+                "Use direct-cem, which keeps vertices apart"
             )
         before, domain = domain, in_gauge(CircleDomain.of_arcs(yamabe.scaled(u)), weights)
         change = float(np.abs(np.log(domain.arcs / before.arcs)).max())
         if change <= tolerance:
             return domain, sweep, change
     raise AlgorithmFailed(
-        f"the boundary's arcs have not converged after {most} sweeps: the last one changed one "
-        f"by the factor exp({change:.2g}), tolerance {tolerance:g}. Allow more with max_sweeps"
+        f"the boundary's arcs have not converged after {most} sweeps: the last one changed an "
+        f"arc by the factor exp({change:.2g}), tolerance {tolerance:g}. Allow more with max_sweeps"
     )

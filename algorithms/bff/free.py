@@ -20,6 +20,7 @@ Real = NDArray[np.float64]
 
 
 def _no_digon(corners: int) -> int:
+    """Refuse polygons with one or two corners."""
     if corners in (1, 2):
         raise ValueError("a polygon has at least 3 corners; 0 leaves the boundary free")
     return corners
@@ -42,14 +43,14 @@ def bff_free(
 
     By default u = 0 on the boundary, the automatic flattening of the paper: the exterior angles
     k - L_bi L_ii^-1 Omega follow, and the boundary keeps its lengths, so that areas change least
-    there. With `corners` the boundary turns by 2 pi / corners at so many vertices, at even
-    distances along it, and nowhere else; u follows up to its mean, and with it the sides.
+    there. With `corners` the boundary turns by 2 pi / corners at this many vertices, evenly spaced
+    along it, and nowhere else; u follows up to its mean, and the sides follow from u.
 
-    Decided here: the curve is closed by the least change of its lengths (`closing` is the largest
-    share), the interior is the harmonic extension of both coordinates from the one factorisation,
-    and the image is scaled to area pi. `gauss_bonnet` is how far the exterior angles are from 2 pi
-    in sum. A boundary that crosses itself stays as it is; the harness tells. Folds inside are
-    mended as in LSCM (`fold_repairs`).
+    Decided here: the curve is closed by the smallest change of its lengths (`closing` is the
+    largest relative change), the interior is the harmonic extension of both coordinates with the
+    one factorisation, and the image is scaled to area pi. `gauss_bonnet` is the distance of the sum
+    of the exterior angles from 2 pi. A boundary that crosses itself is left as it is, and the
+    harness reports it. Folds inside are repaired as in LSCM (`fold_repairs`).
     """
     yamabe = YamabeBoundary(mesh, delaunay=delaunay)
     turns, lengths = yamabe.natural, yamabe.lengths
@@ -63,7 +64,7 @@ def bff_free(
 
 
 def _corners(lengths: Real, corners: int) -> Real:
-    """Exterior angles (B,) of a polygon with corners at even distances from the longest edge on."""
+    """Return exterior angles (B,) of a polygon, corners evenly spaced from the longest edge."""
     first = int(np.argmax(lengths))
     along = np.cumsum(np.roll(lengths, -first)) / lengths.sum()
     at = np.searchsorted(along, np.arange(corners) / corners, side="right")

@@ -1,4 +1,4 @@
-"""The linear relation between how a boundary is scaled and how it turns."""
+"""The linear relation between the scale of a boundary and its exterior angles."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Real = NDArray[np.float64]
 
 
 class YamabeBoundary:
-    """L u = (-Omega; k~ - k), the interior eliminated, for a flat image (Sawhney & Crane, Eq. 14).
+    """L u = (-Omega; k~ - k), interior eliminated, for a flat image (Sawhney & Crane, Eq. 14).
 
     Parameters
     ----------
     mesh : DiskMesh
         The surface.
     delaunay : bool
-        Whether the weights are those of the intrinsic Delaunay triangulation.
+        Whether to use the weights of the intrinsic Delaunay triangulation.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class YamabeBoundary:
     lengths : float (B,)
         From each boundary vertex to the next on the surface.
     natural : float (B,)
-        Exterior angles k~ in radians where the boundary keeps its scale, u = 0; 2 pi in sum.
+        Exterior angles k~ in radians if the boundary keeps its scale, u = 0; their sum is 2 pi.
 
     """
 
@@ -48,9 +48,9 @@ class YamabeBoundary:
         self.natural: Real = 2 * np.pi * swept[:, 0]
 
     def scale(self, turns: Real) -> Real:
-        """Which log scale u (B,), 0 in the mean, has a boundary with these exterior angles (B,)?"""
+        """Return the log scale u (B,) of mean 0 of a boundary with these exterior angles (B,)."""
         return np.asarray(self._S.inverse(turns - self.natural))
 
     def scaled(self, u: Real) -> Real:
-        """The boundary's lengths (B,) where vertices are scaled by exp(u)."""
+        """Return the boundary's lengths (B,) after scaling vertices by exp(u)."""
         return np.asarray(self.lengths * np.exp((u + np.roll(u, -1)) / 2))

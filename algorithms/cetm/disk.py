@@ -28,7 +28,7 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
-#: How many boundary vertices are tried, from the mean vertex outward.
+#: Number of boundary vertices that are tried, from the mean vertex outward.
 TRIED = 4
 
 
@@ -48,20 +48,20 @@ def cetm(
 ) -> Parameterization:
     """Map to the disk by scaling edges at their vertices, by way of a half plane.
 
-    A boundary vertex goes to infinity: all edges to it are made equally long, it is removed with
+    A boundary vertex goes to infinity: all edges at it are made equally long, it is removed with
     its triangles, and its neighbours keep their scale. Newton's method on a convex energy, with one
     analysed pattern (`factorisations`), then finds the scale at which the angles sum to 2 pi inside
-    and to pi on the rest of the boundary, which so becomes a straight line. A Moebius map takes the
-    half plane to the disk, and the vertex back to its circle. The length cross ratios of the map
-    are those of the surface (`cross_ratios` is the largest change of their logarithms).
+    and to pi on the rest of the boundary, which thus becomes a straight line. A Moebius map takes
+    the half plane to the disk, and the vertex back to the circle. The length cross ratios of the
+    map are those of the surface (`cross_ratios` is the largest change of their logarithms).
 
-    Decided here: the vertex is the boundary vertex nearest to the mean vertex (`at_infinity`),
-    or another one of four where triangles break with that.
-    Steps and end are those of cetm-free (`curvature`, radians). No edge inside may join two
-    boundary vertices, since it would fall on the line, with what it cuts off: that is a failure,
-    as are triangles that break the triangle inequality; cetm-flips maps both. The flat surface is
-    laid out by one solve; the image is brought into the `gauge` of direct-cem. Images of triangles
-    are straight, so a few can fold where others are conformal: these are repaired as in CEM
+    Decided here: the vertex is the boundary vertex nearest to the mean vertex (`at_infinity`), or
+    the next of about four candidates if triangles break with it. Steps and stopping rule are those
+    of cetm-free (`curvature`, radians). No interior edge may join two boundary vertices, since it
+    would fall on the line together with what it cuts off: that is a failure, as are triangles that
+    break the triangle inequality; cetm-flips maps both. The flat surface is laid out by one solve;
+    the image is moved into the `gauge` of direct-cem. Images of triangles have straight edges, so a
+    few can fold although the discrete map is conformal: these are repaired as in CEM
     (`fold_repairs`), after which cross ratios are no longer kept.
     """
     b = mesh.boundary
@@ -96,11 +96,11 @@ def cetm(
 def _with_infinity_at(
     mesh: DiskMesh, v: int, tolerance: float, max_iterations: int
 ) -> tuple[Indices, FlatMetric]:
-    """The triangles that do not touch v, and their flat metric with v at infinity."""
+    """Return the triangles that do not touch v, and their flat metric with v at infinity."""
     touching = np.any(np.int64(v) == mesh.F, axis=1)
     F = mesh.F[~touching]
     if not len(F):
-        raise AlgorithmFailed(f"every triangle touches the boundary vertex {v}: too few for CETM")
+        raise AlgorithmFailed(f"every triangle touches the boundary vertex {v}: too few triangles")
     u, link = _infinity(mesh, v, mesh.F[touching])
     flat = np.full(mesh.n, 2 * np.pi)
     flat[mesh.boundary] = np.pi
@@ -117,12 +117,15 @@ def _with_infinity_at(
 
 
 def _checked_ear(mesh: DiskMesh) -> int | None:
-    """The tip of a triangle that is joined by one edge only, if that is the only chord.
+    """Return the tip of an ear if its base is the only chord, None if there is no chord.
+
+    An ear is a triangle joined to the surface by one edge only; a chord is an interior edge between
+    boundary vertices.
 
     Raises
     ------
     AlgorithmFailed
-        Other edges inside join boundary vertices.
+        There are other chords.
 
     """
     on = np.zeros(mesh.n, dtype=bool)
@@ -142,20 +145,20 @@ def _checked_ear(mesh: DiskMesh) -> int | None:
 
 
 def _infinity(mesh: DiskMesh, v: int, star: Indices) -> tuple[Real, Indices]:
-    """The start u (n,) in which all edges to v are equally long, and the neighbours of v.
+    """Return the u (n,) at which all edges to v are equally long, and the neighbours of v.
 
-    It is that of the inversion of space in a sphere round v.
+    It is that of the inversion of space in a sphere around v.
     """
     away = np.linalg.norm(mesh.V - mesh.V[v], axis=1)
     away[v] = 1.0
     if not away.min() > 0:
-        raise AlgorithmFailed(f"another vertex lies where the boundary vertex {v} does")
+        raise AlgorithmFailed(f"another vertex coincides with the boundary vertex {v}")
     u = -2 * np.log(away)
     return u - u.mean(), np.setdiff1d(star, [v])
 
 
 def _half_plane(mesh: DiskMesh, v: int, F: Indices, found: FlatMetric) -> Complex:
-    """Lay out the flat surface, the old boundary on the real axis, the surface above it."""
+    """Lay out the flat surface above the real axis, with the old boundary on the axis."""
     loops = boundary_loops(F, mesh.n)
     if len(loops) != 1:
         raise AlgorithmFailed(f"without the boundary vertex {v} the surface falls apart")
@@ -173,9 +176,9 @@ def _half_plane(mesh: DiskMesh, v: int, F: Indices, found: FlatMetric) -> Comple
 
 
 def _closed_by_link(lengths: Real, turns: Real, k: int) -> Complex:
-    """A polygon whose first k vertices lie on the real axis, at their distances to the digit.
+    """Return a polygon whose first k vertices lie on the real axis, at exactly their distances.
 
-    The others, which are farther apart by orders of magnitude, take what is missing to close it.
+    The other edges, which are longer by orders of magnitude, absorb the closing error.
     """
     line = np.concatenate([[0.0], np.cumsum(lengths[: k - 1])])
     directions = np.exp(1j * np.cumsum(turns[k - 1 :]))
@@ -186,11 +189,11 @@ def _closed_by_link(lengths: Real, turns: Real, k: int) -> Complex:
 
 
 def _on_disk(mesh: DiskMesh, z: Complex, v: int) -> Complex:
-    """The half plane by (z - p) / (z - conj p), with p in the middle triangle, and v from afar."""
+    """Map the half plane by (z - p) / (z - conj p), with p in the middle triangle, and add v."""
     corners = middle_triangle(mesh.V, mesh.F)
     p = complex(z[corners[corners != v]].mean())
     if not p.imag > 0:
-        raise AlgorithmFailed("the middle of the surface came to lie on its boundary")
+        raise AlgorithmFailed("the middle of the surface is mapped to its boundary")
     w = np.empty_like(z)
     others = np.arange(mesh.n) != v
     w[others] = (z[others] - p) / (z[others] - p.conjugate())

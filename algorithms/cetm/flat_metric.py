@@ -22,31 +22,31 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
-#: A step is taken when the energy's slope at its end is at most this share of that at its start,
-#: upward: the energy is convex, so its least value on the way lies near the end or beyond.
+#: A step is taken if the energy's upward slope at its end is at most this share of the slope at its
+#: start: the energy is convex, so its minimum along the step is then near the end or beyond.
 UPHILL = 0.5
-#: How often a step is shortened.
+#: Maximal number of halvings of a step.
 SHORTER = 40
 
 
 @dataclass(frozen=True)
 class FlatMetric:
-    """What Newton's method found.
+    """The result of Newton's method.
 
     Parameters
     ----------
     u : float (n,)
         Log scale at each vertex.
     lengths : float (m, 3)
-        Scaled, opposite to each corner.
+        Scaled lengths, opposite to each corner.
     angles : float (m, 3)
         In radians.
     residual : float
-        The largest distance of an angle sum from what it should be, in radians.
+        The largest error of an angle sum, in radians.
     history : tuple of float
         The residual at the start and after each step.
     factorisations : int
-        How often the Hessian was factored; its pattern was analysed once.
+        Number of factorisations of the Hessian; its pattern was analysed once.
 
     """
 
@@ -60,10 +60,10 @@ class FlatMetric:
     cholesky: Cholesky
 
     def laid_out(self, F: Indices, fixed: NDArray[np.bool_], z: Complex) -> Complex:
-        """The flat surface in the plane: one solve with the analysed pattern.
+        """Lay out the flat surface in the plane, by one solve with the analysed pattern.
 
-        `fixed` (n,) tells the vertices, those whose u was held among them, that are where z (n,)
-        says; other values of z are not looked at.
+        `fixed` (n,) marks the vertices whose position is given by z (n,), which must include those
+        whose u was held; other values of z are ignored.
         """
         with phase("assembly"):
             weights = half_cotangents_of(self.angles, np.zeros(len(F), dtype=bool))
@@ -84,11 +84,11 @@ def flat_metric(
     tolerance: float,
     max_iterations: int,
 ) -> FlatMetric:
-    """Scale vertices so that the angle sums are `flat` (n,) at all but the `held` ones.
+    """Scale vertices so that the angle sums are `flat` (n,) at all vertices but the `held` ones.
 
     Newton's method on the convex energy of Springborn, Schroeder & Pinkall 2008: its gradient is
-    what is missing to each angle sum, its Hessian the cotangent Laplacian of the scaled lengths.
-    `u` is the start, and what the held vertices (k,) keep.
+    the error of each angle sum, its Hessian the cotangent Laplacian of the scaled lengths. `u` is
+    the start, and the held vertices (k,) keep their value.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def flat_metric(
         u, here, broken, gradient = u + share * step, there, lost, missing
         history.append(float(np.abs(gradient).max()))
     if cholesky is not None:
-        # Once more with the last factor: what is nearly at rounding gets there for nothing.
+        # One more step with the last factor, which takes the residual down to rounding for free.
         step = np.zeros(n)
         step[kept] = -cholesky.solve(gradient)
         there, lost = angles(scaled(lengths, F, u + step))
@@ -149,7 +149,7 @@ def flat_metric(
         raise AlgorithmFailed(
             f"{told}, after {len(history) - 1} Newton steps. Allow more with max_iterations"
         )
-    if cholesky is None:  # flat as it is
+    if cholesky is None:  # already flat
         cholesky = Cholesky(pattern.block(half_cotangents_of(here, broken)))
     return FlatMetric(
         u, scaled(lengths, F, u), here, history[-1], tuple(history), len(history), pattern, cholesky

@@ -1,4 +1,4 @@
-"""Conformal equivalence with flips, to the disk: it ends on every surface."""
+"""Conformal equivalence with flips, to the disk: it converges on every surface."""
 
 from __future__ import annotations
 
@@ -46,23 +46,24 @@ def cetm_flips(
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 200,
     gauge: Gauge = "boundary",
 ) -> Parameterization:
-    """Map to the disk by scaling edges, the triangulation kept Delaunay by flips on the way.
+    """Map to the disk by scaling edges, with flips that keep the triangulation Delaunay.
 
-    The surface is glued to its mirror copy and its intrinsic Delaunay triangulation taken.
-    Vertices are scaled by Newton's method on the convex energy of cetm; whenever an edge stops
-    being Delaunay it is flipped and takes the length of Ptolemy's rule, which keeps the hyperbolic
-    metric that all discretely equivalent triangulations share. So no triangle ever breaks, and a
-    flat metric with any angle sums below 2 pi at some vertices exists (discrete uniformisation).
+    The surface is glued to its mirror copy, and the intrinsic Delaunay triangulation of the result
+    is taken. Vertices are scaled by Newton's method on the convex energy of cetm. Whenever an edge
+    stops being Delaunay it is flipped and takes its length from Ptolemy's rule, which preserves the
+    hyperbolic metric that all discretely equivalent triangulations share. So no triangle ever
+    breaks, and a flat metric with any angle sums below 2 pi at some vertices exists (discrete
+    uniformisation).
 
-    Decided here: three boundary vertices take the angle pi / 3 and all others are flat, so that the
-    surface becomes an equilateral triangle, with no unknown and nothing at infinity; Dixon's
-    elliptic function takes it to the disk in closed form. They divide the boundary in three by
-    harmonic measure from the middle triangle. The map is discretely conformal to the triangle and
-    smoothly conformal from there, `curvature` is the largest distance of an angle sum from what it
-    should be (radians), `flips` counts flips, `layout` is by how much edges differ from their
-    lengths, relative, as laid out triangle by triangle. The images of vertices are the map; the
-    surface's own triangles, between straight edges, are other ones than the flipped: those of them
-    that fold are told (`folds_of_own_triangles`), and repaired as in CEM (`fold_repairs`).
+    Decided here: three boundary vertices get the angle pi / 3 and all others are flat, so that the
+    surface becomes an equilateral triangle, without unknowns and without a vertex at infinity;
+    Dixon's elliptic function takes it to the disk in closed form. They divide the boundary into
+    thirds by harmonic measure from the middle triangle. The map is discretely conformal to the
+    triangle and smoothly conformal from there. `curvature` is the largest error of an angle sum
+    (radians), `flips` counts flips, and `layout` is the largest relative difference between edges
+    and their lengths after laying them out triangle by triangle. The map consists of the images of
+    the vertices. The surface's own triangles, between straight edges, differ from the flipped ones:
+    those that fold are counted (`folds_of_own_triangles`) and repaired as in CEM (`fold_repairs`).
     """
     b = mesh.boundary
     L = laplacian(mesh)
@@ -76,7 +77,7 @@ def cetm_flips(
         z, off = _laid_out(T, u, cones, mesh.n)
         uv = disk_of_triangle(z)
     if not np.isfinite(uv).all():
-        raise AlgorithmFailed("a vertex came to lie on the wrong side of the boundary")
+        raise AlgorithmFailed("a vertex is mapped to the wrong side of the boundary")
     uv[b] /= np.abs(uv[b])
     uv /= np.maximum(np.abs(uv), 1.0)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
@@ -84,7 +85,7 @@ def cetm_flips(
     folds = len(folded_triangles(uv, mesh.F))
     try:
         uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
-    except AlgorithmFailed as error:  # the map is told as it is
+    except AlgorithmFailed as error:  # the map is reported unrepaired
         repair = {"fold_repairs": 0, "no_repair": str(error)}
     told = {
         "curvature": residual,
@@ -97,7 +98,7 @@ def cetm_flips(
 
 
 def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:
-    """Three boundary vertices in order, a third of the boundary apart as the middle sees it."""
+    """Return three boundary vertices in order, a third of the harmonic measure apart."""
     b = mesh.boundary
     seen = bordered.swept_to_boundary(gauge_measure(mesh, "triangle", b)[:, None])[:, 0]
     first = int(np.argmax(np.linalg.norm(mesh.V[b] - mesh.V.mean(axis=0), axis=1)))
@@ -109,7 +110,7 @@ def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:
 
 
 def _sides(T: Triangulation, u: Real) -> Real:
-    """Lengths (m, 3) opposite to each corner, each triangle's longest 1."""
+    """Return the lengths (m, 3) opposite to each corner, scaled to longest side 1 per triangle."""
     log_length = T.scaled(u).reshape(-1, 3)
     log_length = log_length - log_length.max(axis=1, keepdims=True)
     return np.exp(np.roll(log_length, -1, axis=1))
@@ -118,7 +119,7 @@ def _sides(T: Triangulation, u: Real) -> Real:
 def _flattened(
     T: Triangulation, n: int, cones: Indices, tolerance: float, most: int
 ) -> tuple[Real, float, int]:
-    """Scale u (n,), the triangulation being flipped with it; the residual; the Newton steps."""
+    """Return the scale u (n,) after flipping along; the residual; the number of Newton steps."""
     flat = np.full(n, 2 * np.pi)
     flat[cones] = 2 * np.pi / 3
     u = np.zeros(n)
@@ -156,10 +157,10 @@ def _flattened(
 
 
 def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Complex, float]:
-    """Where the surface's vertices (n,) lie in the plane of the triangle of `disk_of_triangle`.
+    """Return the positions of the surface's vertices (n,) in the triangle of `disk_of_triangle`.
 
-    Triangles are unfolded in turn from the largest one on; a vertex beyond an edge of the
-    equilateral triangle lies in one of its mirror images, whose corners are those of a lattice.
+    Triangles are unfolded in turn, starting from the largest. A vertex beyond an edge of the
+    equilateral triangle lies in a mirror image of it, whose corners belong to a lattice.
     """
     log_length = T.scaled(u)
     sides = np.exp(log_length - log_length.max()).reshape(-1, 3)
@@ -191,10 +192,10 @@ def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Comple
 
 
 def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, complex]:
-    """Factor and centre that take an image of the equilateral triangle to the standard one.
+    """Return factor and centre that take an image of the equilateral triangle to the standard one.
 
-    Two corners that are a side apart determine it: the surface lies on the left of the way from
-    one to the next.
+    Two corners that are a side apart determine it: the surface lies on the left of the way from one
+    to the next.
     """
     images = [np.unique(np.round(P[np.int64(v) == T.F], 13)) for v in cones]
     area = np.abs(np.imag(np.conj(P[:, 1] - P[:, 0]) * (P[:, 2] - P[:, 0]))).sum() / 4
@@ -208,8 +209,8 @@ def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, 
     off, k, here, there = min(found, key=lambda one: one[0])
     if not off < 1e-3:
         raise AlgorithmFailed(
-            f"the flat surface is no equilateral triangle as laid out (off by {off:.2g}): its "
-            "places differ by more than doubles can hold"
+            f"the laid out flat surface is not an equilateral triangle (off by {off:.2g}): its "
+            "positions differ by more than doubles can resolve"
         )
     third = here + (there - here) * np.exp(1j * np.pi / 3)
     centre = (here + there + third) / 3

@@ -33,19 +33,19 @@ def cetm_free(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-10,
     max_iterations: Annotated[int, Field(ge=0, le=10_000)] = 50,
 ) -> Parameterization:
-    """Flatten by scaling edges at their vertices, the boundary keeping its lengths.
+    """Flatten by scaling edges at their vertices, with the boundary keeping its lengths.
 
-    Lengths l~_ij = l_ij exp((u_i + u_j) / 2) with u = 0 on the boundary, such that the angles round
-    every interior vertex sum to 2 pi: the minimum of a convex energy, by Newton's method with one
-    analysed pattern (`factorisations`). The length cross ratios of the map are those of the surface
-    (`cross_ratios` is the largest change of their logarithms).
+    Lengths l~_ij = l_ij exp((u_i + u_j) / 2) with u = 0 on the boundary, such that the angles
+    around every interior vertex sum to 2 pi: the minimum of a convex energy, by Newton's method
+    with one analysed pattern (`factorisations`). The length cross ratios of the map are those of
+    the surface (`cross_ratios` is the largest change of their logarithms).
 
-    Decided here: a step is halved while the energy rises steeply at its end; it ends when all angle
-    sums are within `tolerance` (`curvature`, radians), and fails where triangles break the triangle
-    inequality, as flips are not made. The boundary is laid out by its lengths and angles (`closing`
-    is the share by which a length changed to close it), the interior by one solve in the flat
-    metric, and the image scaled to area pi. Folds inside are mended as in LSCM (`fold_repairs`),
-    after which cross ratios are no longer kept.
+    Decided here: a step is halved while the energy rises steeply at its end. The iteration ends
+    when all angle sums are within `tolerance` (`curvature`, radians), and fails if triangles break
+    the triangle inequality, since no edge is flipped. The boundary is laid out from its lengths and
+    angles (`closing` is the largest relative change of a length that closes it), the interior by
+    one solve in the flat metric, and the image is scaled to area pi. Folds inside are repaired as
+    in LSCM (`fold_repairs`), after which cross ratios are no longer kept.
     """
     b = mesh.boundary
     lengths = side_lengths(mesh.V, mesh.F)
@@ -76,7 +76,7 @@ def cetm_free(
 
 
 def cross_ratio_change(mesh: DiskMesh, uv: NDArray[np.complex128]) -> float:
-    """By how much does the logarithm of a length cross ratio change, at most?"""
+    """Return the largest change of the logarithm of a length cross ratio."""
     plane = np.stack([uv.real, uv.imag], axis=1)
     before, after = (length_cross_ratios(mesh.F, side_lengths(V, mesh.F)) for V in (mesh.V, plane))
     return float(np.abs(after - before).max(initial=0.0))

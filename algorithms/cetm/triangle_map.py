@@ -9,12 +9,12 @@ Complex = NDArray[np.complex128]
 
 #: sm maps the triangle with corners at K times the cube roots of 1 to the unit disk, K to 1.
 K = 1.7666387502854499
-#: How often an argument is halved, until the series is exact.
+#: Number of times that an argument is halved, after which the series is exact.
 HALVINGS = 6
 
 
 def disk_of_triangle(z: Complex) -> Complex:
-    """Sm z: the inverse of the integral of (1 - w^3)^(-2/3) from 0 to w.
+    """Return sm z, the inverse of the integral of (1 - w^3)^(-2/3) from 0 to w.
 
     Continued by reflection it has the periods 3 K and 3 K exp(2 pi i / 3), and takes neighbouring
     triangles to the outside of the disk.

@@ -1,4 +1,4 @@
-"""The conformal energy minimised directly over where the boundary lies on the unit circle."""
+"""The conformal energy minimised directly over the boundary positions on the unit circle."""
 
 from __future__ import annotations
 
@@ -36,26 +36,26 @@ def direct_cem(
     back: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.01,
     delaunay: bool = True,
 ) -> Parameterization:
-    """Minimise the conformal energy over where the boundary lies on the circle, by Newton's method.
+    """Minimise the conformal energy over the boundary's angles on the circle, by Newton's method.
 
     E_C of the harmonic map (Eqs. 5, 7, 8) is a function of the boundary's angles alone,
-    z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first,
-    boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block:
-    Newton steps (trust region, preconditioned by S^-1) touch nothing but the boundary.
+    z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first and
+    boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block.
+    Newton steps (trust region, preconditioned by S^-1) involve only the boundary.
 
-    Decided here: weights are those of the intrinsic Delaunay triangulation, of which none is
+    Decided here: the weights are those of the intrinsic Delaunay triangulation, none of which is
     negative; with `delaunay` off they are the cotangents of the mesh's own edges, as in CEM. The
-    energies recorded are with the weights used. The start is the harmonic measure of the boundary
-    from the triangle nearest to the mean vertex, or arc length where that has lower energy
-    (`start`); it is brought into the `gauge`, that is, a mean comes to lie at 0: of the boundary by
-    length, of that triangle, or of the surface by area; from there Moebius maps are held by the
-    start's arcs. Iteration ends when the gradient, whose squared norm is about twice what E_C can
-    still fall, says that this is at most the share `tolerance` of E_C (`stopped`: "gradient"), when
-    nothing is left but rounding ("rounding"), after `max_iterations` ("iterations"), or when too
-    many arcs would fall below a tenth of their length at the start ("crowded"; `held_arcs` counts
-    those held). Near its minimum E_C is flat, angles are not, and harmonic measure has better ones:
-    so the boundary then goes back towards it as far as that costs no more than the share `back` of
-    E_C; 0 leaves the least E_C. Folds are repaired as in CEM (`fold_repairs`).
+    recorded energies use the same weights. The start is the harmonic measure of the boundary from
+    the triangle nearest to the mean vertex, or arc length if that has lower energy (`start`). It is
+    moved into the `gauge`, that is, a mean is moved to 0: of the boundary by length, of that
+    triangle, or of the surface by area; from there on Moebius maps are fixed by the start's arcs.
+    The iteration ends when the gradient, whose squared norm is about twice what E_C can still
+    decrease, shows that this is at most the share `tolerance` of E_C (`stopped`: "gradient"), when
+    only rounding is left ("rounding"), after `max_iterations` ("iterations"), or when too many arcs
+    would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those held).
+    Near its minimum E_C is flat but the angles are not, and harmonic measure has better ones. So
+    the boundary is finally moved back towards it as far as that raises E_C by at most the share
+    `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
@@ -87,7 +87,7 @@ def direct_cem(
 
 
 def _share(cost: float, energies: tuple[float, ...]) -> float:
-    """Return the share of the way back that raises E_C by `cost`, E_C being a parabola on it."""
+    """Return the share of the way back that raises E_C, a parabola along it, by `cost`."""
     fallen = energies[0] - energies[-1]
     return min(1.0, (cost * energies[-1] / fallen) ** 0.5) if fallen > 0 else 0.0
 

@@ -1,8 +1,8 @@
-"""From a gauge on to Moebius images of less energy, as long as the angles do not suffer.
+"""Moebius images of lower energy, as long as the angles do not suffer.
 
-The conformal energy of a polygon's map depends on its gauge where boundaries are coarse, and so do
-the angles, but the least energy is not where the best angles are: a map that only seeks the first
-puts where the mesh is coarse into a small part of the disk.
+The conformal energy of a polygon's map depends on its gauge if boundaries are coarse, and so do the
+angles. But the least energy does not have the best angles: a map that only minimises energy
+squeezes the coarse parts of the mesh into a small part of the disk.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from cembench.core.clock import phase
 
 Complex = NDArray[np.complex128]
 
-#: How far a step may go in the unit disk, and how many steps there are at most.
+#: Largest step in the unit disk, and the maximal number of steps.
 LEASH, STEPS = 0.05, 5
-#: A step must lower E_C by this share of itself, and by more than this many times the share by
-#: which the angle error grows.
+#: A step must lower E_C by this share, and by more than this many times the relative growth of the
+#: angle error.
 LEAST_GAIN, ANGLE_WEIGHT = 0.0015, 20
-#: E_C below this is rounding.
+#: E_C below this is rounding error.
 ROUNDING = 1e-12
 
 
@@ -32,18 +32,18 @@ def gauge_walk(
     angle_error: Callable[[Complex], float],
     steps: int = STEPS,
 ) -> tuple[Complex, tuple[float, ...]]:
-    """Which Moebius image of a domain has less energy, at hardly any cost to the angles?
+    """Return a Moebius image of a domain that has less energy at hardly any cost to the angles.
 
     Parameters
     ----------
     here : EnergyModel
         At the domain.
-    extended : function (B,) -> (n,)
-        The harmonic map with given boundary values.
-    angle_error : function (n,) -> float
-        The mean angle error of a map.
+    extended : callable
+        Returns the harmonic map (n,) with given boundary values (B,).
+    angle_error : callable
+        Returns the mean angle error of a map (n,).
     steps : int
-        How many there are at most.
+        Maximal number of steps.
 
     Returns
     -------

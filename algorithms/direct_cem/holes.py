@@ -1,4 +1,4 @@
-"""The conformal energy minimised directly over the unit disks with circular holes."""
+"""The conformal energy minimised directly over unit disks with circular holes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from .gauge_walk import STEPS, gauge_walk
 
 Complex = NDArray[np.complex128]
 
-#: What share of E_C it may cost that crowded arcs take the proportions of the start.
+#: Largest relative increase of E_C for giving crowded arcs the proportions of the start.
 MOST_COST = 0.01
 
 
@@ -49,17 +49,19 @@ def direct_cem_holes(
 ) -> Parameterization:
     """Map a surface with holes to the circle domain of least conformal energy.
 
-    As `direct-cem`, without its way back, with the centre and the radius of every hole as further
-    unknowns; the holes are open in every step, and their circles exact. The outer boundary is that
-    of the vertex `outer`, or the widest. Decided here: the start fills the holes with disks, their
-    vertices on the rim by the hole's equilibrium measure, and fits circles to their images; the
-    origin is near the middle triangle or among the holes, whichever has the lower energy, and then
-    in the `gauge`. Where a circle has a radius below 1e-3, each boundary is tried as the outer one,
-    the one that leaves the smallest circle largest is outside while E_C is minimised
-    (`outside_while_minimised`; the energy history is that of this domain), and a Moebius map brings
-    the outer one out. Arcs below a hundredth of the mean one, which the energy hardly sees, take
-    the proportions of the start's where that has better angles and costs at most 1 % of E_C
-    (`settled`). Folds are mended with the boundary kept (`fold_repairs`).
+    As `direct-cem`, without its final move back, and with the centre and the radius of every hole
+    as further unknowns. The holes are open in every step, and their circles exact. The outer
+    boundary is that of the vertex `outer`, or the widest.
+
+    Decided here: the start fills the holes with disks, with the vertices on the rim spaced by the
+    hole's equilibrium measure, and fits circles to their images. The origin is near the middle
+    triangle or among the holes, whichever has the lower energy, and is then moved into the `gauge`.
+    If a circle has a radius below 1e-3, each boundary is tried as the outer one; the one that makes
+    the smallest circle largest is outside while E_C is minimised (`outside_while_minimised`; the
+    energy history is that of this domain), and a Moebius map then brings the outer boundary
+    outside. Arcs below a hundredth of the mean arc, which hardly change the energy, take the
+    proportions of the start's if that has better angles and raises E_C by at most 1 % (`settled`).
+    Folds are repaired with the boundary fixed (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
@@ -104,7 +106,7 @@ def _settled(
     extended: Callable[[Complex], Complex],
     angle_error: SampledAngleError,
 ) -> tuple[EnergyModel, bool]:
-    """Return the minimum with the start's proportions where arcs crowd, if its angles gain."""
+    """Return the minimum with the start's proportions in crowded arcs, if that improves angles."""
     domain = here.domain.settled(start)
     if domain is here.domain:
         return here, False

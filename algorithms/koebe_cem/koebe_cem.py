@@ -33,20 +33,22 @@ def koebe_cem(
     weights: Weights = "surface",
     rounding: bool = True,
 ) -> Parameterization:
-    """Which map takes a surface with holes to a disk with round holes? Algorithm 2 of the paper.
+    """Map a surface with holes to a disk with round holes by Algorithm 2 of the paper.
 
     One sweep is Algorithm 2: each boundary in turn is left open, the others are filled, and CEM
-    makes it a circle; the outer one (that of the vertex `outer`, or the widest) comes last. More
-    sweeps go on from there. Decided here: the surface's own triangles keep the surface's cotangent
-    weights in every step (`weights="plane"` takes those of the last image, as the paper's text
-    reads); a hole that has an image is filled by a round disk with its vertices where the image
-    puts them (`patches="fans"`: by a fan to the centroid, as in the paper, which knows nothing of
-    the disk's inside); the holes come longest first, so the shortest is opened first; a step starts
-    from the paper's pole (in later sweeps from where the boundary was when last opened) or from the
-    boundary's last image put on a circle, whichever has the lower E_C; at last each hole is put on
-    the circle fitted to it and the interior is solved for again (`rounding`;
-    `circularity_before_rounding` tells how far it was). Since patches change only dense blocks at
-    the boundary, the interior is eliminated once, for all steps of all sweeps.
+    makes it a circle; the outer boundary (that of the vertex `outer`, or the widest) comes last.
+    Further sweeps continue from there. Since patches change only dense blocks at the boundary, the
+    interior is eliminated once, for all steps of all sweeps.
+
+    Decided here: the surface's own triangles keep the surface's cotangent weights in every step
+    (`weights="plane"` takes those of the last image, as the paper's text reads). A hole that has an
+    image is filled by a round disk with its vertices at their images (`patches="fans"`: by a fan to
+    the centroid, as in the paper, which ignores the disk's interior). The holes are sorted longest
+    first, and the shortest is opened first. A step starts from the paper's pole (in later sweeps
+    from the boundary's position when it was last open) or from the boundary's last image put on a
+    circle, whichever has the lower E_C. At the end each hole is put on the circle fitted to it and
+    the interior is solved for again (`rounding`; `circularity_before_rounding` is its circularity
+    before that).
     """
     steps = list(
         koebe_steps(

@@ -1,10 +1,10 @@
 """Koebe's method for surfaces with holes (the paper's Algorithm 2; Zeng et al. 2009).
 
 One step opens one boundary, fills all others, and maps that disk by CEM, so that the open boundary
-becomes a circle. A sweep does so with every boundary, the outer one last. Here the cotangent
-weights of the surface's own triangles are those of the surface in every step, for its conformal
-structure does not change; only the patches come from the plane. So a map is not composed of maps,
-each with its error, and errors of earlier steps are forgotten.
+becomes a circle. A sweep does so for every boundary, the outer one last. Here the surface's own
+triangles have the cotangent weights of the surface in every step, since its conformal structure
+does not change; only the patches come from the plane. So the map is not a composition of maps with
+an error each, and errors of earlier steps are forgotten.
 """
 
 from __future__ import annotations
@@ -33,31 +33,31 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Loop = NDArray[np.int64]
 
-#: Round disks glued in, or the paper's fans to the centroid.
+#: How holes are filled: by round disks, or by the paper's fans to the centroid.
 Patches: TypeAlias = Literal["disks", "fans"]
-#: Whose angles give the weights of the surface's triangles: its own, or those of the last image.
+#: Source of the triangles' weights: the surface's own angles, or those of the last image.
 Weights: TypeAlias = Literal["surface", "plane"]
 
 
 @dataclass(frozen=True)
 class KoebeStep:
-    """What one step of Koebe's method came to.
+    """The result of one step of Koebe's method.
 
     Parameters
     ----------
     sweep : int
-        Counted from 1.
+        Number of the sweep, from 1.
     boundary : int
-        Which boundary became a circle: 0 the outer one, then the holes, longest first.
+        The boundary that became a circle: 0 is the outer one, then the holes, longest first.
     before : complex (n,) or None
-        The image that the step set out from, inverted at the boundary's centroid so that this lies
-        outside; None in the first step, which sets out from the surface in space.
+        The image before the step, inverted at the boundary's centroid so that the boundary is
+        outside; None in the first step, which starts from the surface in space.
     uv : complex (n,)
-        The image after it, the boundary on the unit circle and all others inside.
+        The image after the step, with the boundary on the unit circle and all others inside.
     energies : tuple of float
         E_C of the filled surface, before and after each iteration of CEM.
     order_kept : int
-        How often a step of CEM was changed so that the boundary kept its order.
+        Number of CEM steps that were changed to keep the boundary's order.
     surface : BorderedLaplacian
         The surface with its own weights, factored.
 
@@ -83,7 +83,7 @@ def koebe_steps(
     max_iterations: int = 20,
     inversion: bool = True,
 ) -> Iterator[KoebeStep]:
-    """Which images does Koebe's method pass through? Each step as it is done.
+    """Yield the steps of Koebe's method, each as soon as it is done.
 
     Parameters as in ``koebe_cem.py``.
 
@@ -120,7 +120,7 @@ def koebe_steps(
 
 
 def shown_steps(mesh: HoledMesh, *, sweeps: int = 1, outer: int | None = None) -> Iterator[MapStep]:
-    """Yield the steps of Koebe's method with the map that each sweep would end in."""
+    """Yield the steps of Koebe's method, with the final map of each sweep."""
     for step in koebe_steps(mesh, sweeps=sweeps, outer=outer):
         result = None if step.boundary else finished(mesh, step, outer=outer)[0]
         yield MapStep(step.sweep, step.boundary, step.before, step.uv, step.energies, result)
@@ -129,16 +129,16 @@ def shown_steps(mesh: HoledMesh, *, sweeps: int = 1, outer: int | None = None) -
 def finished(
     mesh: HoledMesh, step: KoebeStep, *, outer: int | None = None, rounding: bool = True
 ) -> tuple[Complex, int]:
-    """Which map comes of the last step's image, its holes made round and its folds mended?
+    """Return the final map of a step: its holes made round, its folds repaired; and the repairs.
 
-    With `rounding`, each hole is put on the circle fitted to it, radially, as (25) puts the outer
-    boundary on its circle (vertices that would change places take the nearest angles in order), and
-    the interior is solved for again. The second value counts the repairs of folds.
+    With `rounding`, each hole is put radially on the circle fitted to it, as (25) does with the
+    outer boundary (vertices that would change places get the nearest angles in order), and the
+    interior is solved for again. The second value counts the repairs of folds.
 
     Raises
     ------
     AlgorithmFailed
-        A hole is too far from a circle for that, or folds remain.
+        A hole is too far from a circle, or folds remain.
 
     """
     uv = step.uv
@@ -155,7 +155,7 @@ def finished(
 
 
 class _FilledSurface:
-    """A surface with patches on all of its boundaries but number `k`: a disk.
+    """A surface with patches on all of its boundaries except number `k`: a disk.
 
     The closed boundaries c are eliminated too, so that an iteration of CEM needs only the open
     boundary o and the interior: f_c = -W f_o, and half of f_o^* S f_o is the Dirichlet energy.
@@ -180,7 +180,7 @@ class _FilledSurface:
         self._to_closed = surface.L_bb[o][:, c]
 
     def start(self, corners: Loop, values: Complex) -> Complex:
-        """Boundary values of the map with a pole (Eqs. 13 to 18) on the filled surface."""
+        """Return the boundary values of the filled surface's map with a pole (Eqs. 13 to 18)."""
         surface = self._surface
         with phase("start"):
             n = len(surface.interior) + len(surface.boundary)
@@ -189,19 +189,19 @@ class _FilledSurface:
             inside = surface.solve_interior(rhs[surface.interior])
             rhs_b = rhs[surface.boundary] - surface.L_bi @ inside
             rhs_o = rhs_b[self._open] - _product(self._W.T, rhs_b[self._closed])
-        # Pinned at the last vertex (Theorem 1).
+        # The last vertex is pinned (Theorem 1).
         f_o = np.append(DenseCholesky(self._S[:-1, :-1]).solve(rhs_o[:-1]), 0.0)
         return np.conj(f_o) if polygon_area(f_o) < 0 else f_o
 
     def energy(self, f_o: Complex) -> float:
-        """E_C (Eq. 7) of the filled surface's map that is harmonic for these boundary values."""
+        """Return E_C (Eq. 7) of the filled surface's harmonic map with these boundary values."""
         with phase("energy"):
             return 0.5 * float(np.vdot(f_o, _product(self._S, f_o)).real) - polygon_area(f_o)
 
     def map(
         self, start: Complex, *, tolerance: float, max_iterations: int, inversion: bool
     ) -> tuple[Complex, Complex, tuple[float, ...], int]:
-        """CEM (Algorithm 1) from these boundary values on the unit circle.
+        """Run CEM (Algorithm 1) from these boundary values on the unit circle.
 
         Returns the open boundary's values, the map (n,), E_C of the filled surface before and after
         each iteration, and how often the order had to be kept.
@@ -234,12 +234,12 @@ class _FilledSurface:
 
 
 def _product(M: Real, f: Complex) -> Complex:
-    """M f without a complex copy of M."""
+    """Return M f without a complex copy of M."""
     return M @ f.real + 1j * (M @ f.imag)
 
 
 def _projected(z: Complex) -> list[Complex]:
-    """An outer boundary's image put on its fitted circle radially, if that keeps its order."""
+    """Put an outer boundary's image radially on its fitted circle, if its order is kept."""
     away: Complex = z - fitted_circle(z)[0]
     if not np.abs(away).min() > 0 or backward_arcs(away):
         return []
@@ -247,32 +247,32 @@ def _projected(z: Complex) -> list[Complex]:
 
 
 def _outside_in(uv: Complex, loop: Loop) -> Complex:
-    """The image inverted at the loop's centroid, so that the loop lies outside (Algorithm 2)."""
+    """Invert the image at the loop's centroid, so that the loop is outside (Algorithm 2)."""
     if polygon_area(uv[loop]) > 0:
-        return uv  # it is the outer one already
+        return uv  # it is already the outer one
     away = uv - uv[loop].mean()
     if not np.abs(away).min() > 0:
         raise AlgorithmFailed(
-            f"the boundary of vertex {int(loop.min())} came to have a vertex at its own centroid, "
-            "where the image is to be inverted"
+            f"the boundary of vertex {int(loop.min())} has a vertex at its own centroid, "
+            "at which the image is inverted"
         )
     return 1 / away
 
 
 def _patch(rim: Real, patches: Patches) -> Real:
-    """What fills a loop that lies at these points (k, 2 or 3)?"""
+    """Return the patch that fills a loop at these points (k, 2 or 3)."""
     if patches == "disks" and rim.shape[1] == 2:
         z = rim[:, 0] + 1j * rim[:, 1]
         try:
             turned = _around(z, fitted_circle(z)[0])
             return disk_patch(np.unwrap(np.angle(turned)))
         except AlgorithmFailed:
-            pass  # too far from round for a disk: its own polygon is nearer
+            pass  # too far from round for a disk: use its own polygon
     return fan_patch(rim)
 
 
 def _around(z: Complex, centre: complex) -> Complex:
-    """Directions from the centre of a hole, which runs clockwise, mirrored: counter-clockwise."""
+    """Return directions from a hole's centre, mirrored to run counter-clockwise."""
     away: Complex = np.conj(z - centre)
     if not np.abs(away).min() > 0:
         raise AlgorithmFailed("a hole's image passes through the centre of its fitted circle")
@@ -281,6 +281,7 @@ def _around(z: Complex, centre: complex) -> Complex:
 
 
 def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> sparse.csc_array:
+    """Return the cotangent Laplacian of an image."""
     with np.errstate(divide="ignore", invalid="ignore"):
         L = cotangent_laplacian(points, F)
     if not np.isfinite(L.data).all():

@@ -1,1 +1,1 @@
-"""Algorithms of others: libraries and programs that are run where they are on the machine."""
+"""Third-party algorithms: libraries and programs, which run where they are installed."""

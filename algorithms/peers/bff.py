@@ -1,4 +1,4 @@
-"""Boundary first flattening, by the command line of its authors' program."""
+"""Boundary first flattening, by its authors' command line program."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _REMEDY = (
     remedy=_REMEDY,
 )
 def bff(mesh: DiskMesh) -> None:
-    """What does boundary first flattening come to with a free boundary?
+    """Map a disk by boundary first flattening with a free boundary.
 
-    Not run here: written after the program's own usage. It writes six digits.
+    Untested: written from the program's usage text. The program writes six digits.
     """
 
 
@@ -38,8 +38,8 @@ def bff(mesh: DiskMesh) -> None:
     fit=True,
 )
 def bff_disk(mesh: DiskMesh) -> None:
-    """What does boundary first flattening come to with the disk as its target?
+    """Map a disk by boundary first flattening with the disk as target.
 
-    Not run here: written after the program's own usage. It writes six digits, so its boundary may
-    lie 1e-5 off the circle.
+    Untested: written from the program's usage text. The program writes six digits, so its boundary
+    may be 1e-5 off the circle.
     """

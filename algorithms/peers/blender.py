@@ -1,8 +1,8 @@
-"""Blender's three ways to unwrap, each in a process of Blender's own.
+"""Blender's three unwrapping methods, each in a process of Blender's own.
 
-Blender comes as a program, or as the Python module `bpy`. That needs an older NumPy than cembench
-does, so it lies in an environment of its own; the variable CEMBENCH_BLENDER names that
-environment's Python, or a Blender.
+Blender is available as a program or as the Python module `bpy`. The module needs an older NumPy
+than cembench, so it is installed in a separate environment. The variable CEMBENCH_BLENDER names
+that environment's Python, or a Blender program.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SCRIPT = Path(__file__).with_name("blender_unwrap.py")
 
 
 def blender_command() -> str:
-    """Return the command that runs the script, by the Blender that is there."""
+    """Return the command that runs the script with the Blender that is installed."""
     named = os.environ.get(VARIABLE, "")
     here = sys.executable if importlib.util.find_spec("bpy") else ""
     program = named or here or "blender"
@@ -54,9 +54,9 @@ _HOW: dict[str, Any] = {
     **_HOW,
 )
 def blender_angle_based(mesh: DiskMesh) -> None:
-    """What does Blender's angle based flattening come to, without a seam?
+    """Map a disk by Blender's angle based flattening, without a seam.
 
-    Blender computes UVs in single precision, and puts them into the unit square.
+    Blender computes UVs in single precision, and moves them into the unit square.
     """
 
 
@@ -68,9 +68,9 @@ def blender_angle_based(mesh: DiskMesh) -> None:
     **_HOW,
 )
 def blender_conformal(mesh: DiskMesh) -> None:
-    """What does Blender's least squares conformal map come to, without a seam?
+    """Map a disk by Blender's least squares conformal map, without a seam.
 
-    Blender computes UVs in single precision, and puts them into the unit square.
+    Blender computes UVs in single precision, and moves them into the unit square.
     """
 
 
@@ -82,7 +82,7 @@ def blender_conformal(mesh: DiskMesh) -> None:
     **_HOW,
 )
 def blender_minimum_stretch(mesh: DiskMesh) -> None:
-    """What does Blender's minimum stretch (SLIM) come to, without a seam?
+    """Map a disk by Blender's minimum stretch (SLIM), without a seam.
 
-    Its energy is of isometry. Blender computes UVs in single precision.
+    Its energy measures isometry. Blender computes UVs in single precision.
     """

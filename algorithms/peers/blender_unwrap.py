@@ -5,7 +5,7 @@ Run by a Python that has Blender as its module `bpy`, or by Blender itself::
     python blender_unwrap.py MESH.npz UV.npz ANGLE_BASED
     blender --background --factory-startup --python blender_unwrap.py -- MESH.npz UV.npz CONFORMAL
 
-What it needs of cembench is nothing: it stands alone, in whatever Python Blender has.
+The script needs nothing from cembench, so it runs in whatever Python Blender has.
 """
 
 import sys
@@ -22,7 +22,7 @@ def version() -> None:
 
 
 def main(given: str, left: str, method: str) -> None:
-    """Read V and F, unwrap them as one island without a seam, write a UV for each corner."""
+    """Read V and F, unwrap them as one island without a seam, and write a UV for each corner."""
     import bpy
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
@@ -48,7 +48,7 @@ def main(given: str, left: str, method: str) -> None:
     corners = np.empty(len(mesh.loops), dtype=np.int32)
     mesh.loops.foreach_get("vertex_index", corners)
     if not np.array_equal(corners.reshape(-1, 3), F):
-        sys.exit("Blender holds other triangles than it was given")
+        sys.exit("Blender changed the triangles that it was given")
     np.savez(left, uv=uv.reshape(-1, 2).astype(np.float64), fuv=np.arange(F.size).reshape(-1, 3))
     print(f"solve: {seconds:.9f} s")
 

@@ -34,9 +34,9 @@ LIBIGL = Library("igl", "libigl")
     library=LIBIGL,
 )
 def igl_lscm(mesh: DiskMesh) -> Parameterization:
-    """What does libigl's least squares conformal map come to, with the pins of ours?
+    """Map a disk by libigl's least squares conformal map, with the pins of `lscm`.
 
-    The pins are those of `lscm`, and as there the image is scaled to area pi. Folds stay.
+    As in `lscm`, the image is scaled to area pi. Folds remain.
     """
     import igl
 
@@ -53,7 +53,7 @@ def igl_lscm(mesh: DiskMesh) -> Parameterization:
     library=LIBIGL,
 )
 def igl_harmonic(mesh: DiskMesh) -> Parameterization:
-    """What does libigl's harmonic map to the disk come to, its boundary by arc length?"""
+    """Map a disk by libigl's harmonic map, with the boundary spaced by arc length."""
     import igl
 
     b = mesh.boundary
@@ -63,7 +63,7 @@ def igl_harmonic(mesh: DiskMesh) -> Parameterization:
 
 
 class SlimEnergy(StrEnum):
-    """What SLIM minimises."""
+    """Energies that SLIM can minimise."""
 
     symmetric_dirichlet = "symmetric_dirichlet"
     conformal = "conformal"
@@ -83,11 +83,11 @@ def igl_slim(
     energy: SlimEnergy = SlimEnergy.symmetric_dirichlet,
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 20,
 ) -> Parameterization:
-    """What does libigl's SLIM come to from the harmonic map of the disk?
+    """Map a disk by libigl's SLIM, starting from the harmonic map.
 
-    Its usual energy, symmetric Dirichlet, is of isometry: lengths count beside angles. Decided
-    here: the start is the harmonic map by arc length, scaled to the surface's area, as in libigl's
-    tutorial; where that has folds, Tutte's map.
+    Its default energy, symmetric Dirichlet, measures isometry: lengths count as well as angles.
+    Decided here: the start is the harmonic map by arc length, scaled to the surface's area, as in
+    libigl's tutorial; if that has folds, Tutte's map.
     """
     import igl
 
@@ -130,6 +130,7 @@ def _complex(uv: NDArray[np.float64]) -> NDArray[np.complex128]:
 
 
 def _of_area_pi(mesh: DiskMesh, uv: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Scale a map so that its boundary encloses pi."""
     area = polygon_area(uv[mesh.boundary])
     if not area > 0:
         raise AlgorithmFailed(f"the image of the boundary encloses an area of {area:.3g}")

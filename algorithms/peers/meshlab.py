@@ -1,4 +1,4 @@
-"""MeshLab's parametrisations, called through pymeshlab; it computes UVs in single precision."""
+"""MeshLab's parametrisations, through pymeshlab; it computes UVs in single precision."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ MESHLAB = Library("pymeshlab", "pymeshlab", circle=1e-6)
     library=MESHLAB,
 )
 def meshlab_harmonic(mesh: DiskMesh) -> Parameterization:
-    """What does MeshLab's harmonic map to the disk come to?"""
+    """Map a disk by MeshLab's harmonic map."""
     return Parameterization(_of_vertices(mesh, "compute_texcoord_parametrization_harmonic"))
 
 
@@ -38,7 +38,7 @@ def meshlab_harmonic(mesh: DiskMesh) -> Parameterization:
     library=MESHLAB,
 )
 def meshlab_lscm(mesh: DiskMesh) -> Parameterization:
-    """What does MeshLab's least squares conformal map come to, with its own pins?"""
+    """Map a disk by MeshLab's least squares conformal map, with its own pins."""
     name = "compute_texcoord_parametrization_least_squares_conformal_maps"
     return Parameterization(_of_vertices(mesh, name))
 
@@ -53,10 +53,10 @@ def meshlab_lscm(mesh: DiskMesh) -> Parameterization:
 def meshlab_voronoi(
     mesh: TriangleMesh, *, regions: Annotated[int, Field(ge=1, le=1000)] = 10
 ) -> Atlas:
-    """What does MeshLab's atlas of Voronoi regions come to?"""
+    """Map a surface by MeshLab's atlas of Voronoi regions."""
     meshes = _loaded(mesh)
     _apply(meshes, "generate_voronoi_atlas_parametrization", regionnum=regions)
-    found = meshes.mesh(meshes.mesh_number() - 1)  # it is another one than was given
+    found = meshes.mesh(meshes.mesh_number() - 1)  # the surface differs from the given one
     V, F = found.vertex_matrix(), found.face_matrix().astype(np.int64)
     if found.has_wedge_tex_coord():
         uv, index = found.wedge_tex_coord_matrix(), np.arange(F.size).reshape(-1, 3)
@@ -80,6 +80,7 @@ def _loaded(mesh: TriangleMesh) -> Any:
 
 
 def _apply(meshes: Any, name: str, **parameters: Any) -> None:
+    """Apply a MeshLab filter; its errors become those of an algorithm."""
     from pymeshlab.pmeshlab import PyMeshLabException
 
     try:

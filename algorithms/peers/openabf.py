@@ -17,8 +17,8 @@ from cembench.registry import external_program
     "PATH",
 )
 def openabf(mesh: DiskMesh) -> None:
-    """What do ABF++ and the angle based LSCM of OpenABF come to?
+    """Map a disk by OpenABF: ABF++, then angle based LSCM.
 
-    Not run here: written after the example's source. It writes the flattened surface itself, in
+    Untested: written from the example's source. The program writes the flattened surface itself, in
     single precision.
     """

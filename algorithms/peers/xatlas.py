@@ -1,4 +1,4 @@
-"""xatlas: cuts a surface into charts of small distortion and packs them."""
+"""xatlas, which cuts a surface into charts of small distortion and packs them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,9 @@ from cembench.registry import algorithm
     library=Library("xatlas", "xatlas"),
 )
 def xatlas(mesh: TriangleMesh) -> Atlas:
-    """What atlas does xatlas make with its own settings?
+    """Map a surface to an atlas by xatlas with its default settings.
 
-    It computes in single precision and takes as many threads as there are, whatever `--threads`
-    says.
+    It computes in single precision and uses all available threads, whatever `--threads` says.
     """
     import xatlas as library
 

@@ -1,9 +1,9 @@
-"""Maps whose surface is cut into islands: UVs belong to corners. What are islands, seams, figures?
+"""Atlases: maps of surfaces cut into islands, with UVs at corners; islands, seams and metrics.
 
-Two triangles hang together at an edge of the surface where the images of both its ends are the same
-numbers in both; else the edge is a seam. An island is what hangs together. Moving, turning and
-scaling an island leaves its angles as they are, so energies are divided by the area of the image
-before they are compared.
+Two triangles are joined at an edge if the images of both its ends are exactly the same in both;
+otherwise the edge is a seam. An island is a connected set of joined triangles. Moving, rotating and
+scaling an island preserves its angles, so energies are divided by the area of the image before they
+are compared.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
-#: Figures that an atlas has none of: its outline is not meant to be round.
+#: Metrics that do not apply to an atlas, whose outline is not meant to be round.
 _NOT_OF_AN_ATLAS = ("boundary_circularity", "common_gauge_energy", "overlap_share")
 
 
@@ -34,18 +34,18 @@ class CutMap:
     Parameters
     ----------
     surface : TriangleMesh
-        The same triangles; a vertex for each image of a vertex.
+        The same triangles, with one vertex for each image of a vertex.
     uv : complex128 (k,)
-        The image of each of its vertices.
+        The image of each vertex.
     island : int64 (m,)
-        Number of each triangle's island, from 0.
+        The island of each triangle, counted from 0.
     seams : int64 (s, 2)
         The edges of the uncut surface that are seams, by its vertices.
     seam_length : float
-        Their length, in the units of the surface.
+        Total length of the seams, in the units of the surface.
     mirrored : int
-        How many islands came mirrored; in `uv` they are turned over, so that folds are told from
-        them and angles keep their sign.
+        Number of islands that were mirrored. In `uv` they are mirrored back, to distinguish them
+        from folds and to keep the sign of angles.
 
     """
 
@@ -58,12 +58,12 @@ class CutMap:
 
     @property
     def islands(self) -> int:
-        """How many islands there are."""
+        """Number of islands."""
         return int(self.island.max()) + 1
 
 
 def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
-    """Cut a surface where the images of its corners (m, 3) part."""
+    """Cut a surface where the images of its corners (m, 3) differ."""
     F = mesh.F
     keys = np.stack([F.ravel().astype(np.float64), corners.real.ravel(), corners.imag.ravel()])
     found, index = np.unique(keys, axis=1, return_inverse=True)
@@ -80,7 +80,7 @@ def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
 
 
 def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
-    """Return each triangle's island, and the edges between triangles that do not hang together."""
+    """Return each triangle's island, and the edges between triangles that are not joined."""
     m = len(F)
     ends = [np.concatenate([A, np.roll(A, -1, axis=1)]) for A in (F, G)]
     on_surface, in_plane = (
@@ -99,7 +99,7 @@ def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
 
 
 class AtlasFigures(MapFigures):
-    """What the metrics of an atlas are computed from, each part once."""
+    """Intermediate results for the metrics of an atlas, each computed once."""
 
     def __init__(self, cut: CutMap) -> None:
         super().__init__(cut.surface, cut.uv)
@@ -107,12 +107,12 @@ class AtlasFigures(MapFigures):
 
     @cached_property
     def area(self) -> float:
-        """A: the signed areas of all triangles, added up, mirrored islands turned over."""
+        """A: the sum of the signed areas of all triangles, with mirrored islands mirrored back."""
         return float(signed_areas(self.uv, self.mesh.F).sum())
 
     @cached_property
     def folds(self) -> Indices:
-        """Of each island, how many triangles are folded over or collapsed."""
+        """Number of folded or collapsed triangles of each island."""
         folded = folded_triangles(self.uv, self.mesh.F)
         return np.bincount(self.cut.island[folded], minlength=self.cut.islands).astype(np.int64)
 
@@ -122,7 +122,7 @@ def _atlas(figures: MapFigures) -> AtlasFigures:
     return figures
 
 
-#: The figures that only an atlas has.
+#: The metrics that only an atlas has.
 ATLAS_METRICS: tuple[Metric, ...] = (
     Metric(
         "islands", "islands", "islands", "", "d", "d",
@@ -148,7 +148,7 @@ ATLAS_METRICS: tuple[Metric, ...] = (
 
 
 def atlas_metrics(mesh: TriangleMesh, corners: Complex) -> dict[str, float | int]:
-    """Return every figure that a record of an atlas holds, under the record's keys."""
+    """Return all metrics of an atlas, by their keys in records."""
     figures = AtlasFigures(cut_map(mesh, corners))
     chosen = [metric for metric in METRICS if metric.name not in _NOT_OF_AN_ATLAS]
     return computed((*chosen, *ATLAS_METRICS), figures)

@@ -1,4 +1,4 @@
-"""Moebius centring: which conformal map of the sphere puts the centre of mass at the origin?
+"""Moebius centring: conformal maps of the sphere that move the centre of mass to the origin.
 
 Baden, Crane & Kazhdan 2018, Moebius registration, Algorithm 1.
 """
@@ -12,7 +12,7 @@ from cembench.core.errors import AlgorithmFailed
 
 Real = NDArray[np.float64]
 
-#: Newton's step is cut to this length; a step of length 1 would carry the sphere to a point.
+#: Newton steps are cut to this length; a step of length 1 would map the sphere to a point.
 LONGEST_STEP = 0.5
 
 
@@ -21,7 +21,7 @@ def moebius_centred(
 ) -> Real:
     """Move points S (n, 3) of the unit sphere so that their centre of `mass` (n,) is the origin.
 
-    Newton's method with inversions; it converges wherever no point holds half of the mass.
+    Newton's method with inversions; it converges if no point holds half of the mass.
 
     Raises
     ------
@@ -38,7 +38,7 @@ def moebius_centred(
         try:
             step = -np.linalg.solve(jacobian, centre)
         except np.linalg.LinAlgError:
-            break  # all points lie at one place
+            break  # all points coincide
         length = float(np.linalg.norm(step))
         S = _inverted(S, step * min(1.0, LONGEST_STEP / length) if length > 0 else step)
     raise AlgorithmFailed(
@@ -49,7 +49,7 @@ def moebius_centred(
 
 
 def _inverted(S: Real, c: Real) -> Real:
-    """The conformal map of the sphere that carries -c / |c| ... c / |c| toward c, |c| < 1."""
+    """Return the conformal map of the sphere that moves points along c, |c| < 1."""
     moved = S + c
     squared = np.einsum("nd,nd->n", moved, moved)
     S = (1 - c @ c) / squared[:, None] * moved + c

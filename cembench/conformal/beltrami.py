@@ -1,6 +1,6 @@
-"""Beltrami coefficients: how far from conformal is a piecewise linear map, and which way?
+"""Beltrami coefficients: how far a piecewise linear map is from conformal, and in which direction.
 
-Also the way back, from coefficients to a map: the generalised Laplacian and the linear Beltrami
+Also the reverse, from coefficients to a map: the generalised Laplacian and the linear Beltrami
 solver (Lui, Lam, Wong & Gu 2013).
 """
 
@@ -19,17 +19,17 @@ from cembench.core.errors import AlgorithmFailed
 
 Complex = NDArray[np.complex128]
 
-#: A triangle with 1 - |mu| below this counts as collapsed: its coefficient has lost its digits.
+#: A triangle with 1 - abs(mu) below this is collapsed: its coefficient has no correct digits.
 COLLAPSED = 1e-8
 
 
 def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> Complex:
-    """What is mu of the map that carries each planar triangle ``uv[F]`` to ``V[F]``? Shape (m,).
+    """Return mu (m,) of the map that takes each planar triangle ``uv[F]`` to ``V[F]``.
 
-    V is (n, 2) or (n, 3). From the first fundamental form E, F, G of that map,
-    mu = (E - G + 2 i F) / (E + G + 2 sqrt(EG - F^2)), with the root's sign that of the planar area:
-    |mu| < 1 where the orientation is kept, |mu| > 1 where the triangle is folded, NaN where the
-    planar triangle has no area.
+    V is (n, 2) or (n, 3). With the first fundamental form E, F, G of that map, ``mu = (E - G + 2 i
+    F) / (E + G + 2 sqrt(EG - F^2))``, where the root has the sign of the planar area: ``|mu| < 1``
+    if the orientation is kept, ``|mu| > 1`` if the triangle is folded, NaN if the planar triangle
+    has no area.
     """
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
@@ -40,11 +40,12 @@ def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float
 
 
 def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Largest over smallest stretch of the map between ``uv[F]`` and ``V[F]``, (m,); 1 at least.
+    """Return the ratio of the largest to the smallest stretch of each triangle (m,), at least 1.
 
-    Infinite where an image has no area. It is (1 + |mu|) / |1 - |mu||, mu being that of
-    :func:`beltrami_coefficients`, written as (1 + |mu|)^2 / (1 - |mu|^2) with the ratio of the
-    areas as the root: no difference of nearly equal numbers is taken, so slivers cost no digits.
+    Infinite if an image has no area. The map is that between ``uv[F]`` and ``V[F]``. The ratio is
+    ``(1 + |mu|) / |1 - |mu||``, with mu as in :func:`beltrami_coefficients`, computed as
+    ``(1 + |mu|)^2 / (1 - |mu|^2)`` with the ratio of the areas as the root. No nearly equal numbers
+    are subtracted, so slivers cost no digits.
     """
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
@@ -59,8 +60,8 @@ def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> ND
 def _first_fundamental_form(
     uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64], area: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """E, G and F of the map that carries planar triangles of these signed areas to ``V[F]``."""
-    # The gradient of the hat function of a corner is i times the opposite edge over 2 area.
+    """Return E, G, F of the map that takes triangles of these signed areas to ``V[F]``."""
+    # The gradient of a corner's hat function is i times the opposite edge over twice the area.
     dx = np.zeros((len(F), V.shape[1]))
     dy = np.zeros_like(dx)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -74,19 +75,20 @@ def _first_fundamental_form(
 
 
 def unfolded(mu: Complex) -> Complex:
-    """What would mu be if the folded triangles were turned over? 1 / conj(mu) where |mu| > 1."""
+    """Return mu after reversing folded triangles: ``1 / conj(mu)`` where ``|mu| > 1``."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(np.abs(mu) > 1, 1 / np.conj(mu), mu)
 
 
 def generalised_weights(uv: Complex, F: NDArray[np.int64], mu: Complex) -> NDArray[np.float64]:
-    """Which weights make maps of coefficients mu harmonic? Shape (m, 3), for the opposite edges.
+    """Return the edge weights (m, 3) for which maps with coefficients mu are harmonic.
 
-    They add up (`laplacian_of_weights`) to the generalised Laplacian, the stiffness matrix of
-    -div(A grad) on the planar triangles ``uv[F]``, where A = [[a, b], [b, c]], a = |1 - mu|^2 / d,
-    b = -2 Im mu / d, c = |1 + mu|^2 / d, d = 1 - |mu|^2; mu = 0 gives half the cotangents of the
-    plane. A folded triangle counts with its coefficient `unfolded`, which keeps A positive. Not
-    finite where a planar triangle has no area or |mu| = 1.
+    Weights belong to the opposite edges. They assemble (`laplacian_of_weights`) into the
+    generalised Laplacian, the stiffness matrix of ``-div(A grad)`` on the planar triangles
+    ``uv[F]``, with ``A = [[a, b], [b, c]]``, ``a = |1 - mu|^2 / d``, ``b = -2 Im mu / d``, ``c = |1
+    + mu|^2 / d`` and ``d = 1 - |mu|^2``; mu = 0 gives half the cotangents of the plane. A folded
+    triangle uses its coefficient `unfolded`, which keeps A positive. Not finite if a planar
+    triangle has no area or ``|mu| = 1``.
     """
     mu = unfolded(mu)
     edge = [uv[F[:, (c + 2) % 3]] - uv[F[:, (c + 1) % 3]] for c in range(3)]
@@ -102,10 +104,10 @@ def generalised_weights(uv: Complex, F: NDArray[np.int64], mu: Complex) -> NDArr
 def weights_of_map(
     uv: Complex, F: NDArray[np.int64], mu: Complex, V: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """`generalised_weights` for the coefficients mu of the map from ``uv[F]`` to ``V[F]``.
+    """Return `generalised_weights` for the coefficients mu of the map from ``uv[F]`` to ``V[F]``.
 
-    Dirichlet's energy is conformally invariant, so these are half the cotangents of V whatever uv
-    is. Where a planar triangle has collapsed, so that mu is lost in rounding, that limit is taken.
+    Dirichlet's energy is conformally invariant, so these are half the cotangents of V for any uv.
+    If a planar triangle has collapsed, so that mu has no correct digits, that limit is used.
     """
     weights = generalised_weights(uv, F, mu)
     with np.errstate(invalid="ignore"):
@@ -121,17 +123,31 @@ def linear_beltrami_solver(
     fixed: NDArray[np.int64],
     values: NDArray[Any],
 ) -> NDArray[Any]:
-    """Which map has the coefficients behind these generalised weights, and these values?
+    """Return the map with given Beltrami coefficients and given values at some vertices.
 
-    In the least squares sense: it is harmonic for the generalised Laplacian, whose matrix is
-    symmetric positive definite once a vertex is fixed. `weights` (m, 3) as `generalised_weights`
-    gives them, `fixed` (k,) vertices, `values` (k,), real or complex, where they go; the result
-    is (n,) for the vertices 0 to n - 1 that F names.
+    The coefficients are met in the least squares sense: the map is harmonic for the generalised
+    Laplacian, whose matrix is symmetric positive definite once a vertex is fixed.
+
+    Parameters
+    ----------
+    F : int64 (m, 3)
+        Triangles; they use the vertices 0 to n - 1.
+    weights : float64 (m, 3)
+        From `generalised_weights`.
+    fixed : int64 (k,)
+        Fixed vertices.
+    values : float or complex (k,)
+        Their images.
+
+    Returns
+    -------
+    float or complex (n,)
+        The image of each vertex.
 
     Raises
     ------
     AlgorithmFailed
-        Weights that are not finite, or a matrix that is not positive definite.
+        The weights are not finite, or the matrix is not positive definite.
 
     """
     bad = np.flatnonzero(~np.isfinite(weights).all(axis=1))

@@ -1,4 +1,4 @@
-"""A closed curve in the plane from its lengths and its turns."""
+"""Closed planar curves from edge lengths and exterior angles."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ Complex = NDArray[np.complex128]
 
 
 def closed_curve(lengths: Real, turns: Real) -> tuple[Complex, float]:
-    """Which closed polygon has edges in these directions and of nearly these lengths?
+    """Return the closed polygon with these exterior angles and nearly these edge lengths.
 
     Parameters
     ----------
     lengths : float (B,)
-        From each vertex to the next. They are changed by as little as closes the curve, least
+        From each vertex to the next. They are changed as little as closes the curve, in least
         squares relative to each length (Sawhney & Crane 2017, Eq. 17).
     turns : float (B,)
-        Exterior angle at each vertex in radians, counter-clockwise, 2 pi in sum.
+        Exterior angle at each vertex in radians, counter-clockwise, with sum 2 pi.
 
     Returns
     -------
     z : complex (B,)
-        The vertices, the first at 0, its next one in the direction 1.
+        The vertices; the first is 0, and the first edge has direction 1.
     change : float
-        The largest share by which a length was changed.
+        The largest relative change of a length.
 
     Raises
     ------

@@ -1,16 +1,17 @@
-"""The conformal energy of harmonic maps to a circle domain, minimised over where the boundary lies.
+"""Minimise the conformal energy of harmonic maps to a circle domain over the boundary positions.
 
-A map that is harmonic inside has E_C = z^* S z / 2 - A(z), z its boundary values: S is the
-Dirichlet-to-Neumann matrix, A the area of the boundary polygons (Eqs. 5, 7, 8). Free are the angle
-of every vertex on its circle, and the centre and the radius of every hole. With G = S z - grad A,
-grad A at vertex j being -(i/2) (z_next - z_previous), E_C = Re(z^* G) / 2, its derivative along dz
-is Re(dz^* G), and the second one Re(dz^* (S - A'') dz) + Re(G^* d^2 z). So steps are Newton's.
+A map that is harmonic inside has E_C = z^* S z / 2 - A(z), with z its boundary values, S the
+Dirichlet-to-Neumann matrix and A the area of the boundary polygons (Eqs. 5, 7, 8). The unknowns are
+the angle of every vertex on its circle, and the centre and radius of every hole. With
+G = S z - grad A, where grad A at vertex j is -(i/2) (z_next - z_previous), E_C = Re(z^* G) / 2, its
+derivative along dz is Re(dz^* G), and the second derivative is Re(dz^* (S - A'') dz) +
+Re(G^* d^2 z). So Newton steps can be taken.
 
-S and its inverse cost B^2 operations for B boundary vertices. S is also what preconditions: on the
-disk the Hessian's Fourier mode k has |k| - 1 where S has |k|.
+S and its inverse cost B^2 operations for B boundary vertices. S is also the preconditioner: on the
+disk the Hessian's Fourier mode k has ``|k| - 1`` where S has ``|k|``.
 
-The Moebius maps of the disk leave conformality as it is, but the energy of a polygon only nearly.
-So they are held fixed by a *gauge*: weights w, 1 in sum, for which sum w z = 0.
+The Moebius maps of the disk preserve conformality, but the energy of a polygon only nearly. They
+are therefore held fixed by a *gauge*: weights w with sum 1 for which sum w z = 0.
 """
 
 from __future__ import annotations
@@ -32,31 +33,42 @@ from cembench.core.errors import AlgorithmFailed
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Fourier modes from 2 to this one get the Hessian's own weight in the preconditioner.
+#: Fourier modes from 2 to this one have the Hessian's own weight in the preconditioner.
 MODES = 8
-#: A promised decrease below this, times the number of boundary vertices, is rounding.
+#: A predicted decrease below this, times the number of boundary vertices, is rounding.
 ROUNDING = 1e-16
-#: With more arcs than this held at their least length the boundary is too crowded to go on.
+#: With more arcs than this held at their minimal length, the boundary is too crowded.
 MOST_HELD = 64
-#: How small CG makes the residual of a Newton step, as a share of the gradient: products are cheap,
-#: and with coarser steps crowded circles need ten times as many of them.
+#: Relative residual at which CG ends a Newton step. Products are cheap, and with coarser steps
+#: crowded circles need ten times as many.
 ACCURACY = 0.01, 0.03
-#: Among radii and centres no curvature counts for less than this share of the largest.
+#: Curvatures of radii and centres are at least this share of the largest one.
 LEAST_CURVATURE = 1e-12
-#: How near to 0 the gauge brings sum w z, and in how many Newton steps at most.
+#: Tolerance for sum w z = 0, and the maximal number of Newton steps for it.
 GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 50
 
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where the minimisation ended.
+    """The result of a minimisation.
 
-    `energies` are E_C of the start and after every step; `gradient` is the gradient's norm, whose
-    square is about twice what E_C could still fall; `reason` tells what ended it: "gradient" (it is
-    small enough), "rounding" (nothing more to gain in floating point), "iterations", or
-    "crowded" (more than `MOST_HELD` arcs at their least length; then `gradient` is NaN); `products`
-    counts those with the Hessian, `held_arcs` the arcs that would have to become shorter than they
-    may be for the energy to fall further.
+    Attributes
+    ----------
+    model : EnergyModel
+        The model at the minimiser.
+    energies : tuple of float
+        E_C at the start and after every step.
+    gradient : float
+        The gradient's norm, whose square is about twice what E_C could still decrease.
+    reason : str
+        Why the iteration ended: "gradient" (it is small enough), "rounding" (no further decrease in
+        floating point), "iterations", or "crowded" (more than `MOST_HELD` arcs at their minimal
+        length; `gradient` is then NaN).
+    products : int
+        Number of products with the Hessian.
+    held_arcs : int
+        Number of arcs that would have to become shorter than allowed to decrease E_C further.
+
     """
 
     model: EnergyModel
@@ -75,10 +87,10 @@ def minimise(
     tolerance: float,
     max_iterations: int,
 ) -> Minimum:
-    """Which boundary on circles has the least conformal energy, in the gauge `weights` (B,)?
+    """Minimise the conformal energy over boundaries on circles, in the gauge `weights` (B,).
 
-    Ends when E_C can fall by no more than the share `tolerance` of itself; never above the energy
-    of the start, which is brought into the gauge first.
+    Ends when E_C can decrease by at most the share `tolerance`. The result is never above the
+    energy of the start, which is moved into the gauge first.
 
     Raises
     ------
@@ -121,14 +133,14 @@ def minimise(
 
 
 def moebius_descent(here: EnergyModel, leash: float) -> complex:
-    """Which Moebius map z -> (z - a) / (1 - conj(a) z), |a| <= `leash`, lowers the energy most?
+    """Return the a, ``|a| <= leash``, whose Moebius map of the disk lowers the energy most.
 
-    By the second-order model of E_C in a: z moves by -a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3
-    + ....
+    The map is z -> (z - a) / (1 - conj(a) z). By the second-order model of E_C in a: z moves by
+    ``-a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + ...``.
     """
     z, G = here.domain.points, here.residual
     squared = z * z
-    fields = np.stack([squared - 1, -1j * (squared + 1)], axis=1)  # for real and for imaginary a
+    fields = np.stack([squared - 1, -1j * (squared + 1)], axis=1)  # for real and imaginary a
     g = np.real(np.conj(fields).T @ G)
     H = np.real(np.conj(fields).T @ here.residual_of(fields))
     once, cubed = complex(np.vdot(z, G)), complex(np.vdot(squared * z, G))
@@ -155,7 +167,7 @@ def moebius_descent(here: EnergyModel, leash: float) -> complex:
 
 
 def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:
-    """What is the energy where this step leads? None where circles meet, or the gauge is lost."""
+    """Return the model after a step, or None if circles meet or the gauge is lost."""
     domain = here.moved(step)
     if not domain.apart:
         return None
@@ -166,12 +178,12 @@ def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:
 
 
 def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
-    """Which Moebius image of this domain has sum w z = 0?
+    """Return the Moebius image of a domain for which sum w z = 0.
 
     Raises
     ------
     AlgorithmFailed
-        Newton's method finds none: a single vertex has too much of the weight.
+        Newton's method does not converge: a single vertex has too much of the weight.
 
     """
     for _ in range(GAUGE_STEPS):
@@ -187,9 +199,9 @@ def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
 
 
 def _to_gauge(points: Complex, weights: Real) -> complex:
-    """Which a, 0.5 at most, brings sum w z nearer to 0 by z -> (z - a) / (1 - conj(a) z)?
+    """Return a, |a| <= 0.5, such that z -> (z - a) / (1 - conj(a) z) decreases sum w z.
 
-    By Newton's method on the points alone; 0 where nothing is left to be done.
+    By Newton's method on the points alone; 0 if nothing is left to do.
     """
     a, z = 0j, points
     for _ in range(GAUGE_STEPS):
@@ -208,10 +220,10 @@ def _to_gauge(points: Complex, weights: Real) -> complex:
 
 
 class EnergyModel:
-    """E_C at a domain, its gradient, Hessian and preconditioner on steps that keep the gauge.
+    """E_C at a domain, with gradient, Hessian and preconditioner on steps that keep the gauge.
 
-    A step is a real vector: by how much every vertex moves along its circle (B), then for the holes
-    by how much the radii grow, and the centres move right, and up.
+    A step is a real vector: the motion of every vertex along its circle (B), then for the holes the
+    growth of the radii and the motion of the centres to the right and up.
     """
 
     def __init__(self, S: DirichletToNeumann, domain: CircleDomain, weights: Real) -> None:
@@ -221,22 +233,22 @@ class EnergyModel:
             self.energy = 0.5 * float(np.vdot(domain.points, self.residual).real)
 
     def at(self, domain: CircleDomain) -> EnergyModel:
-        """The same at another domain."""
+        """Return the model at another domain."""
         return EnergyModel(self.S, domain, self.weights)
 
     def residual_of(self, z: Complex) -> Complex:
-        """(S - A'') z for z (B,) or (B, k)."""
+        """Return (S - A'') z for z (B,) or (B, k)."""
         rims = self.domain.rims
         return self.S(z) + 0.5j * (z[rims.following] - z[rims.previous])
 
     @cached_property
     def _along(self) -> Complex:
-        """Where does dz go as each vertex moves along its circle? Shape (B,)."""
+        """The derivative of z with respect to each vertex's motion along its circle, (B,)."""
         return 1j * self.domain.directions
 
     @cached_property
     def _holes(self) -> Complex | None:
-        """Where does dz go as each radius grows, each centre moves right, and up? (B, 3 holes)."""
+        """The derivative of z with respect to each radius and centre (right, up), (B, 3 holes)."""
         rims = self.domain.rims
         if not len(rims.holes):
             return None
@@ -245,20 +257,20 @@ class EnergyModel:
         return np.concatenate([grow, inside.astype(complex), 1j * inside], axis=1)
 
     def _velocity(self, x: Real) -> Complex:
-        """Dz of a step."""
+        """Return the dz of a step."""
         B = len(self._along)
         moved = self._along * x[:B]
         return moved if self._holes is None else moved + self._holes @ x[B:]
 
     def _pulled_back(self, u: Complex) -> Real:
-        """Re(dz^* u) as a function of the step."""
+        """Return Re(dz^* u) as a linear function of the step."""
         along = (self._along.conj() * u).real
         if self._holes is None:
             return along
         return np.concatenate([along, np.real(np.conj(self._holes).T @ u)])
 
     def moved(self, x: Real) -> CircleDomain:
-        """The domain that a step leads to."""
+        """Return the domain after a step."""
         domain, holes, B = self.domain, self.domain.rims.holes, len(self._along)
         growth, shift = np.zeros_like(domain.radii), np.zeros_like(domain.centres)
         grown, right, up = x[B:].reshape(3, -1)
@@ -267,16 +279,16 @@ class EnergyModel:
 
     @cached_property
     def gradient(self) -> Real:
-        """Derivative of E_C along each entry of a step."""
+        """The derivative of E_C along each entry of a step."""
         return self._pulled_back(self.residual)
 
     @cached_property
     def _outward(self) -> Real:
-        """How much does the residual point away from the circle's centre, by its radius? (B,)."""
+        """The radial component of the residual, divided by the radius, (B,)."""
         return (self.residual.conj() * self.domain.directions).real / self.domain.radius
 
     def hessian(self, x: Real) -> Real:
-        """Second derivative of E_C, applied to a step."""
+        """Return the second derivative of E_C applied to a step."""
         domain, rims = self.domain, self.domain.rims
         B, h = len(domain.arcs), len(rims.holes)
         result = self._pulled_back(self.residual_of(self._velocity(x)))
@@ -292,7 +304,7 @@ class EnergyModel:
 
     @cached_property
     def _modes(self) -> tuple[Real, Real]:
-        """Fourier modes on the outer circle, and by how much 1 / (|k| - 1) exceeds 1 / |k|."""
+        """Fourier modes on the outer circle, and the excess of 1 / (|k| - 1) over 1 / |k|."""
         domain, k = self.domain, np.arange(2, MODES + 1)
         base = np.where(domain.rims.on_outer, domain.directions, 0)
         powers = np.multiply.accumulate(np.broadcast_to(base, (MODES, len(base))))[1:].T
@@ -301,7 +313,7 @@ class EnergyModel:
 
     @cached_property
     def _hole_block(self) -> Real:
-        """Inverse of the Hessian's block of radii and centres."""
+        """The inverse of the Hessian's block of radii and centres."""
         assert self._holes is not None
         block = np.real(np.conj(self._holes).T @ self.residual_of(self._holes))
         values, vectors = np.linalg.eigh((block + block.T) / 2)
@@ -309,7 +321,7 @@ class EnergyModel:
         return np.asarray(vectors / values @ vectors.T)
 
     def _unconstrained(self, g: Real) -> Real:
-        """M^-1 g; g (N,) or (N, k)."""
+        """Return M^-1 g for g (N,) or (N, k)."""
         B = len(self._along)
         modes, weights = self._modes
         along = self.S.inverse(g[:B]) + (modes * weights) @ (modes.T @ g[:B])
@@ -319,7 +331,7 @@ class EnergyModel:
 
     @cached_property
     def _gauge(self) -> tuple[Real, Real, Real]:
-        """Constraints, as :meth:`_constrained` has them: the mean and the outer circle stay."""
+        """The constraints of the gauge, as :meth:`_constrained` returns them."""
         rims, mean = self.domain.rims, self.weights * self._along
         turn = rims.on_outer / rims.sizes[rims.outer]
         if self._holes is not None:
@@ -328,13 +340,13 @@ class EnergyModel:
         return self._constrained(np.stack([mean.real, mean.imag, turn], axis=1))
 
     def _constrained(self, c: Real) -> tuple[Real, Real, Real]:
-        """Columns c that a step must be orthogonal to, M^-1 c, and the inverse of c^T M^-1 c."""
+        """Return columns c that steps are orthogonal to, M^-1 c, and the inverse of c^T M^-1 c."""
         preconditioned = self._unconstrained(c)
         return c, preconditioned, np.asarray(np.linalg.inv(c.T @ preconditioned), dtype=np.float64)
 
     @cached_property
     def held(self) -> NDArray[np.int64]:
-        """Which arcs are as short as they may be, and would become shorter downhill?"""
+        """Whether each arc has its minimal length and would become shorter downhill."""
         domain = self.domain
         short = np.flatnonzero(domain.shortest)
         if not len(short):
@@ -346,7 +358,7 @@ class EnergyModel:
 
     @cached_property
     def _constraints(self) -> tuple[Real, Real, Real]:
-        """Those of the gauge, and that held arcs keep their length."""
+        """The constraints of the gauge, and those that keep the length of held arcs."""
         if not len(self.held):
             return self._gauge
         c, k = self._gauge[0], np.arange(len(self.held))
@@ -356,7 +368,7 @@ class EnergyModel:
         return self._constrained(np.concatenate([c, keep], axis=1))
 
     def precondition(self, g: Real) -> Real:
-        """What is M^-1 g, projected onto the steps that keep the gauge?"""
+        """Return M^-1 g projected onto the steps that keep the gauge."""
         return _projected(self._unconstrained(g), self._constraints)
 
     @cached_property
@@ -371,10 +383,11 @@ class EnergyModel:
 
     @cached_property
     def gradient_norm(self) -> float:
-        """Norm of the gradient on these steps, (g M^-1 g)^(1/2)."""
+        """The norm of the gradient on these steps, (g M^-1 g)^(1/2)."""
         return max(0.0, float(self.gradient @ self.uphill)) ** 0.5
 
 
 def _projected(x: Real, constraints: tuple[Real, Real, Real]) -> Real:
+    """Project a preconditioned gradient onto the steps that satisfy the constraints."""
     c, preconditioned, inverse = constraints
     return x - preconditioned @ (inverse @ (c.T @ x))

@@ -19,10 +19,10 @@ Complex = NDArray[np.complex128]
 def pole(
     V: Real, F: NDArray[np.int64], triangle: int | None = None
 ) -> tuple[NDArray[np.int64], Complex]:
-    """Which right-hand side puts a pole at the triangle in the middle (Eq. 14)?
+    """Return the right-hand side that puts a pole at a triangle in the middle (Eq. 14).
 
-    V is (n, 2 or 3). The triangle is the one whose barycentre is nearest to the mean vertex, if
-    none is given; its corners (3,) come back with their values (3,), all others are zero.
+    V is (n, 2 or 3). By default the triangle is the one whose barycentre is nearest to the mean
+    vertex. Returns its corners (3,) and their values (3,); all other entries are zero.
     """
     corners = middle_triangle(V, F) if triangle is None else F[triangle]
     p_a, p_b, p_c = V[corners]
@@ -44,21 +44,21 @@ def pole_start(
     solve: Callable[[Complex], Complex],
     triangle: int | None = None,
 ) -> Complex:
-    """Where does the boundary lie in the map with a pole in the middle (Eqs. 13, 14, 18)?
+    """Return the boundary values of the map with a pole in the middle (Eqs. 13, 14, 18).
 
-    `solve` gives f_b of L f = rhs (n,); `triangle` is the one in the middle, if not the usual one.
+    `solve` returns f_b of L f = rhs (n,); `triangle` replaces the usual middle triangle.
     """
     with phase("start"):
         corners, values = pole(V, F, triangle)
         rhs = np.zeros(len(V), dtype=np.complex128)
         rhs[corners] = values
         f_b = solve(rhs)
-    # The image is the outside of a curve, so the boundary runs clockwise round it.
+    # The image is the outside of a curve, so the boundary runs clockwise around it.
     return np.conj(f_b) if polygon_area(f_b) < 0 else f_b
 
 
 def on_circle(f_b: Complex) -> Complex:
-    """Centralise and normalise (Eqs. 24, 25).
+    """Centralise and normalise boundary values (Eqs. 24, 25).
 
     Raises
     ------
@@ -70,14 +70,14 @@ def on_circle(f_b: Complex) -> Complex:
     modulus = np.abs(f_b)
     if not modulus.min() > 0:
         raise AlgorithmFailed(
-            f"boundary vertex number {int(np.argmin(modulus))} of the loop came to lie at the "
+            f"boundary vertex number {int(np.argmin(modulus))} of the loop is at the "
             "centre of the boundary, so its place on the circle is undefined (Eq. 25)"
         )
     return f_b / modulus
 
 
 def inverted(f: Complex) -> Complex:
-    """F / |f|^2 (Eq. 30); zero stays zero."""
+    """Return ``F / |f|^2`` (Eq. 30); zero stays zero."""
     squared = (f * np.conj(f)).real
     return np.divide(f, squared, out=np.zeros_like(f), where=squared > 0)
 
@@ -93,35 +93,36 @@ def iterate_boundary(
     inversion: bool = True,
     best: bool = False,
 ) -> tuple[Complex, Complex, list[float], int]:
-    """Return the boundary values that CEM's iteration (30), (24), (25), (22) ends with.
+    """Return the boundary values at the end of CEM's iteration (30), (24), (25), (22).
 
     Parameters
     ----------
     f_b : complex (k,)
         The start, on the unit circle.
-    dirichlet : function
-        The other values f_i that are harmonic for boundary values f_b (Eq. 22).
-    ring : function
-        The solution of L_bb x = -L_bi f_i for f_i (Eq. 23).
-    energy : function
-        E_C (Eq. 7) of f_i and f_b.
-    tolerance, max_iterations
-        It ends after the first step that changes E_C by less, or after so many. A rise at first is
-        not an end: Remark 3 says that E_C "would become" decreasing.
+    dirichlet : callable
+        Returns the values f_i that are harmonic for boundary values f_b (Eq. 22).
+    ring : callable
+        Returns the solution of L_bb x = -L_bi f_i for f_i (Eq. 23).
+    energy : callable
+        Returns E_C (Eq. 7) of f_i and f_b.
+    tolerance, max_iterations : float, int
+        The iteration ends after the first step that changes E_C by less than `tolerance`, or after
+        `max_iterations` steps. An initial increase does not end it: Remark 3 says that E_C "would
+        become" decreasing.
     inversion : bool
-        Step (30); else (23). A step that would make boundary vertices change places is (23), and
-        iteration ends where (23) would do so too.
+        Whether to use step (30) rather than (23). A step that would exchange boundary vertices is
+        replaced by (23), and the iteration ends if (23) would do so too.
     best : bool
-        Return the values of least E_C, the start's included, instead of the last ones.
+        Whether to return the values of least E_C, the start included, instead of the last ones.
 
     Returns
     -------
     f_b, f_i : complex
         The last values, or those of least E_C.
     history : list of float
-        E_C of the start and after each step.
+        E_C at the start and after each step.
     order_kept : int
-        How many steps were changed, or left out, to keep the boundary's order.
+        Number of steps that were changed, or left out, to keep the boundary's order.
 
     """
 

@@ -1,10 +1,10 @@
-"""How far is a mesh, and a map of it, from the conformal map, where none is known?
+"""Error bounds without a known map: how far a mesh, and a map of it, is from the conformal map.
 
-Four boundary points make a surface a quadrilateral. Its modulus is Dirichlet's energy of the
-potential that is 0 on one side and 1 on the opposite one; that of the other pair of sides is its
-reciprocal. Linear elements find each from above, so both together enclose the modulus of the
-surface that the mesh is, and their product exceeds 1 by the error of the discretisation (Hakula,
-Rasila & Vuorinen 2011). A conformal map keeps the modulus, which in the disk is known exactly.
+Four boundary points make a surface a quadrilateral. Its modulus is the Dirichlet energy of the
+potential that is 0 on one side and 1 on the opposite side; that of the other pair of sides is the
+reciprocal. Linear elements approximate each from above, so both together enclose the modulus of the
+polyhedral surface, and their product exceeds 1 by the discretisation error (Hakula, Rasila &
+Vuorinen 2011). A conformal map preserves the modulus, which is known exactly in the disk.
 """
 
 from __future__ import annotations
@@ -22,24 +22,25 @@ from cembench.mesh.triangle_mesh import DiskMesh
 
 Complex = NDArray[np.complex128]
 
-#: Where on the boundary the four points lie. Quarters would lie where a surface is symmetric, as
-#: every map is then: they could not tell one from another.
+#: Positions of the four points along the boundary. On a symmetric surface quarters would be
+#: symmetric under every map, and could not distinguish maps.
 SHARES = (0.0, 0.15, 0.45, 0.7)
 
 
 @dataclass(frozen=True)
 class Certificate:
-    """The modulus of a surface with four boundary points, and how sure it is.
+    """The modulus of a surface with four boundary points, with bounds.
 
     Parameters
     ----------
     corners : int64 (4,)
-        The points, as vertices, counter-clockwise.
+        The four vertices, counter-clockwise.
     upper : float
-        Energy of the potential from the side between the first two corners to the opposite one:
-        of a rectangle, the length of these sides over their distance. At least the modulus.
+        Energy of the potential from the side between the first two corners to the opposite side;
+        for a rectangle the length of these sides over their distance. An upper bound of the
+        modulus.
     conjugate : float
-        The same for the other two sides: at least the modulus' reciprocal.
+        The same for the other two sides: an upper bound of the reciprocal modulus.
 
     """
 
@@ -49,23 +50,23 @@ class Certificate:
 
     @property
     def lower(self) -> float:
-        """What the modulus is at least."""
+        """A lower bound of the modulus."""
         return 1 / self.conjugate
 
     @property
     def modulus(self) -> float:
-        """The middle of the two bounds, in proportion."""
+        """The geometric mean of the two bounds."""
         return float(np.sqrt(self.upper / self.conjugate))
 
     @property
     def reciprocal_error(self) -> float:
-        """By how much does the product of the two energies exceed 1? The discretisation's error."""
+        """The excess over 1 of the product of the two energies: the discretisation error."""
         return self.upper * self.conjugate - 1
 
     def off(self, z: Complex) -> float:
-        """By how much is the modulus of a map to the disk off, relatively and with sign?
+        """Return the relative signed error of the modulus of a map to the disk.
 
-        z (4,) are the corners' images, on the unit circle; NaN where they are not in order.
+        z (4,) are the images of the corners, on the unit circle; NaN if they are not in order.
         """
         return disk_modulus(z) / self.modulus - 1
 
@@ -75,10 +76,9 @@ class Certificate:
 
 
 def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certificate:
-    """Enclose the modulus of a surface with four boundary points: two harmonic functions.
+    """Enclose the modulus of a surface with four boundary points by two harmonic functions.
 
-    `corners` (4,) are vertices of the boundary, in its order; the default are those that
-    :func:`four_points` finds.
+    `corners` (4,) are boundary vertices in order (default: those of :func:`four_points`).
 
     Raises
     ------
@@ -112,14 +112,14 @@ def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certifi
 
 
 def _energy(L: sparse.csc_array, low: NDArray[np.int64], high: NDArray[np.int64]) -> float:
-    """The integral of |grad u|^2 of the u that is 0 on one side, 1 on the other."""
+    """Return the integral of |grad u|^2 for the u that is 0 on one side and 1 on the other."""
     fixed = np.concatenate([low, high])
     u = harmonic_extension(L, fixed, np.repeat([0.0, 1.0], [len(low), len(high)]))
     return float(u @ (L @ u))
 
 
 def four_points(mesh: DiskMesh) -> NDArray[np.int64]:
-    """Which four boundary vertices lie at :data:`SHARES` of its length, the first farthest out?
+    """Return the boundary vertices at :data:`SHARES` of its length, starting at the farthest one.
 
     Raises
     ------
@@ -135,18 +135,18 @@ def four_points(mesh: DiskMesh) -> NDArray[np.int64]:
     lengths = edge_lengths(mesh, boundary)
     gone = np.concatenate([[0.0], np.cumsum(lengths)])
     places = [int(np.argmin(np.abs(gone[:-1] - gone[-1] * part))) for part in SHARES]
-    for k in range(1, 4):  # apart also where an edge is long
+    for k in range(1, 4):  # distinct even if an edge is long
         places[k] = min(max(places[k], places[k - 1] + 1), len(boundary) - 4 + k)
     return boundary[places]
 
 
 def disk_modulus(z: Complex) -> float:
-    """What is the modulus of the unit disk with four points (4,) of the circle?
+    """Return the modulus of the unit disk with four points (4,) on the circle.
 
-    That of :class:`Certificate`, by their cross ratio and complete elliptic integrals; NaN where
-    the points do not go round the circle once and counter-clockwise.
+    As in :class:`Certificate`, from the cross ratio and complete elliptic integrals; NaN if the
+    points do not go around the circle once and counter-clockwise.
     """
-    from scipy.special import ellipkm1  # here: few who measure need it
+    from scipy.special import ellipkm1  # imported here: rarely needed
 
     arcs = np.angle(np.roll(z, -1) * np.conj(z)) % (2 * np.pi)
     if not (arcs > 0).all() or not np.isclose(arcs.sum(), 2 * np.pi):

@@ -1,9 +1,9 @@
-"""Points on the unit circle and on the circles of holes inside it: where a boundary may lie.
+"""Circle domains: boundary vertices on the unit circle and on the circles of holes inside it.
 
-A boundary vertex is z = c + r exp(i theta), with c = 0 and r = 1 on the outer circle. Vertices keep
-their order: what is stored are the arcs between neighbours, all positive, 2 pi in sum on each
-circle, and every change of a domain leaves them so. Angles grow along the outer loop and fall along
-those of holes, since the surface lies on the left of both.
+A boundary vertex is z = c + r exp(i theta), with c = 0 and r = 1 on the outer circle. The vertices
+keep their order: the arcs between neighbours are stored, all positive and with sum 2 pi on each
+circle, and every change of a domain preserves that. Angles increase along the outer loop and
+decrease along the loops of holes, since the surface lies on the left of both.
 """
 
 from __future__ import annotations
@@ -20,26 +20,26 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
-#: What share of its length at the start every arc keeps, so that no two vertices come together.
+#: Minimal share of its initial length that every arc keeps, so that no vertices meet.
 LEAST_SHARE = 0.1
-#: Arcs below this share of the mean arc crowd: the energy hardly sees them, and the steps of a
-#: minimiser, which are not exact, leave them to chance.
+#: Arcs below this share of the mean arc are crowded: they hardly change the energy, and the inexact
+#: steps of a minimiser leave them to chance.
 RESOLVED = 1e-2
-#: A half chord below this may belong to a vanishing arc, or to all but the whole circle: that only
-#: where the arc was longer than a radian before.
+#: A half chord below this belongs to a vanishing arc or to nearly the whole circle; the latter only
+#: if the arc was longer than a radian before.
 _ROUNDING, _WIDE = 1e-9, 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class BoundaryLoops:
-    """Which of B boundary vertices lie on which of K circles, loop behind loop; one is outside.
+    """The assignment of B boundary vertices to K circles, loop by loop; one loop is the outer one.
 
     Parameters
     ----------
     sizes : tuple of int
-        How many vertices lie on each circle.
+        Number of vertices on each circle.
     outer : int
-        Which is the outer circle.
+        Index of the outer circle.
 
     """
 
@@ -48,69 +48,69 @@ class BoundaryLoops:
 
     @cached_property
     def holes(self) -> Indices:
-        """Which loops are holes? Shape (K - 1,)."""
+        """The indices of the holes, shape (K - 1,)."""
         return np.delete(np.arange(len(self.sizes)), self.outer)
 
     @cached_property
     def starts(self) -> Indices:
-        """Where each loop begins, shape (K,)."""
+        """The first vertex of each loop, shape (K,)."""
         return np.concatenate([[0], np.cumsum(self.sizes)[:-1]]).astype(np.int64)
 
     @cached_property
     def loop(self) -> Indices:
-        """On which loop lies each vertex? Shape (B,)."""
+        """The loop of each vertex, shape (B,)."""
         return np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     @cached_property
     def on_outer(self) -> NDArray[np.bool_]:
-        """Which vertices lie on the outer circle? Shape (B,)."""
+        """Whether each vertex is on the outer circle, shape (B,)."""
         return self.loop == self.outer
 
     @cached_property
     def following(self) -> Indices:
-        """Which vertex comes next on its loop? Shape (B,)."""
+        """The next vertex on the same loop, shape (B,)."""
         after = np.arange(1, len(self.loop) + 1)
         after[self.starts + np.array(self.sizes) - 1] = self.starts
         return after
 
     @cached_property
     def previous(self) -> Indices:
-        """Which vertex comes before on its loop? Shape (B,)."""
+        """The previous vertex on the same loop, shape (B,)."""
         before = np.empty_like(self.following)
         before[self.following] = np.arange(len(before))
         return before
 
     @cached_property
     def sense(self) -> Real:
-        """1 for the vertices of the outer loop, whose angles grow, -1 for the others."""
+        """1 for vertices of the outer loop, whose angles increase, -1 for the others."""
         return np.where(self.on_outer, 1.0, -1.0)
 
     def sums(self, values: Real) -> Real:
-        """Sum over each loop, shape (K,)."""
+        """Return the sum over each loop, shape (K,)."""
         return np.asarray(np.add.reduceat(values, self.starts))
 
     def along(self, arcs: Real) -> Real:
-        """How far round its circle is each vertex from the first of its loop? Radians."""
+        """Return the angle from the first vertex of its loop to each vertex, in radians."""
         along = np.cumsum(arcs) - arcs
         return along - along[self.starts][self.loop] if len(self.sizes) > 1 else along
 
 
 @dataclass(frozen=True, eq=False)
 class CircleDomain:
-    """The vertices of K boundary loops, B in all, on K circles, one of which is the outer one.
+    """B boundary vertices in K loops on K circles, one of which is the outer one.
 
     Parameters
     ----------
     rims : BoundaryLoops
-        Which vertices lie on which circle.
+        The assignment of vertices to circles.
     arcs : float (B,)
-        From each vertex to the next of its loop, radians, positive.
+        From each vertex to the next of its loop, in radians, positive.
     turns : float (K,)
         Angle of each loop's first vertex.
     centres, radii : complex (K,), float (K,)
         0 and 1 for the outer circle.
     least : float (B,)
-        No step makes an arc shorter than this.
+        Minimal length of each arc.
 
     """
 
@@ -123,28 +123,28 @@ class CircleDomain:
 
     @classmethod
     def of_arcs(cls, arcs: Real) -> CircleDomain:
-        """The unit disk, with such arcs in proportion, all positive, from 1 on; (B,)."""
+        """Return the unit disk with positive arcs (B,) in these proportions, starting at 1."""
         arcs = arcs * (2 * np.pi / arcs.sum())
         rims, least = BoundaryLoops((len(arcs),)), LEAST_SHARE * arcs
         return cls(rims, arcs, np.zeros(1), np.zeros(1, complex), np.ones(1), least)
 
     @property
     def outer_measure(self) -> Real:
-        """What share of the unit circle belongs to each vertex? Shape (B,), 0 on holes, 1 in sum.
+        """Return each vertex's share of the unit circle, shape (B,); 0 on holes, with sum 1.
 
-        Nearly the boundary's harmonic measure from what lies at the origin.
+        This is nearly the boundary's harmonic measure from the point mapped to the origin.
         """
         share = (self.arcs + self.arcs[self.rims.previous]) / (4 * np.pi)
         return np.where(self.rims.on_outer, share, 0.0)
 
     @property
     def shortest(self) -> NDArray[np.bool_]:
-        """Whether each arc is as short as it may be, and long enough to count; (B,)."""
+        """Whether each arc has its minimal length and is long enough to matter; (B,)."""
         return (self.arcs <= 1.01 * self.least) & (self.arcs > self._resolved)
 
     @property
     def _resolved(self) -> Real:
-        """The shortest arc that counts, for each vertex's circle."""
+        """The shortest arc that matters on each vertex's circle."""
         return (2 * np.pi * RESOLVED / np.array(self.rims.sizes))[self.rims.loop]
 
     @cached_property
@@ -165,18 +165,19 @@ class CircleDomain:
 
     @property
     def apart(self) -> bool:
-        """Do the circles of the holes lie inside the unit circle and outside each other?"""
+        """Whether the circles of holes lie inside the unit circle and outside each other."""
         c, r = self.centres[self.rims.holes], self.radii[self.rims.holes]
         between = np.abs(c[:, None] - c) - (r[:, None] + r)
         np.fill_diagonal(between, np.inf)
         return bool((np.abs(c) + r < 1).all() and (between > 0).all() and (r > 0).all())
 
     def moved(self, along: Real, growth: Real, shift: Complex) -> CircleDomain:
-        """Which domain lies in this direction?
+        """Return the domain after a step in this direction.
 
-        To first order a vertex moves by `along` (B,) in the direction of growing angles, a radius
-        by `growth` (K,), a centre by `shift` (K,); those of the outer circle are zero. However long
-        the step, no arc falls below the `least`, and no radius changes by more than a factor 2.
+        To first order a vertex moves by `along` (B,) in the direction of increasing angles, a
+        radius by `growth` (K,), a centre by `shift` (K,); those of the outer circle are zero.
+        However long the step, no arc falls below its `least`, and no radius changes by more than a
+        factor of 2.
         """
         rims, angle = self.rims, along / self.radius
         change = rims.sense * (angle[rims.following] - angle)
@@ -184,21 +185,21 @@ class CircleDomain:
         arcs *= (2 * np.pi / rims.sums(arcs))[rims.loop]
         spare, room = np.maximum(arcs - self.least, 0.0), 2 * np.pi - rims.sums(self.least)
         arcs = self.least + spare * (room / rims.sums(spare))[rims.loop]
-        # The first vertex turns so that all together turn as they should.
+        # The first vertex is rotated so that the mean rotation is as requested.
         ahead = rims.sense * rims.along(arcs - self.arcs)
         turns = self.turns + rims.sums(angle - ahead) / np.array(rims.sizes)
         radii = self.radii * np.clip(_growth(growth / self.radii), 0.5, 2.0)
         return CircleDomain(rims, arcs, turns, self.centres + shift, radii, self.least)
 
     def towards(self, other: CircleDomain, share: float) -> CircleDomain:
-        """The domain on this share of the way to the arcs of another one, on the same circles."""
+        """Return the domain with arcs moved by this share towards those of `other`."""
         return replace(self, arcs=(1 - share) * self.arcs + share * other.arcs)
 
     def settled(self, like: CircleDomain) -> CircleDomain:
-        """Return the domain with the proportions of another one where its arcs crowd.
+        """Return the domain with the proportions of another one where its arcs are crowded.
 
-        Arcs that begin within one `RESOLVED` of the mean arc keep their sum. Where no two do, it is
-        this domain itself.
+        Arcs that begin within one `RESOLVED` of the mean arc keep their sum. Without crowded arcs
+        this is the domain itself.
         """
         rims = self.rims
         cell = np.floor(rims.along(like.arcs) / self._resolved)
@@ -209,31 +210,31 @@ class CircleDomain:
         return replace(self, arcs=like.arcs * np.repeat(factors, np.diff([*first, len(cell)])))
 
     def through(self, a: complex) -> CircleDomain:
-        """Where does the Moebius map (z - a) / (1 - conj(a) z) of the disk take this domain?"""
+        """Return the image under the Moebius map (z - a) / (1 - conj(a) z) of the disk."""
         return self._image(Moebius(1, -a, -a.conjugate(), 1), self.rims) if a else self
 
     def inside_out(self, k: int) -> CircleDomain:
-        """The same with hole k outside: z goes to r / (z - c), with its centre and radius."""
+        """Return the domain with hole k outside: z goes to r / (z - c), c and r those of k."""
         return self._image(
             Moebius(0, self.radii[k], 1, -self.centres[k]), replace(self.rims, outer=k)
         )
 
     def _image(self, phi: Moebius, rims: BoundaryLoops) -> CircleDomain:
-        """The image by a Moebius map that takes the outer circle of `rims` to the unit circle.
+        """Return the image by a Moebius map that takes circle `rims.outer` to the unit circle.
 
-        Circles go to circles; arcs stay as exact as they are, however short.
+        Circles go to circles; arcs keep their relative precision, however short.
         """
         bottom = phi.c * self.points + phi.d
         image = turned = (phi.a * self.points + phi.b) / bottom
         centres, radii = np.zeros_like(self.centres), np.ones_like(self.radii)
         if len(rims.holes):
-            # An image has its centre where that goes that the circle reflects to the pole.
+            # The centre of an image is the image of the pole's reflection in the circle.
             c, r, pole = self.centres, self.radii, -phi.d / phi.c
             found = phi(c + r**2 / np.conj(pole - c + (pole == c)) * (pole != c))
             centres[rims.holes] = found[rims.holes]
             radii[rims.holes] = np.abs(image[rims.starts] - centres)[rims.holes]
             turned = (image - centres[rims.loop]) / radii[rims.loop]
-        # Half a chord, and its distance from the centre, of which rounding may take the sign.
+        # Half a chord and its distance from the centre, whose sign may be lost in rounding.
         next_turned = turned[rims.following]
         stretch = np.sqrt(abs(phi.a * phi.d - phi.b * phi.c)) / np.abs(bottom)
         shrunk = self.radius / radii[rims.loop]
@@ -248,5 +249,5 @@ class CircleDomain:
 
 
 def _growth(t: Real) -> Real:
-    """1 + t where that grows, exp(t) where it shrinks: positive, and smooth at 0."""
+    """Return 1 + t for t >= 0 and exp(t) for t < 0: positive and smooth."""
     return np.where(t < 0, np.exp(np.minimum(t, 0.0)), 1 + t)

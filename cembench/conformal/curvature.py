@@ -11,11 +11,11 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 
 def mean_curvature(mesh: TriangleMesh) -> NDArray[np.float64]:
-    """How curved is the surface at each vertex: the mean of both principal curvatures?
+    """Return the mean curvature at each vertex: the mean of both principal curvatures.
 
     Shape (n,), in one over the unit of V; positive where the surface bulges outwards (1 on a unit
-    sphere). ``L V = 2 H A n`` with A the mixed Voronoi area round the vertex (Meyer et al. 2003).
-    On the boundary, where that says nothing, it is the mean over the interior neighbours, or 0.
+    sphere). ``L V = 2 H A n`` with A the mixed Voronoi area of the vertex (Meyer et al. 2003). On
+    the boundary, where this does not apply, it is the mean over interior neighbours, or 0.
     """
     V, F, n = mesh.V, mesh.F, mesh.n
     corner = V[F[:, 0]]
@@ -33,7 +33,7 @@ def mean_curvature(mesh: TriangleMesh) -> NDArray[np.float64]:
 
 
 def mixed_vertex_areas(mesh: TriangleMesh) -> NDArray[np.float64]:
-    """What part of the surface belongs to each vertex (n,)? Mixed Voronoi areas (Meyer et al.)."""
+    """Return the mixed Voronoi area of each vertex (n,) (Meyer et al. 2003)."""
     a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
     shares = _mixed_areas(mesh.V, mesh.F, areas)
@@ -44,9 +44,10 @@ def mixed_vertex_areas(mesh: TriangleMesh) -> NDArray[np.float64]:
 def _mixed_areas(
     V: NDArray[np.float64], F: NDArray[np.int64], areas: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """What part of each triangle belongs to each of its corners? Shape (m, 3).
+    """Return the part of each triangle that belongs to each of its corners, shape (m, 3).
 
-    The Voronoi part; of an obtuse triangle half to the obtuse corner, a quarter to each other.
+    This is the Voronoi part; an obtuse triangle gives half to its obtuse corner and a quarter to
+    each other corner.
     """
     half = half_cotangents(V, F)
     opposite = np.linalg.norm(V[F[:, [1, 2, 0]]] - V[F[:, [2, 0, 1]]], axis=2) ** 2
@@ -58,6 +59,7 @@ def _mixed_areas(
 
 
 def _continued_to_boundary(mesh: TriangleMesh, H: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Give boundary vertices the mean of their interior neighbours."""
     inside = np.zeros(mesh.n)
     inside[mesh.interior] = 1.0
     graph = topology.vertex_graph(mesh.F, mesh.n).astype(bool).astype(float)

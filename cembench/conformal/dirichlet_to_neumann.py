@@ -17,13 +17,13 @@ Real = NDArray[np.float64]
 class DirichletToNeumann:
     """S = L_bb - L_bi L_ii^-1 L_ib: a harmonic map with boundary f_b has E_D = f_b^* S f_b / 2.
 
+    S itself is never formed. Its last row and column follow from the others, since rows of S sum to
+    zero.
+
     Parameters
     ----------
-    times, solved : function
-        The products, with (B - 1, k), of S without its last row and column and of the inverse of
-        that. The last row and column follow from the others, since the rows of S sum to zero.
-
-    S itself is never formed.
+    times, solved : callable
+        Products with (B - 1, k) of S without its last row and column, and of the inverse of that.
 
     """
 
@@ -32,19 +32,19 @@ class DirichletToNeumann:
 
     @classmethod
     def of_factor(cls, C: Real) -> Self:
-        """From C (B - 1, B - 1), lower triangular in Fortran order; B^2 operations a product."""
+        """Return S from its lower triangular factor C (B - 1, B - 1); B^2 operations a product."""
         return cls(
             lambda X: triangle_times(C, triangle_times(C, X, transposed=True)),
             lambda X: triangle_solved(C, triangle_solved(C, X), transposed=True),
         )
 
     def __call__(self, f: NDArray[Any]) -> NDArray[Any]:
-        """S f for f (B,) or (B, k), real or complex."""
+        """Return S f for f (B,) or (B, k), real or complex."""
         found = by_real_columns(self._times, (f - f[-1])[:-1])
         return np.concatenate([found, -found.sum(axis=0, keepdims=True)])
 
     def inverse(self, g: Real) -> Real:
-        """(S + m m^T)^-1 g with m = 1 / B: what inverts S up to its constants; g (B,) or (B, k)."""
+        """Return (S + m m^T)^-1 g with m = 1 / B, the inverse up to constants; g (B,) or (B, k)."""
         total = g.sum(axis=0)
         x = by_real_columns(self._solved, (g - total / len(g))[:-1])
         mean = x.sum(axis=0) / len(g)

@@ -1,7 +1,7 @@
 """Discrete metrics: edge lengths of triangles, scaled at vertices (discrete conformal equivalence).
 
-Lengths are kept by triangle, ``lengths[t, c]`` opposite to the corner ``F[t, c]``. A vertex that is
-scaled by u multiplies each of its edges by exp(u / 2).
+Lengths are stored by triangle; ``lengths[t, c]`` is opposite to the corner ``F[t, c]``. Scaling a
+vertex by u multiplies each of its edges by exp(u / 2).
 """
 
 from __future__ import annotations
@@ -15,24 +15,25 @@ from cembench.mesh.gluing import edges_of_half_edges
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: Half the cotangent that a triangle counts with whose lengths make none: 60 degrees.
+#: Half the cotangent of 60 degrees, used for lengths that form no triangle.
 REGULAR = 0.5 / np.sqrt(3)
 
 
 def scaled(lengths: Real, F: Indices, u: Real) -> Real:
-    """Lengths (m, 3) with vertices scaled by u (n,): l exp((u_i + u_j) / 2)."""
+    """Return the lengths (m, 3) after scaling vertices by u (n,): l exp((u_i + u_j) / 2)."""
     corners = u[F]
     return np.asarray(lengths * np.exp((corners.sum(axis=1, keepdims=True) - corners) / 2))
 
 
 def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
-    """Angles (m, 3) in radians, and which triangles are broken (m,).
+    """Return the angles (m, 3) in radians, and which triangles are broken (m,).
 
-    Where one side is as long as both others, the angle opposite to it is pi and the others are 0:
-    so the energy whose gradient they are stays convex (Springborn et al. 2008, Sec. 3).
+    If one side is at least as long as the other two together, its opposite angle is pi and the
+    others are 0. The energy whose gradient they form then stays convex (Springborn et al. 2008,
+    Sec. 3).
     """
     a, b, c = lengths.T
-    # Twice what is missing to each side: the three factors of Heron's formula.
+    # Sum of two sides less the third: the three factors of Heron's formula.
     spare = np.stack([b + c - a, c + a - b, a + b - c], axis=1)
     broken = np.asarray((spare <= 0).any(axis=1))
     spare[broken] = 1.0
@@ -46,7 +47,7 @@ def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
 
 
 def half_cotangents_of(angles: Real, broken: NDArray[np.bool_]) -> Real:
-    """Half the cotangent of each angle (m, 3); of broken triangles that of 60 degrees."""
+    """Return half the cotangent of each angle (m, 3); of 60 degrees for broken triangles."""
     with np.errstate(divide="ignore"):
         weights = 0.5 / np.tan(angles)
     weights[broken] = REGULAR
@@ -54,29 +55,29 @@ def half_cotangents_of(angles: Real, broken: NDArray[np.bool_]) -> Real:
 
 
 def angle_sums(F: Indices, angles: Real, n: int) -> Real:
-    """The sum of the angles (m, 3) at each vertex, (n,)."""
+    """Return the sum of the angles (m, 3) at each vertex, (n,)."""
     return np.bincount(F.ravel(), weights=angles.ravel(), minlength=n).astype(np.float64)
 
 
 def length_cross_ratios(F: Indices, lengths: Real) -> Real:
-    """Logarithms (e,) of the length cross ratio of every interior edge, in an order of its own.
+    """Return the logarithms (e,) of the length cross ratios of the interior edges.
 
-    For the edge ij with triangles ijk and jil it is l_ik l_jl / (l_kj l_li). Two metrics on the
-    same triangles are discretely conformally equivalent where these agree.
+    For the edge ij with triangles ijk and jil the ratio is l_ik l_jl / (l_kj l_li). Two metrics on
+    the same triangles are discretely conformally equivalent if these agree.
     """
     _, edge, faces = edges_of_half_edges(F)
     side = np.log(lengths)
-    # Half-edge c of a triangle runs from corner c to the next; beside it lie, from its start on
-    # counter-clockwise, the sides opposite to the next corner and to corner c.
+    # Half-edge c of a triangle runs from corner c to the next. The sides at its start and its end
+    # are those opposite to the next corner and to corner c.
     ratio = (np.roll(side, -1, axis=1) - side).ravel()
     total = np.bincount(edge, weights=ratio, minlength=len(faces))
     return np.asarray(total[faces == 2])
 
 
 class BlockPattern:
-    """Laplacians of changing weights on the same triangles, restricted to some vertices.
+    """Laplacians with changing weights on the same triangles, restricted to some vertices.
 
-    Each has the same stored entries, zeros included, so that one analysis serves all.
+    All have the same stored entries, zeros included, so one symbolic analysis serves all.
 
     Parameters
     ----------
@@ -103,24 +104,24 @@ class BlockPattern:
         self._A = self._A.astype(np.float64)
 
     def weights_of_edges(self, weights: Real) -> Real:
-        """Sum weights (m, 3), for the edge opposite to each corner, over each edge; (e,)."""
+        """Return the sums over edges (e,) of weights (m, 3) for the opposite corners."""
         # The side opposite to corner c is half-edge c + 1.
         return np.bincount(
             self._edge, weights=np.roll(weights, 1, axis=1).ravel(), minlength=len(self._ends)
         ).astype(np.float64)
 
     def block(self, weights: Real) -> sparse.csc_array:
-        """The rows and columns of the kept vertices of the Laplacian with weights (m, 3)."""
+        """Return the rows and columns of the kept vertices of the Laplacian with weights (m, 3)."""
         w = self.weights_of_edges(weights)
         return self._filled(-w[self._inside], self._degrees(w))
 
     def dirichlet(
         self, weights: Real, fixed: NDArray[np.bool_], f: NDArray[np.complex128]
     ) -> tuple[sparse.csc_array, NDArray[np.complex128]]:
-        """A and b of A x = b for the harmonic map that is f (n,) at the fixed vertices (n,).
+        """Return A and b of A x = b for the harmonic map that is f (n,) at fixed vertices (n,).
 
-        All that are not kept are fixed; kept ones that are get the equation x = f, in the same
-        pattern.
+        All vertices that are not kept are fixed. Kept vertices that are fixed have the equation x =
+        f, in the same pattern.
         """
         w = self.weights_of_edges(weights)
         free = ~fixed & self.kept

@@ -1,4 +1,4 @@
-"""A surface glued to its mirror copy along the boundary: closed, and of genus zero for a disk."""
+"""A surface glued to its mirror copy along the boundary; from a disk, a sphere."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ class DoubledSurface:
     Parameters
     ----------
     F : int64 (2 m, 3)
-        The surface's own triangles, then their mirror images in the same order, turned over so
-        that the whole is oriented.
+        The surface's triangles, then their mirror images in the same order, reversed so that the
+        whole surface is oriented.
     mirror : int64 (n,)
-        The copy of each vertex of the surface; a boundary vertex is its own.
+        The copy of each vertex of the surface; a boundary vertex is its own copy.
     size : int
         Number of vertices of both copies together.
 
@@ -33,7 +33,7 @@ class DoubledSurface:
     size: int
 
     def on_both(self, values: NDArray[Any]) -> NDArray[Any]:
-        """What is known at the surface's vertices (n, ...), at those of both copies (size, ...)."""
+        """Extend values at the surface's vertices (n, ...) to both copies (size, ...)."""
         both = np.empty((self.size, *values.shape[1:]), dtype=values.dtype)
         both[self.mirror] = values
         both[: len(values)] = values
@@ -41,10 +41,10 @@ class DoubledSurface:
 
 
 def doubled(mesh: DiskMesh) -> DoubledSurface:
-    """What does the surface glued to its mirror copy look like?
+    """Return a surface glued to its mirror copy.
 
     A chord, an interior edge between two boundary vertices, is shared by both copies and then has
-    four triangles; sums over triangles are right all the same.
+    four triangles; sums over triangles are still correct.
     """
     mirror = np.arange(mesh.n)
     mirror[mesh.interior] = mesh.n + np.arange(len(mesh.interior))
@@ -54,7 +54,7 @@ def doubled(mesh: DiskMesh) -> DoubledSurface:
 
 
 def doubled_laplacian(L: sparse.csc_array, double: DoubledSurface) -> sparse.csc_array:
-    """Which Laplacian has the doubled surface: the sum of L (n, n) over both copies."""
+    """Return the Laplacian of the doubled surface: the sum of L (n, n) over both copies."""
     one = sparse.coo_array(L)
     i = np.concatenate([one.row, double.mirror[one.row]])
     j = np.concatenate([one.col, double.mirror[one.col]])

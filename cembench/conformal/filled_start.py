@@ -1,9 +1,10 @@
-"""A start for maps to the disk with circular holes: the holes are filled, then circles are fitted.
+"""Initial maps to the disk with circular holes: fill the holes, then fit circles.
 
-A hole is filled with a round disk, its vertices on the rim by its own equilibrium measure: the flux
-through it of the potential that is 1 on it and 0 on all other boundaries. On a round hole of a
-circle domain that is nearly even, on a lone concentric one exactly; and it follows a boundary that
-crowds, where lengths say nothing. The disk adds a small dense block, no mesh.
+A hole is filled with a round disk. The vertices on its rim are spaced by its equilibrium measure:
+the flux through it of the potential that is 1 on it and 0 on all other boundaries. On a round hole
+of a circle domain that measure is nearly uniform, on a single concentric hole exactly. It also
+follows a crowded boundary, for which lengths are no guide. The disk adds a small dense block, and
+no mesh.
 """
 
 from __future__ import annotations
@@ -22,21 +23,21 @@ from cembench.conformal.planar import backward_arcs, polygon_area
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: What share of the way to its neighbours' centres, or to the outer circle, a start's radius takes.
+#: A start's radius as a share of the distance to its neighbours' centres or the outer circle.
 ROOM = 0.45
-#: With circles smaller than this, other loops are tried as the outer one.
+#: If a circle is smaller than this, other loops are tried as the outer one.
 CROWDED = 1e-3
-#: What share of the mean arc all arcs of a disk that fills a hole have: with shorter ones
-#: differences of its energy cancel, and a start does not depend on them.
+#: Minimal share of the mean arc for arcs of a disk that fills a hole: with shorter ones its energy
+#: suffers from cancellation, and a start does not depend on them.
 PATCH_SHARE = 1e-4
 
 
 def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> CircleDomain:
-    """Return a start with loop 0 outside or, where its circles are too small, the least crowded.
+    """Return the start with loop 0 outside or, if its circles are too small, the widest start.
 
-    Along a tube circles shrink by a constant factor with every radius of the tube. What happens at
-    circles of radius r adds r^2 to the energy: a loop that leaves the smallest ones larger is then
-    the better outside. Arguments as for :func:`filled_start`.
+    Along a tube, circles shrink by a constant factor per radius of the tube. Details at circles of
+    radius r add r^2 to the energy, so a loop that leaves the smallest circles larger is then a
+    better outer loop. Arguments as for :func:`filled_start`.
     """
     start = filled_start(S, seen, lengths, 0)
     if start.radii.min() >= CROWDED:
@@ -48,21 +49,21 @@ def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> 
 def filled_start(
     S: DirichletToNeumann, seen: Real, lengths: Sequence[Real], outer: int
 ) -> CircleDomain:
-    """Return where the boundaries go when the holes are filled.
+    """Return the circle domain of the boundaries after filling the holes.
 
-    The origin goes near to what `seen` is the harmonic measure of, or among the holes, whichever
-    start has the lower E_C: a triangle may lie where the surface crowds.
+    The origin lies near the point whose harmonic measure is `seen`, or among the holes, whichever
+    start has the lower E_C: the given point may lie where the surface is crowded.
 
     Parameters
     ----------
     S : DirichletToNeumann
         Of the surface with its holes open.
     seen : float (B,)
-        Harmonic measure of the boundary vertices from what may go near the origin.
+        Harmonic measure of the boundary vertices from a point that may be mapped near the origin.
     lengths : sequence of float arrays
         Edge lengths along each boundary loop.
     outer : int
-        Which loop goes to the unit circle.
+        The loop that goes to the unit circle.
 
     """
     rims = BoundaryLoops(tuple(len(along) for along in lengths), outer)
@@ -83,35 +84,36 @@ def filled_start(
     to_holes = np.linalg.solve(filled, columns[rim].T)  # minus the harmonic extension
     domains = []
     for measure in (seen, np.where(rims.on_outer, 0.0, own) / len(rims.holes)):
-        # What the open holes would swallow goes on to the outer boundary.
+        # The part that the open holes would absorb goes on to the outer boundary.
         outside = arcs_of_measure(measure[rim] - measure[inner] @ to_holes, lengths[outer])
         domains.append(_fitted(rims, arcs, _of_circle(outside), -to_holes))
     return min(domains, key=lambda domain: EnergyModel(S, domain, domain.outer_measure).energy)
 
 
 def equilibrium_measures(S: DirichletToNeumann, rims: BoundaryLoops) -> Real:
-    """Return the equilibrium measure of each loop, the others held at 0; (B,), each 1 in sum."""
+    """Return the equilibrium measure of each loop, the others at 0; (B,), each of sum 1."""
     potentials = (rims.loop[:, None] == np.arange(len(rims.sizes))).astype(np.float64)
     fluxes = S(potentials)[np.arange(len(rims.loop)), rims.loop]
     return fluxes / rims.sums(fluxes)[rims.loop]
 
 
 def _parts(rims: BoundaryLoops) -> list[slice]:
-    """Return where each loop lies in the boundary."""
+    """Return the position of each loop in the boundary."""
     return [slice(a, a + size) for a, size in zip(rims.starts, rims.sizes, strict=True)]
 
 
 def _of_circle(arcs: Real) -> Real:
-    """Return arcs in proportion, 2 pi in sum."""
+    """Return arcs in these proportions with sum 2 pi."""
     return arcs * (2 * np.pi / arcs.sum())
 
 
 def _fitted(rims: BoundaryLoops, arcs: Real, outside: Real, to_holes: Real) -> CircleDomain:
-    """Return the domain with arcs `outside` on the outer circle, and the holes where they then go.
+    """Return the domain with arcs `outside` on the outer circle, and circles fitted to the holes.
 
-    `to_holes` takes values on the outer boundary to the holes' vertices. The centre of a circle is
-    the mean of its image by the hole's equilibrium measure; its arcs are those of the image about
-    it where that is in order, else those of the measure; radius and turn are the nearest ones.
+    `to_holes` maps values on the outer boundary to the holes' vertices. The centre of a circle is
+    the mean of the hole's image in its equilibrium measure. Its arcs are those of the image about
+    that centre if they are in order, else those of the measure. Radius and rotation are least
+    squares fits.
     """
     arcs, z = arcs.copy(), np.empty(len(arcs), dtype=np.complex128)
     arcs[rims.on_outer] = outside
@@ -131,15 +133,16 @@ def _fitted(rims: BoundaryLoops, arcs: Real, outside: Real, to_holes: Real) -> C
     return CircleDomain(rims, arcs, np.angle(similarities), centres, radii, LEAST_SHARE * arcs)
 
 
-#: Harmonic measure per length is taken for at least this share of its largest value.
+#: Harmonic measure per length is raised to at least this share of its largest value.
 LEAST_DENSITY = 1e-12
 
 
 def arcs_of_measure(measure: Real, lengths: Real) -> Real:
-    """Which arcs, up to a factor, have boundary vertices of this harmonic measure?
+    """Return the arcs, up to a factor, of boundary vertices with this harmonic measure.
 
     A conformal map to the disk gives every piece of the boundary an arc of 2 pi times its harmonic
-    measure from what goes to the origin. The measure of a vertex spreads over half of either edge.
+    measure from the point mapped to the origin. A vertex's measure is spread over half of each
+    edge.
     """
     around = (lengths + np.roll(lengths, 1)) / 2
     density = np.maximum(measure / around, LEAST_DENSITY * np.max(measure / around))
@@ -147,14 +150,14 @@ def arcs_of_measure(measure: Real, lengths: Real) -> Real:
 
 
 def _arcs_about(loop: Complex, otherwise: Real) -> Real:
-    """Return the arcs of a hole's clockwise image about its centre, if that is in order."""
+    """Return the arcs of a hole's clockwise image about its centre if in order, or `otherwise`."""
     if (loop == 0).any() or backward_arcs(np.conj(loop)) or polygon_area(loop) >= 0:
         return otherwise
     return _of_circle(np.angle(loop / np.roll(loop, -1)))
 
 
 def _with_room(centres: Complex, radii: Real) -> Real:
-    """Radii no larger than leaves room between the circles."""
+    """Return radii reduced until there is room between the circles."""
     apart = np.abs(centres[:, None] - centres)
     np.fill_diagonal(apart, np.inf)
     room = np.minimum(ROOM * apart.min(axis=1), 0.9 * (1 - np.abs(centres)))

@@ -1,4 +1,4 @@
-"""What the repair of folds costs a map, and whether it is worth that."""
+"""Accept or reject a repair of folds by what it costs the map."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 Complex = NDArray[np.complex128]
 
-#: A repair that multiplies one of these figures by more is not taken. The mean angle error flatters
+#: A repair that multiplies one of these metrics by more is rejected. The mean angle error flatters
 #: a folded map, since a reflected triangle has the right angles; E_C does not.
 MOST_COST = {"conformal_energy": 1.25, "angle_error_mean_deg": 1.5}
 
@@ -21,7 +21,7 @@ MOST_COST = {"conformal_energy": 1.25, "angle_error_mean_deg": 1.5}
 def accepted_repair(
     mesh: TriangleMesh, before: Complex, repair: tuple[Complex, int]
 ) -> tuple[Complex, dict[str, Any]]:
-    """Return a repaired map, or the map before where the repair costs too much, and the figures.
+    """Return a repaired map, or the original map if the repair costs too much, and its metrics.
 
     Parameters
     ----------
@@ -30,17 +30,17 @@ def accepted_repair(
     before : complex (n,)
         Its map before the repair.
     repair : complex (n,) and int
-        The map after it and the number of rounds, as
-        :func:`cembench.conformal.folds.without_folds` returns them.
+        The map after it and the number of rounds, as returned by
+        :func:`cembench.conformal.folds.without_folds`.
 
     Returns
     -------
     z : complex (n,)
-        The map that is taken.
+        The accepted map.
     extras : dict
-        ``fold_repairs``, the number of rounds. Where there were any, ``before_repair`` has the
-        figures of the map before; where the repair is not taken, ``refused_repair`` has those of
-        the map after.
+        ``fold_repairs``, the number of rounds. If there were any, ``before_repair`` has the metrics
+        of the original map; if the repair was rejected, ``refused_repair`` has those of the
+        repaired map.
 
     """
     after, rounds = repair
@@ -55,6 +55,7 @@ def accepted_repair(
 
 
 def _figures(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
+    """Return the metrics that decide on a repair."""
     return {
         "flipped_triangles": flipped_triangles(mesh, uv),
         "conformal_energy": dirichlet_energy(mesh, uv) - image_area(mesh, uv),

@@ -1,9 +1,9 @@
-"""Folded triangles in a map to the disk, and their repair, which is local.
+"""Folded triangles in a map to the disk, and their local repair.
 
-The boundary stays where the method put it, but for vertices that changed places; then patches of
-the interior around the folds are laid out anew (:mod:`cembench.conformal.untangling`), everything
-else being held. What cannot be repaired that way stays folded: a map that is made fold-free at the
-price of its angles is of no use to anybody.
+The boundary stays where the method put it, except for vertices that changed places. Then patches of
+the interior around the folds are laid out again (:mod:`cembench.conformal.untangling`), with
+everything else fixed. What cannot be repaired that way stays folded: a map that is made free of
+folds at the expense of its angles is useless.
 """
 
 from __future__ import annotations
@@ -23,38 +23,56 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: What remains between boundary vertices that changed places, in radians: only so much that doubles
-#: tell them apart.
+#: Gap between boundary vertices that changed places, in radians: just enough to be distinct in
+#: doubles.
 LEAST_ARC = 1e-12
-#: By how much the tip of a triangle whose corners all lie on the circle is taken off it, outward,
-#: where they are so close together that the triangle has no area in doubles.
+#: Outward shift of the tip of a triangle with all corners on the circle, if they are so close that
+#: the triangle has no area in doubles.
 HEIGHT = 4 * np.finfo(float).eps
-#: An angle that changes by no more than this is left as it is.
+#: Changes of an angle up to this size are ignored.
 MOVED = 1e-14
-#: What share of the boundary's arcs may go backward and still count as a few.
+#: Largest share of the boundary's arcs that may run backward.
 MOST_BACKWARD = 0.1
-#: How many rings of vertices around the folds are laid out anew, one after the other.
+#: Numbers of rings of vertices around the folds that are laid out again, in this order.
 RINGS = (1, 2, 4, 8, 16)
 
 
 def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Complex, int]:
-    """Repair a map to the disk that is nearly harmonic for L.
+    """Repair the folds of a map to the disk that is nearly harmonic for L.
 
-    Where boundary vertices changed places on the circle, they take the nearest angles in order, and
-    the interior is solved for again. What is folded then is repaired as in
-    :func:`interior_without_folds`. A map without folds comes back untouched.
+    Boundary vertices that changed places on the circle get the nearest angles in order, and the
+    interior is solved for again. Remaining folds are repaired as in
+    :func:`interior_without_folds`. A map without folds is returned unchanged.
+
+    Parameters
+    ----------
+    mesh : DiskMesh
+        The surface.
+    L : sparse (n, n)
+        Its Laplacian.
+    z : complex (n,)
+        The map, with its boundary on the unit circle.
 
     Returns
     -------
     z : complex (n,)
-        The map. Folds that could not be repaired are still there.
+        The map. Folds that could not be repaired remain.
     rounds : int
-        How many rounds of repair that took; 0 where z was not folded.
+        The number of rounds of repair; 0 if z was not folded.
 
     Raises
     ------
     AlgorithmFailed
         The boundary is too far out of order to be repaired.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> from cembench.conformal.laplacian import laplacian
+    >>> disk = cembench.surface("flat-disk", 600)
+    >>> z, rounds = without_folds(disk, laplacian(disk), disk.V[:, 0] + 1j * disk.V[:, 1])
+    >>> rounds
+    0
 
     """
     if not len(_folded(mesh, z)):
@@ -72,9 +90,9 @@ def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Comp
 def interior_without_folds(mesh: TriangleMesh, z: Complex) -> tuple[Complex, int]:
     """Repair the interior of a map around its folds; the boundary stays.
 
-    The vertices within a few rings of a fold are laid out anew, everything else held; where that
-    leaves a fold, they go back and more rings are taken, up to the last of `RINGS`. Returns what
-    :func:`without_folds` does.
+    Vertices within a few rings of a fold are laid out again, with everything else fixed. If a fold
+    remains, they are put back and more rings are tried, up to the last entry of `RINGS`. Returns as
+    :func:`without_folds`.
     """
     folded = _folded(mesh, z)
     if not len(folded):
@@ -101,7 +119,7 @@ def interior_without_folds(mesh: TriangleMesh, z: Complex) -> tuple[Complex, int
 def _accepted(
     mesh: TriangleMesh, before: Complex, after: Complex, patch: NDArray[np.int64]
 ) -> Complex:
-    """Return the map after, with those patches as before that still have folds."""
+    """Return the repaired map, with patches that still have folds put back."""
     folded = np.unique(patch[folded_triangles(after, mesh.F)])
     back = np.unique(mesh.F[np.isin(patch, folded[folded >= 0])])
     accepted = after.copy()
@@ -110,12 +128,13 @@ def _accepted(
 
 
 def _folded(mesh: TriangleMesh, z: Complex) -> NDArray[np.int64]:
+    """Return the folded triangles, in the phase "folds"."""
     with phase("folds"):
         return folded_triangles(z, mesh.F)
 
 
 def _on_boundary_without_folds(mesh: DiskMesh, circle: Complex) -> Complex:
-    """Return the boundary in order, no triangle between its vertices alone without area."""
+    """Return the boundary in order, such that no triangle between its vertices has zero area."""
     ordered = in_order(circle)
     place = np.full(mesh.n, -1)
     place[mesh.boundary] = np.arange(len(circle))
@@ -129,21 +148,21 @@ def _on_boundary_without_folds(mesh: DiskMesh, circle: Complex) -> Complex:
 
 
 def in_order(circle: Complex) -> Complex:
-    """Return the points of the unit circle nearest to these that go round it counter-clockwise.
+    """Return the nearest points of the unit circle that go around it counter-clockwise.
 
-    The angles (k,) are replaced by their isotonic regression; points that are in order stay as they
-    are. Those that changed places among each other are spread evenly over at least as much of the
-    circle as they were out of order by; no two are closer together than `LEAST_ARC`.
+    The angles (k,) are replaced by their isotonic regression; points that are in order stay. Points
+    that changed places with each other are spread evenly over at least the part of the circle by
+    which they were out of order; no two are closer than `LEAST_ARC`.
 
     Raises
     ------
     AlgorithmFailed
-        The points do not go round the circle once and counter-clockwise, or more than the share
-        `MOST_BACKWARD` of the arcs between them goes backward.
+        The points do not go around the circle once and counter-clockwise, or more than the share
+        `MOST_BACKWARD` of their arcs runs backward.
 
     """
     arcs = np.angle(np.roll(circle, -1) / circle)
-    first = int(np.argmax(arcs)) + 1  # cut the circle where it is least crowded
+    first = int(np.argmax(arcs)) + 1  # cut the circle where points are least crowded
     arcs = np.roll(arcs, -first)
     angles = np.concatenate([[0.0], np.cumsum(arcs[:-1])])
     turned = _in_order(angles) - angles
@@ -162,10 +181,11 @@ def in_order(circle: Complex) -> Complex:
 
 
 def _in_order(angles: Real) -> Real:
+    """Return the isotonic regression of angles, with distinct values."""
     from scipy.optimize import isotonic_regression  # slow to load, and rarely needed
 
     spread = LEAST_ARC * np.arange(len(angles))
-    # Groups that changed places: each would come to lie in one point.
+    # Groups that changed places; each would collapse to one point.
     first = np.asarray(isotonic_regression(angles - spread).blocks)[:-1]
     sizes = np.diff(np.append(first, len(angles)))
     disorder = np.maximum.reduceat(angles, first) - np.minimum.reduceat(angles, first)

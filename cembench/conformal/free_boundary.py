@@ -1,4 +1,4 @@
-"""What maps with a free boundary share: the energy as a form, two pins, the scale."""
+"""Common parts of maps with a free boundary: the energy form, the two pins, the scale."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Complex = NDArray[np.complex128]
 
 
 def conformal_energy_form(L: sparse.csc_array, b: NDArray[np.int64]) -> sparse.csc_array:
-    """Q with E_C = x^T Q x / 2 for x = (u, v): diag(L, L) less the Hessian of the area (Eq. 8)."""
+    """Return Q with E_C = x^T Q x / 2, x = (u, v): diag(L, L) minus the area's Hessian (Eq. 8)."""
     after = np.roll(b, -1)
     half = np.full(len(b), 0.5)
     D = sparse.coo_array((np.r_[half, -half], (np.r_[b, after], np.r_[after, b])), shape=L.shape)
@@ -28,7 +28,7 @@ def conformal_energy_form(L: sparse.csc_array, b: NDArray[np.int64]) -> sparse.c
 
 
 def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
-    """The boundary vertex farthest from the mean vertex, and the one farthest from that; (2,)."""
+    """Return two boundary vertices (2,): the farthest from the mean vertex and from the first."""
     loop = mesh.V[mesh.boundary]
     first = int(np.argmax(np.linalg.norm(loop - mesh.V.mean(axis=0), axis=1)))
     second = int(np.argmax(np.linalg.norm(loop - loop[first], axis=1)))
@@ -36,7 +36,7 @@ def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
 
 
 def pinned_map(L: sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np.int64]) -> Complex:
-    """Which map (n,) has the least E_C with two vertices `pins` (2,) at -1 and 1?
+    """Return the map (n,) of least E_C with two vertices `pins` (2,) at -1 and 1.
 
     L (n, n) is the Laplacian, b the boundary loop.
     """
@@ -54,14 +54,14 @@ def pinned_map(L: sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np.int64
 
 
 def with_area_pi(mesh: DiskMesh, uv: Complex) -> tuple[Complex, dict[str, Any]]:
-    """Scale a map so that its boundary encloses pi, as a disk does, and repair folds inside.
+    """Scale a map so that its boundary encloses pi, as a disk does, and repair interior folds.
 
     Returns
     -------
     uv : complex (n,)
         The map.
     extras : dict
-        What :func:`cembench.conformal.fold_repair.accepted_repair` tells.
+        As returned by :func:`cembench.conformal.fold_repair.accepted_repair`.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def with_area_pi(mesh: DiskMesh, uv: Complex) -> tuple[Complex, dict[str, Any]]:
     if not area > 0:
         raise AlgorithmFailed(
             f"the image of the boundary encloses an area of {area:.3g}, which is not positive: "
-            "the map has collapsed or crosses itself. A disk map, such as direct-cem, cannot"
+            "the map has collapsed or crosses itself. Use a disk map, such as direct-cem"
         )
     uv = uv * np.sqrt(np.pi / area)
     return accepted_repair(mesh, uv, interior_without_folds(mesh, uv))

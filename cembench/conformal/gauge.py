@@ -1,4 +1,4 @@
-"""Which of the Moebius images of a map to the disk is taken: a measure whose mean goes to 0."""
+"""Choose one of the Moebius images of a map to the disk: the mean of a measure goes to 0."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Newton's steps to a gauge, at most, and how near to 0 the mean must come.
+#: Maximal number of Newton steps to a gauge, and the tolerance of the mean.
 GAUGE_STEPS, GAUGE_ACCURACY = 200, 1e-12
-#: What is centred: the outer boundary, by length; the middle triangle; the surface, by area.
+#: What is centred: the outer boundary by length, the middle triangle, or the surface by area.
 Gauge = Literal["boundary", "triangle", "area"]
 
 
 def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) -> Real:
-    """Which non-negative weights (n,), 1 in sum, has the measure that is centred?
+    """Return the non-negative weights (n,), with sum 1, of the measure that is centred.
 
     `outer` is the outer boundary loop.
     """
@@ -39,15 +39,15 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
 
 
 def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
-    """Move a map to the unit disk by a Moebius map so that its mean comes to lie at 0.
+    """Move a map to the unit disk by a Moebius map so that its mean is 0.
 
-    uv is (n,), all of it in the closed disk; `measure` (n,) has sum 1. By Newton's method, the
-    steps cut to 0.5.
+    uv is (n,) in the closed disk; `measure` (n,) has sum 1. By Newton's method with steps cut to
+    0.5.
 
     Raises
     ------
     AlgorithmFailed
-        The mean stays away from 0: a single point has too much of the measure.
+        The mean does not reach 0: a single point has too much of the measure.
 
     """
     middle = complex(measure @ uv)
@@ -67,7 +67,7 @@ def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
 
 
 def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Which triangle's barycentre is nearest to the mean vertex? V is (n, 2 or 3); its corners."""
+    """Return the corners of the triangle nearest to the mean vertex; V is (n, 2 or 3)."""
     a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
     off = a + b + c - 3 * V.mean(axis=0)
     return F[np.argmin(np.einsum("td,td->t", off, off))]

@@ -1,4 +1,4 @@
-"""Curvature of a polyhedral surface: what is missing to a flat angle at each vertex."""
+"""Curvature of a polyhedral surface: the angle defect at each vertex."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ Real = NDArray[np.float64]
 
 
 def vertex_curvatures(mesh: DiskMesh) -> Real:
-    """Angle defects (n,) in radians: 2 pi less the angles inside, pi less them on the boundary.
+    """Return the angle defects (n,) in radians: 2 pi (interior) or pi (boundary) less the angles.
 
-    Their sum is 2 pi, whatever the surface (Gauss-Bonnet).
+    Their sum is 2 pi for every disk (Gauss-Bonnet).
     """
     angles = np.deg2rad(corner_angles(mesh.V, mesh.F))
     flat = np.full(mesh.n, 2 * np.pi)

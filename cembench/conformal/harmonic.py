@@ -15,15 +15,31 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 
 def edge_lengths(mesh: TriangleMesh, loop: NDArray[np.int64]) -> NDArray[np.float64]:
-    """How long is the edge from each vertex of a boundary loop to the next? Shape (k,)."""
+    """Return the edge length from each vertex of a boundary loop to the next, (k,)."""
     corners = mesh.V[loop]
     return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
 
 
 def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
-    """Where on the unit circle does each boundary vertex go, in proportion to edge length?
+    """Return boundary positions on the unit circle, spaced in proportion to edge length.
 
-    Shape (k,), in the order of ``mesh.boundary``, counter-clockwise, the first vertex at 1.
+    Parameters
+    ----------
+    mesh : DiskMesh
+        The surface, with k boundary vertices.
+
+    Returns
+    -------
+    complex128 (k,)
+        In the order of ``mesh.boundary``, counter-clockwise, the first vertex at 1.
+
+    Examples
+    --------
+    >>> import cembench, numpy as np
+    >>> circle = arc_length_circle(cembench.surface("flat-disk", 600))
+    >>> bool(np.allclose(abs(circle), 1))
+    True
+
     """
     lengths = edge_lengths(mesh, mesh.boundary)
     travelled = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -33,10 +49,40 @@ def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
 def harmonic_extension(
     L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[Any]
 ) -> NDArray[Any]:
-    """Which map is harmonic for L and takes these values at the fixed vertices (Eq. 10)?
+    """Return the map that is harmonic for L and has these values at the fixed vertices (Eq. 10).
 
-    L (n, n) positive semi-definite, `fixed` (k,) indices, `values` (k,), real or complex; the
-    result is (n,), of the same type.
+    Parameters
+    ----------
+    L : sparse (n, n)
+        Positive semi-definite Laplacian.
+    fixed : int64 (k,)
+        Fixed vertices.
+    values : float or complex (k,)
+        Their images.
+
+    Returns
+    -------
+    float or complex (n,)
+        The image of each vertex, of the type of `values`.
+
+    Raises
+    ------
+    NotPositiveDefinite
+        The interior block of L is not positive definite.
+
+    References
+    ----------
+    Eq. (10) of the CEM paper.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> from cembench.conformal.laplacian import laplacian
+    >>> disk = cembench.surface("flat-disk", 600)
+    >>> z = harmonic_extension(laplacian(disk), disk.boundary, arc_length_circle(disk))
+    >>> z.shape == (disk.n,)
+    True
+
     """
     n = L.shape[0]
     f = np.zeros(n, dtype=values.dtype)

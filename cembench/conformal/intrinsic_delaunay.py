@@ -1,12 +1,11 @@
-"""The intrinsic Delaunay triangulation of a surface: edges are flipped on their lengths alone.
+"""The intrinsic Delaunay triangulation of a surface, by edge flips on lengths alone.
 
-Own code, because libigl's flips do not end on thin triangles, where rounding makes an edge and the
-one that replaces it both look wrong, and take all memory meanwhile. Here an edge is flipped only
-where rounding cannot be the reason, and the flips of a round share no triangle, so that all are
-made at once.
+Own code, because libigl's flips do not end on thin triangles, where rounding makes both an edge and
+its replacement look wrong, and then use up all memory. Here an edge is flipped only if rounding
+cannot be the reason, and the flips of a round share no triangle, so all are made at once.
 
-Corners are numbered through: corner ``3 t + c`` is that at vertex ``F[t, c]``, and stands for the
-edge opposite to it too.
+Corners are numbered consecutively: corner ``3 t + c`` is at vertex ``F[t, c]``, and also stands for
+the opposite edge.
 """
 
 from __future__ import annotations
@@ -20,34 +19,35 @@ from cembench.mesh.gluing import twins_of_half_edges
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: An edge is not Delaunay when its cotangents sum to less than minus this share of their size.
+#: An edge is not Delaunay if its cotangents sum to less than minus this share of their size.
 ROUNDING = 1e-10
-#: Rounds of flips at most; a real surface takes about ten.
+#: Maximal rounds of flips; a real surface takes about ten.
 MOST_ROUNDS = 1000
 
 
 def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indices, Real, Real]:
-    """Flip edges until all are Delaunay: their opposite angles sum to 180 degrees at most.
+    """Flip edges until all are Delaunay: their opposite angles sum to at most 180 degrees.
 
     Parameters
     ----------
-    F : (m, 3) integers
+    F : int64 (m, 3)
         Triangles of an oriented manifold, counter-clockwise.
-    lengths : (m, 3)
+    lengths : float (m, 3)
         Length of the edge opposite to each corner.
-    weights : (m, 3)
+    weights : float (m, 3)
         Half the cotangent of the angle at each corner.
 
     Returns
     -------
     F, lengths, weights
-        The same of the new triangles, whose straight edges run over the old ones. Two of them may
-        share several edges, and one may meet itself.
+        The same for the new triangles, whose straight edges cross the old ones. Two of them may
+        share several edges, and a triangle may meet itself.
 
-    Notes
-    -----
-    Fisher, Springborn, Schroeder, Bobenko, "An algorithm for the construction of intrinsic Delaunay
-    triangulations with applications to digital geometry processing", Computing 81, 2007.
+    References
+    ----------
+    .. [1] Fisher, Springborn, Schroeder, Bobenko, "An algorithm for the construction of intrinsic
+           Delaunay triangulations with applications to digital geometry processing",
+           Computing 81, 2007.
 
     """
     corners = _Corners(F, lengths, weights)
@@ -63,7 +63,7 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
 
 
 class _Corners:
-    """What is known at each corner of each triangle; arrays (3 m,), changed by flips."""
+    """Data at each corner of each triangle; arrays (3 m,), changed by flips."""
 
     def __init__(self, F: Indices, lengths: Real, weights: Real) -> None:
         self.vertex: Indices = F.flatten()
@@ -75,20 +75,20 @@ class _Corners:
         self._moved_to = np.arange(F.size)  # the same before and after each flip
 
     def not_delaunay(self, corners: Indices) -> Indices:
-        """Those of these corners whose edge is not Delaunay; the lower one of an edge's two."""
+        """Return the corners whose edge is not Delaunay, the lower one of each edge's two."""
         twins = self.twin[corners]
         corners, twins = corners[twins >= 0], twins[twins >= 0]
         one, other = self.weight[corners], self.weight[twins]
         wrong = one + other < -ROUNDING * (np.abs(one) + np.abs(other))
-        wrong &= corners // 3 != twins // 3  # such an edge cannot be flipped
+        wrong &= corners // 3 != twins // 3  # the same triangle on both sides
         return np.unique(np.minimum(corners, twins)[wrong])
 
     def sharing_no_triangle(self, corners: Indices) -> Indices:
-        """Of these edges, one after another, those whose triangles no earlier one has."""
+        """Return those edges, in order, whose triangles belong to no earlier one."""
         return corners[self._apart(corners // 3, self.twin[corners] // 3)]
 
     def flip(self, corners: Indices) -> Indices:
-        """Flip these edges, of triangles (k, i, j) and (h, j, i); all corners of those.
+        """Flip these edges, of triangles (k, i, j) and (h, j, i); return all corners of those.
 
         Edge ij becomes kh: the triangles become (k, i, h) and (h, j, k).
         """
@@ -114,7 +114,7 @@ class _Corners:
 
 
 def half_cotangents_of_sides(lengths: Real) -> Real:
-    """Half the cotangent (m, 3) of the angle opposite to each edge, of edge lengths (m, 3)."""
+    """Return half the cotangent (m, 3) of the angle opposite to each edge length (m, 3)."""
     area = area_of_sides(*lengths.T)
     found = np.empty_like(lengths)
     for c in range(3):
@@ -125,6 +125,6 @@ def half_cotangents_of_sides(lengths: Real) -> Real:
 
 
 def _following(corner: Indices) -> tuple[Indices, Indices]:
-    """The next two corners of the same triangle."""
+    """Return the next two corners of the same triangle."""
     first = corner - corner % 3
     return first + (corner + 1) % 3, first + (corner + 2) % 3

@@ -1,7 +1,7 @@
 """The cotangent Laplacian (Eq. 6).
 
 Sign convention: positive semi-definite, rows sum to zero, ``L[i, j]`` is minus half the sum of the
-cotangents opposite to edge ij; it is positive exactly where an interior edge is not Delaunay.
+cotangents opposite to edge ij. It is positive exactly if an interior edge is not Delaunay.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 def corner_products(
     V: NDArray[np.float64], F: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Dot products (m, 3) of the edges that leave each corner, and twice the areas (m,), unsigned.
+    """Return the dot products (m, 3) of the edges at each corner, and twice the areas (m,).
 
-    V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is that at vertex ``F[t, c]``.
+    V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is at vertex ``F[t, c]``. Areas are unsigned.
     """
     a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
     # Edges opposite to the corners 0, 1, 2.
@@ -30,7 +30,7 @@ def corner_products(
     for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
         np.einsum("td,td->t", p, q, out=dots[:, k])
     np.negative(dots, out=dots)
-    # Lagrange's identity through the dot products alone would cancel on slivers.
+    # Lagrange's identity with dot products alone would suffer from cancellation on slivers.
     if V.shape[1] == 2:
         double_area = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     else:
@@ -42,7 +42,7 @@ def corner_products(
 
 
 def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
-    """What is half the cotangent of each corner's angle? Shape (m, 3), dimensionless.
+    """Return half the cotangent of each corner's angle, shape (m, 3), dimensionless.
 
     V and corners as for :func:`corner_products`.
     """
@@ -53,9 +53,9 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
 def laplacian_of_weights(
     F: NDArray[np.int64], weights: NDArray[np.float64], n: int
 ) -> sparse.csc_array:
-    """Which Laplacian has these weights? `weights[t, c]` counts for the edge opposite to corner c.
+    """Return the Laplacian of `weights` (m, 3), for the edges opposite to the corners.
 
-    The two triangles of an edge add up.
+    The weights of the two triangles of an edge are added.
     """
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
     one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
@@ -65,15 +65,41 @@ def laplacian_of_weights(
 
 
 def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> sparse.csc_array:
-    """The positive semi-definite cotangent Laplacian L of Eq. (6); V (n, 2 or 3), L (n, n)."""
+    """Return the positive semi-definite cotangent Laplacian (n, n) of Eq. (6); V (n, 2 or 3)."""
     return laplacian_of_weights(F, half_cotangents(V, F), len(V))
 
 
 def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array:
-    """The Laplacian that every algorithm shares; booked as the phase "laplacian".
+    """Return the cotangent Laplacian of a mesh, in the phase "laplacian".
 
-    With `delaunay` it is that of the intrinsic Delaunay triangulation of the same surface (Fisher
-    et al. 2007): no weight is negative, so a harmonic map has discrete maximum principle.
+    All algorithms share this function.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    delaunay : bool
+        Whether to use the intrinsic Delaunay triangulation of the same surface [1]_. Then no weight
+        is negative, and harmonic maps obey a discrete maximum principle.
+
+    Returns
+    -------
+    sparse (n, n)
+        Positive semi-definite; rows sum to zero (Eq. 6).
+
+    References
+    ----------
+    .. [1] Fisher, Springborn, Schroeder, Bobenko, "An algorithm for the construction of intrinsic
+           Delaunay triangulations with applications to digital geometry processing",
+           Computing 81, 2007.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> L = laplacian(cembench.surface("flat-disk", 600))
+    >>> bool(abs(L.sum(axis=1)).max() < 1e-12)
+    True
+
     """
     with phase("laplacian"):
         if not delaunay:
@@ -84,12 +110,12 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
 
 
 def by_rows(L: sparse.csc_array) -> sparse.csr_array:
-    """A Laplacian stored by rows: it is symmetric, so its columns are its rows as they are."""
+    """Return a Laplacian stored by rows; by symmetry these are its columns."""
     return sparse.csr_array(L.T)
 
 
 def non_delaunay_share(mesh: TriangleMesh) -> float:
-    """What share of the interior edges is not Delaunay (opposite angles above 180 degrees)?"""
+    """Return the share of interior edges with opposite angles above 180 degrees in sum."""
     F, n = mesh.F, mesh.n
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
     keys = np.minimum(i, j) * n + np.maximum(i, j)

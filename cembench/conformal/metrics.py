@@ -1,7 +1,7 @@
-"""How good is a map? Figures computed from the mesh and the map alone, never by the algorithm.
+"""Quality metrics of a map, computed from the mesh and the map alone, never by the algorithm.
 
 Angles are in degrees. Energies and areas are in the units of the map squared: for a unit disk they
-are comparable between surfaces, for a free boundary only after scaling the image.
+can be compared between surfaces, for a free boundary only after scaling the image.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: What share of E_D rounding may take E_C below zero.
+#: Share of E_D by which rounding may make E_C negative.
 LEAST_ENERGY = 1e-9
-#: How many triangles stand for all in :class:`SampledAngleError`.
+#: Number of triangles that :class:`SampledAngleError` samples.
 SAMPLE = 4_000
-#: How far from the unit circle the boundary of a map to the disk may lie, for a common gauge.
+#: Allowed distance from the unit circle of a disk map's boundary, for a common gauge.
 NEAR_CIRCLE = 1e-3
 
 
 def dirichlet_energy(mesh: TriangleMesh, uv: Complex) -> float:
-    """E_D (Eq. 5): half the sum over edges of cotangent weight times squared image length."""
+    """Return E_D (Eq. 5): half the sum over edges of cotangent weight times squared length."""
     F = mesh.F
     weights = half_cotangents(mesh.V, F)
     squared = np.stack(
@@ -50,15 +50,31 @@ def dirichlet_energy(mesh: TriangleMesh, uv: Complex) -> float:
 
 
 def image_area(mesh: TriangleMesh, uv: Complex) -> float:
-    """A (Eq. 8): what the boundary polygons enclose, holes subtracted; not pi for a disk."""
+    """Return A (Eq. 8): the area inside the boundary polygons less the holes, not exactly pi."""
     return sum(polygon_area(uv[loop]) for loop in mesh.loops)
 
 
 def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
-    """What are the triangles' angles? Degrees, shape (m, 3), unsigned.
+    """Return the angles of triangles in degrees.
 
-    `points` is (n, 3) in space or complex (n,) in the plane. A triangle whose image is a point
-    has angles of zero.
+    Parameters
+    ----------
+    points : float (n, 3) or complex (n,)
+        Vertices in space or in the plane.
+    F : int64 (m, 3)
+        Triangles.
+
+    Returns
+    -------
+    float (m, 3)
+        Unsigned. A triangle whose vertices coincide has angles of zero.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> corner_angles(np.array([0, 1, 1j]), np.array([[0, 1, 2]])).round()
+    array([[90., 45., 45.]])
+
     """
     planar = np.iscomplexobj(points)
     V = np.stack([points.real, points.imag], axis=1) if planar else np.asarray(points, np.float64)
@@ -67,14 +83,14 @@ def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
 
 
 def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:
-    """By how many degrees does each corner's angle change (Table 4)? Absolute, shape (m, 3)."""
+    """Return the absolute change of each corner's angle in degrees (Table 4), shape (m, 3)."""
     return np.abs(corner_angles(mesh.V, mesh.F) - corner_angles(uv, mesh.F))
 
 
 class SampledAngleError:
-    """By how many degrees does a map change a corner's angle in the mean, over every k-th triangle?
+    """The mean change of corner angles in degrees, over every k-th triangle.
 
-    Of a large mesh these are 4,000 triangles or a few more: enough to compare two maps of it.
+    On a large mesh these are 4,000 triangles or a few more: enough to compare two maps of it.
     """
 
     def __init__(self, mesh: TriangleMesh) -> None:
@@ -85,17 +101,17 @@ class SampledAngleError:
         return corner_angles(self._V, self._F)
 
     def __call__(self, uv: Complex) -> float:
-        """Degrees, for a map (n,)."""
+        """Return the mean change in degrees for a map (n,)."""
         return float(np.abs(self._in_space - corner_angles(uv, self._F)).mean())
 
 
 def flipped_triangles(mesh: TriangleMesh, uv: Complex) -> int:
-    """Count the triangles that are folded over or collapsed, by the exact sign of their area."""
+    """Return the number of folded or collapsed triangles, by the exact sign of their area."""
     return len(folded_triangles(uv, mesh.F))
 
 
 def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:
-    """How far from a similarity is each triangle: largest over smallest stretch, 1 when conformal?
+    """Return each triangle's ratio of largest to smallest stretch, which is 1 if conformal.
 
     Shape (m,); infinite for a triangle that collapsed to a segment or a point.
     """
@@ -104,20 +120,20 @@ def dilatations(mesh: TriangleMesh, uv: Complex) -> Real:
 
 @dataclass(frozen=True)
 class BoundaryCircle:
-    """The circle that lies closest to a boundary's image.
+    """The circle fitted to the image of a boundary loop.
 
     Parameters
     ----------
     vertex : int
-        The smallest vertex of the boundary loop, by which it is known.
+        The smallest vertex of the boundary loop, which identifies it.
     vertices : int
-        How many vertices the loop has.
+        Number of vertices of the loop.
     centre : complex
-        The circle's centre.
+        Centre of the circle.
     radius : float
-        Its radius; NaN where the image determines no circle.
+        Its radius; NaN if the image determines no circle.
     circularity : float
-        The largest ``| |z - c| - r | / r`` over the loop; infinite where there is no circle.
+        The largest ``| |z - c| - r | / r`` over the loop; infinite if there is no circle.
 
     """
 
@@ -129,13 +145,13 @@ class BoundaryCircle:
 
 
 def boundary_circles(mesh: TriangleMesh, uv: Complex) -> tuple[BoundaryCircle, ...]:
-    """Which circles are the boundary images nearly, and how nearly? That of largest area first."""
+    """Return the circles fitted to the boundary images, that of the largest area first."""
     loops = sorted(mesh.loops, key=lambda loop: polygon_area(uv[loop]), reverse=True)
     return tuple(circle_of(loop, uv[loop]) for loop in [*loops[:1], *sorted(loops[1:], key=min)])
 
 
 def circle_of(loop: NDArray[np.int64], z: Complex) -> BoundaryCircle:
-    """Which circle is the image z (k,) of a boundary loop (k,) nearly?"""
+    """Return the circle fitted to the image z (k,) of a boundary loop (k,)."""
     centre, radius = fitted_circle(z)
     with np.errstate(divide="ignore", invalid="ignore"):
         off = float(np.max(np.abs(np.abs(z - centre) - radius) / np.float64(radius)))
@@ -144,20 +160,20 @@ def circle_of(loop: NDArray[np.int64], z: Complex) -> BoundaryCircle:
 
 
 def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
-    """How far from circles are the boundary images: the largest ``| |z - c| - r | / r``?
+    """Return the distance of the boundary images from circles: the largest ``| |z - c| - r | / r``.
 
-    Centre and radius are fitted to each loop; infinite where a loop determines no circle.
+    Centre and radius are fitted to each loop; infinite if a loop determines no circle.
     """
     return max((circle.circularity for circle in boundary_circles(mesh, uv)), default=0.0)
 
 
 def surface_areas(mesh: TriangleMesh) -> Real:
-    """What area has each triangle of the surface? Shape (m,)."""
+    """Return the area of each triangle of the surface, shape (m,)."""
     return corner_products(mesh.V, mesh.F)[1] / 2
 
 
 def is_disk_map(mesh: TriangleMesh, uv: Complex) -> bool:
-    """Whether the outer boundary lies on the unit circle, to :data:`NEAR_CIRCLE`."""
+    """Whether the outer boundary lies on the unit circle, within :data:`NEAR_CIRCLE`."""
     if not mesh.loops:
         return False
     outer = max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
@@ -165,10 +181,11 @@ def is_disk_map(mesh: TriangleMesh, uv: Complex) -> bool:
 
 
 def in_common_gauge(mesh: TriangleMesh, uv: Complex) -> Complex:
-    """Move a map to the disk by the Moebius map that brings its mean, weighted by area, to 0.
+    """Move a map to the disk by the Moebius map that brings its area-weighted mean to 0.
 
-    Two maps of a surface that differ by a Moebius map of the disk come out alike but for a turn;
-    that of a mesh is taken of its vertices. uv is (n,), its outer boundary on the unit circle.
+    Two maps of a surface that differ by a Moebius map of the disk become equal up to a rotation; on
+    a mesh the Moebius map is applied to the vertices. uv is (n,), its outer boundary on the unit
+    circle.
 
     Raises
     ------
@@ -177,17 +194,17 @@ def in_common_gauge(mesh: TriangleMesh, uv: Complex) -> Complex:
 
     """
     if not np.abs(uv).max() <= 1 + NEAR_CIRCLE:
-        raise AlgorithmFailed("a vertex lies outside the disk, so that no gauge can be sought")
+        raise AlgorithmFailed("a vertex lies outside the disk: the map has no common gauge")
     return moved_to_gauge(uv, gauge_measure(mesh, "area", mesh.loops[0]))
 
 
 def area_distortion(mesh: TriangleMesh, uv: Complex) -> tuple[float, float]:
-    """How unequally are areas scaled: mean and standard deviation, over the surface's area?
+    """Return mean and standard deviation of the area distortion, weighted by surface area.
 
-    The logarithm of each triangle's area in the image over that on the surface, at the scale of the
-    image that is best in least squares: at which these logarithms, weighted by the surface's area,
-    have mean 0. The first figure is the mean of their absolute values, the second their standard
-    deviation, weighted alike. Folded triangles count by their size; infinite if one collapsed.
+    The distortion of a triangle is the logarithm of its area in the image over that on the surface,
+    at the scale of the image that is best in least squares, so that the weighted mean is 0. The
+    first value is the mean of the absolute values, the second the standard deviation. Folded
+    triangles count with the size of their area; infinite if a triangle collapsed.
     """
     areas = surface_areas(mesh)
     held = areas > 0
@@ -201,7 +218,7 @@ def area_distortion(mesh: TriangleMesh, uv: Complex) -> tuple[float, float]:
 
 
 class MapFigures:
-    """What the metrics of one map are computed from, each part once."""
+    """Intermediate results for the metrics of one map, each computed once."""
 
     def __init__(self, mesh: TriangleMesh, uv: Complex) -> None:
         self.mesh, self.uv = mesh, uv
@@ -218,17 +235,17 @@ class MapFigures:
 
     @cached_property
     def angle_errors(self) -> Real:
-        """Change of every corner's angle in degrees, absolute, (m, 3)."""
+        """Absolute change of every corner's angle in degrees, (m, 3)."""
         return angle_errors(self.mesh, self.uv)
 
     @cached_property
     def dilatations(self) -> Real:
-        """Largest over smallest stretch of every triangle, (m,)."""
+        """Ratio of largest to smallest stretch of every triangle, (m,)."""
         return dilatations(self.mesh, self.uv)
 
     @cached_property
     def beltrami(self) -> Real:
-        """|mu| of every triangle, (m,): 0 if conformal, 1 if collapsed; as if none was folded."""
+        """Modulus of mu of every triangle, (m,): 0 if conformal, 1 if collapsed; folds reversed."""
         K = self.dilatations
         with np.errstate(invalid="ignore"):
             mu = (K - 1) / (K + 1)
@@ -236,7 +253,7 @@ class MapFigures:
 
     @cached_property
     def beltrami_mean(self) -> float:
-        """The mean of |mu| over the surface's area."""
+        """Mean of the modulus of mu over the surface's area."""
         areas = surface_areas(self.mesh)
         return float(areas @ self.beltrami / areas.sum())
 
@@ -247,7 +264,7 @@ class MapFigures:
 
     @cached_property
     def centred(self) -> Complex | None:
-        """A map to the disk in the common gauge, another as it is; None if that cannot be had."""
+        """The map, in the common gauge if it is a disk map; None if that cannot be reached."""
         if not self.is_disk_map:
             return self.uv
         try:
@@ -257,7 +274,7 @@ class MapFigures:
 
     @cached_property
     def centred_energy(self) -> float | None:
-        """E_C of a map to the disk in the common gauge; None for a map to another target."""
+        """E_C of a disk map in the common gauge; None for a map to another target."""
         if not self.is_disk_map:
             return None
         if self.centred is None:
@@ -266,47 +283,47 @@ class MapFigures:
 
     @cached_property
     def area_distortion(self) -> tuple[float, float]:
-        """Mean and standard deviation; of a map to the disk in the common gauge."""
+        """Mean and standard deviation; for a disk map in the common gauge."""
         if self.centred is None:
             return float("inf"), float("inf")
         return area_distortion(self.mesh, self.centred)
 
     @cached_property
     def overlap(self) -> float:
-        """What share of the image lies over other parts of it."""
+        """Share of the image that lies over other parts of it."""
         return overlap_share([self.uv[loop] for loop in self.mesh.loops])
 
 
 @dataclass(frozen=True)
 class Metric:
-    """One figure of a map, and how it is shown wherever it is shown.
+    """One metric of a map, and how it is displayed everywhere.
 
     Parameters
     ----------
     name : str
-        The key in records, CSV and JSON.
+        Key in records, CSV and JSON.
     title : str
-        What it is called where there is room.
+        Name where space is not limited.
     heading : str
-        What a table's column calls it.
+        Heading of a table column.
     unit : str
-        What follows the number where it is shown alone.
+        Unit after a single value.
     form : str
-        Format of the number in a table.
+        Number format in tables.
     precise : str
-        Format of the number where it is shown alone.
+        Number format for a single value.
     meaning : str
-        One line for documents.
+        One line of explanation for documents.
     compute : callable
-        From :class:`MapFigures` to the number; infinite where it does not exist, None where it
-        says nothing of such a map, which then has none.
+        From :class:`MapFigures` to the value; infinite if it does not exist, None if the metric
+        does not apply to such a map.
     better : "lower" or None
-        Which of two values is better; None where neither is by itself.
+        Which of two values is better; None if neither is by itself.
     gauge_invariant : bool
-        Whether a Moebius map of the image leaves it as it is, up to the discretisation.
-    shown : "overview", "page" or "record"
-        The shortest kind of table that has a column for it: a run's overview, a surface's page, or
-        only the listing of a single record.
+        Whether a Moebius map of the image leaves it unchanged, up to the discretisation.
+    shown : {"overview", "page", "record"}
+        The shortest kind of table with a column for it: a run's overview, a surface's page, or only
+        the listing of a single record.
 
     """
 
@@ -323,12 +340,12 @@ class Metric:
     shown: Literal["overview", "page", "record"] = "record"
 
     def text(self, value: float | None, *, precise: bool = False) -> str:
-        """Return a recorded value as text; records hold None for what is infinite."""
+        """Return a recorded value as text; records hold None for infinite values."""
         form = self.precise if precise else self.form
         return "inf" if value is None else format(value, form)
 
 
-#: Every figure of a map, in the order of tables: a new one is added here and nowhere else.
+#: All metrics of a map, in the order of tables; a new metric is added here and nowhere else.
 METRICS: tuple[Metric, ...] = (
     Metric(
         "conformal_energy", "conformal energy", "E_C", "", ".4f", ".6f",
@@ -410,12 +427,12 @@ METRICS: tuple[Metric, ...] = (
 
 
 def metrics_shown(*places: str) -> tuple[Metric, ...]:
-    """Return the metrics that tables of these kinds have columns for."""
+    """Return the metrics that have a column in these kinds of tables."""
     return tuple(metric for metric in METRICS if metric.shown in places)
 
 
 def caption(metrics: Mapping[str, float | int | None]) -> str:
-    """Return the figures of an overview in one line, for below a picture."""
+    """Return the overview metrics in one line, as a caption of a picture."""
     shown = (m for m in metrics_shown("overview") if m.name in metrics)
     return "   ".join(
         f"{m.title} {m.text(metrics[m.name])}{f' {m.unit}' if m.unit else ''}" for m in shown
@@ -423,13 +440,13 @@ def caption(metrics: Mapping[str, float | int | None]) -> str:
 
 
 def metrics_markdown() -> str:
-    """Return the table of all metrics for a document."""
+    """Return a Markdown table of all metrics."""
     rows = "\n".join(f"| `{m.name}` | {m.meaning} | {m.unit or '-'} |" for m in METRICS)
     return f"| name | meaning | unit |\n|---|---|---|\n{rows}\n"
 
 
 def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
-    """Name the figures that say nothing: not finite, or an energy below what is possible."""
+    """Return a sentence for each meaningless value: not finite, or an impossible energy."""
     found = [
         f"{name} is {value}, which is not a figure"
         for name, value in metrics.items()
@@ -442,12 +459,34 @@ def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
 
 
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
-    """Return every figure that a record holds, under the record's keys."""
+    """Return all metrics of a map, by their keys in records.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    uv : complex128 (n,)
+        Image of each vertex.
+
+    Returns
+    -------
+    dict of str to float or int
+        The values; metrics that do not apply to the map are left out.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> disk = cembench.surface("flat-disk", 600)
+    >>> found = all_metrics(disk, disk.V[:, 0] + 1j * disk.V[:, 1])
+    >>> abs(found["conformal_energy"]) < 1e-12, found["flipped_triangles"]
+    (True, 0)
+
+    """
     figures = MapFigures(mesh, uv)
     return computed(METRICS, figures)
 
 
 def computed(metrics: Iterable[Metric], figures: MapFigures) -> dict[str, float | int]:
-    """Return the figures that such a map has, by their names."""
+    """Return the metrics that apply to a map, by name."""
     found = ((metric.name, metric.compute(figures)) for metric in metrics)
     return {name: value for name, value in found if value is not None}

@@ -15,7 +15,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Moebius:
-    """The map z -> (a z + b) / (c z + d); a d - b c is not zero."""
+    """The map z -> (a z + b) / (c z + d) with a d - b c not zero."""
 
     a: complex
     b: complex
@@ -23,7 +23,7 @@ class Moebius:
     d: complex
 
     def __call__(self, z: Complex) -> Complex:
-        """Where do finite points z (n,) go? The one at -d / c goes to infinity."""
+        """Return the images of finite points z (n,); -d / c goes to infinity."""
         top, bottom = self.a * z + self.b, self.c * z + self.d
         image = np.full(z.shape, complex(np.inf))
         np.divide(top, bottom, out=image, where=bottom != 0)
@@ -31,12 +31,12 @@ class Moebius:
 
     @property
     def inverse(self) -> Moebius:
-        """The map that undoes this one."""
+        """Return the inverse map."""
         return Moebius(self.d, -self.b, -self.c, self.a)
 
 
 def three_point_map(p: Sequence[complex] | Complex, q: Sequence[complex] | Complex) -> Moebius:
-    """Which Moebius map carries the three finite points p to the three finite points q?
+    """Return the Moebius map that takes three finite points p to three finite points q.
 
     Raises
     ------
@@ -57,4 +57,5 @@ def three_point_map(p: Sequence[complex] | Complex, q: Sequence[complex] | Compl
 
 
 def _to_zero_one_infinity(p: complex, q: complex, r: complex) -> Complex:
+    """Return the matrix of the Moebius map that takes p, q, r to 0, 1, infinity."""
     return np.array([[q - r, -p * (q - r)], [q - p, -r * (q - p)]])

@@ -1,7 +1,7 @@
-"""What closes a hole: triangles to its centroid, or a round disk glued in along its rim.
+"""Patches that close a hole: triangles to its centroid, or a round disk glued in along its rim.
 
-To a Dirichlet problem on the rest of the surface a patch is only the energy that its harmonic
-filling has for given values u on the rim, half of u^T P u: a dense symmetric matrix P (k, k),
+For a Dirichlet problem on the rest of the surface, a patch is only the energy of its harmonic
+filling for values u on the rim, u^T P u / 2, with a dense symmetric matrix P (k, k) that is
 positive semi-definite with the constants as its kernel.
 """
 
@@ -19,12 +19,12 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 Real = NDArray[np.float64]
 Loop = NDArray[np.int64]
 
-#: How many terms of the power series below rounding errors leave, for |x| <= pi.
+#: Number of terms of the power series above rounding errors, for |x| <= pi.
 _TERMS = 28
 
 
 def fan(loop: Loop, centre: int) -> NDArray[np.int64]:
-    """Which triangles fill a hole from its centre? Shape (k, 3), oriented like the surface.
+    """Return the triangles (k, 3) that fill a hole from a centre, oriented like the surface.
 
     `loop` has the surface on its left, as in ``mesh.loops``.
     """
@@ -32,7 +32,7 @@ def fan(loop: Loop, centre: int) -> NDArray[np.int64]:
 
 
 def filled(mesh: TriangleMesh, holes: Sequence[Loop]) -> DiskMesh:
-    """The surface with each hole filled by a fan to its centroid; those vertices come last.
+    """Return the surface with each hole filled by a fan to its centroid; these vertices come last.
 
     Raises
     ------
@@ -47,10 +47,10 @@ def filled(mesh: TriangleMesh, holes: Sequence[Loop]) -> DiskMesh:
 
 
 def fan_patch(rim: Real) -> Real:
-    """P of the fan over a rim (k, 2 or 3), its centre eliminated.
+    """Return P of the fan over a rim (k, 2 or 3), with its centre eliminated.
 
-    Where the centroid lies on the line of an edge, so that angles are not defined, all the fan's
-    edges count alike.
+    If the centroid lies on the line of an edge, so that angles are not defined, all edges of the
+    fan get equal weights.
     """
     k = len(rim)
     V, F = np.concatenate([rim, rim.mean(axis=0, keepdims=True)]), fan(np.arange(k), k)
@@ -65,12 +65,12 @@ def fan_patch(rim: Real) -> Real:
 
 
 def disk_patch(angles: Real) -> Real:
-    """P of a round disk whose rim vertices lie at these angles (k,), increasing within one turn.
+    """Return P of a round disk with rim vertices at these angles (k,), increasing within one turn.
 
-    Exact for values that are linear in the angle between neighbours: with u' constant on arcs,
-    u^T P u = -(1/pi) times the double integral of u'(s) u'(t) log|2 sin((s - t)/2)|, of which a
-    second antiderivative is known (`sum_of_cosines`). Moebius maps of the disk do not change it
-    but for that interpolation.
+    Exact for values that are linear in the angle between neighbours. With u' constant on arcs, u^T
+    P u = -(1/pi) times the double integral of u'(s) u'(t) log abs(2 sin((s - t)/2)), of which a
+    second antiderivative is known (`sum_of_cosines`). Up to that interpolation it is invariant
+    under Moebius maps of the disk.
     """
     ends = np.append(angles, angles[0] + 2 * np.pi)
     table = sum_of_cosines(ends[:, None] - ends[None, :])
@@ -84,10 +84,10 @@ def disk_patch(angles: Real) -> Real:
 
 
 def sum_of_cosines(x: Real) -> Real:
-    """The sum of (cos(k x) - 1) / k^3 over k = 1, 2, ... to rounding errors, also for small x.
+    """Return the sum over k >= 1 of (cos(k x) - 1) / k^3 to rounding errors, also for small x.
 
-    Its second derivative is log|2 sin(x / 2)|: x^2 (log x / 2 - 3 / 4) less a power series in x^2
-    with coefficients |B_2k| / (2k (2k + 2)!), B the Bernoulli numbers.
+    Its second derivative is log abs(2 sin(x / 2)): x^2 (log x / 2 - 3 / 4) minus a power series in
+    x^2 with coefficients abs(B_2k) / (2k (2k + 2)!), B the Bernoulli numbers.
     """
     x = np.abs(x) % (2 * np.pi)
     x = np.minimum(x, 2 * np.pi - x)
@@ -102,7 +102,7 @@ def sum_of_cosines(x: Real) -> Real:
 
 @cache
 def _coefficients() -> Real:
-    """The numbers |B_2k| / (2k (2k + 2)!) for k = 1, 2, ..."""
+    """Return the numbers |B_2k| / (2k (2k + 2)!) for k = 1, 2, ..."""
     from scipy.special import bernoulli, factorial
 
     k = np.arange(1, _TERMS + 1)

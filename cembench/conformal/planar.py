@@ -1,4 +1,4 @@
-"""Small facts about polygons and triangles in the complex plane."""
+"""Functions of polygons and triangles in the complex plane."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ from numpy.typing import NDArray
 
 Complex = NDArray[np.complex128]
 
-#: An area computed in doubles has a certain sign where it exceeds this share of its terms
-#: (Shewchuk 1997, the filter of `orient2d`), and these are not so small that they underflow.
+#: The sign of an area computed in doubles is certain if it exceeds this share of its terms
+#: (Shewchuk 1997, the filter of `orient2d`), and the terms do not underflow.
 CERTAIN = (3 + 16 * 2.0**-53) * 2.0**-53
 UNDERFLOW = 1e-280
-#: An angle between neighbours on the unit circle is known to within this many radians.
+#: Precision of an angle between neighbours on the unit circle, in radians.
 ANGLE_ROUNDING = 4 * float(np.finfo(float).eps)
-#: Crossings of boundaries up to which an overlap is measured; how many numbers are held for it.
+#: Most boundary crossings for which an overlap is computed; size of its buffers.
 MOST_CROSSINGS, AT_ONCE = 20_000, 2_000_000
 
 
 def polygon_area(z: Complex) -> float:
-    """What area does a closed polygon enclose (Eq. 8)? Positive when counter-clockwise."""
-    w = z - z[0]  # far from the origin the products would cancel
+    """Return the area inside a closed polygon (Eq. 8); positive if counter-clockwise."""
+    w = z - z[0]  # far from the origin the products would suffer from cancellation
     return 0.5 * float(np.imag(np.conj(w) * np.roll(w, -1)).sum())
 
 
 def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
-    """What area has each triangle's image? Shape (m,); positive when counter-clockwise."""
+    """Return the area of each triangle's image, shape (m,); positive if counter-clockwise."""
     a, b, c = (uv[F[:, k]] for k in range(3))
     return 0.5 * np.imag(np.conj(b - a) * (c - a))
 
 
 def folded_triangles(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the triangles whose image has no positive area, judged by its exact sign."""
+    """Return the triangles whose image has no positive area, by its exact sign."""
     return np.flatnonzero(orientations(uv, F) <= 0)
 
 
 def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
     """Return the exact sign of each triangle's image area: 1, 0 or -1, shape (m,).
 
-    Exact for the given doubles: where rounding could hide the sign, whole numbers decide. A corner
-    that is NaN or infinite gives 0.
+    Exact for the given doubles: if rounding could hide the sign, integer arithmetic decides. A
+    corner that is NaN or infinite gives 0.
     """
     a, b, c = (uv[F[:, k]] for k in range(3))
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
@@ -49,7 +49,7 @@ def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
         area, terms = left - right, np.abs(left) + np.abs(right)
         certain = (np.abs(area) > CERTAIN * terms) & (terms > UNDERFLOW) & np.isfinite(terms)
     signs = np.sign(np.where(certain, area, 0)).astype(np.int8)
-    # Differences of doubles are zero only where these are equal: such products are exact.
+    # A difference of doubles is zero only if they are equal: such products are exact.
     flat = ((p.real == 0) | (q.imag == 0)) & ((p.imag == 0) | (q.real == 0))
     open_ = np.flatnonzero(~certain & ~flat & np.isfinite(uv)[F].all(axis=1))
     signs[open_] = _exact_orientations(a[open_], b[open_], c[open_])
@@ -57,7 +57,7 @@ def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
 
 
 def _exact_orientations(a: Complex, b: Complex, c: Complex) -> NDArray[np.int8]:
-    """Return the signs in whole numbers: each triangle scaled by a power of two."""
+    """Return the signs by integer arithmetic, scaling each triangle by a power of two."""
     parts = np.stack([a.real, a.imag, b.real, b.imag, c.real, c.imag])
     mantissa, exponent = np.frexp(parts)
     whole = np.ldexp(mantissa, 53).astype(np.int64).astype(object)
@@ -68,12 +68,12 @@ def _exact_orientations(a: Complex, b: Complex, c: Complex) -> NDArray[np.int8]:
 
 
 def turns(z: Complex) -> tuple[int, int, int]:
-    """Return how a loop of points goes round the origin.
+    """Return how a loop of points goes around the origin.
 
-    The first number is how many turns the arcs make if each is taken counter-clockwise: 1 where the
-    points go round once and in order. The others tell why it is more: how often the polygon winds
-    round the origin, and how many arcs go backward. Neighbours whose angles differ by no more than
-    rounding are in order.
+    The first number counts turns if each arc is taken counter-clockwise: 1 if the points go around
+    once and in order. The others explain a larger number: the winding number of the polygon, and
+    the number of arcs that run backward. Neighbours whose angles differ only by rounding are in
+    order.
     """
     arcs = np.angle(np.roll(z, -1) * np.conj(z))
     backward = arcs < -ANGLE_ROUNDING
@@ -83,14 +83,14 @@ def turns(z: Complex) -> tuple[int, int, int]:
 
 
 def backward_arcs(f_b: Complex) -> int:
-    """How many arcs between consecutive points of a loop do not run counter-clockwise about 0?"""
+    """Return the number of arcs of a loop that do not run counter-clockwise about 0."""
     return int(np.count_nonzero(~(np.imag(np.conj(f_b) * np.roll(f_b, -1)) > 0)))
 
 
 def fitted_circle(z: Complex) -> tuple[complex, float]:
-    """Which circle lies closest to these points? Centre and radius, algebraic least squares (Kasa).
+    """Return centre and radius of the circle closest to points (least squares, Kasa).
 
-    Radius NaN where the points do not determine a circle.
+    The radius is NaN if the points do not determine a circle.
     """
     if not np.isfinite(z).all():
         return complex("nan"), float("nan")
@@ -109,12 +109,12 @@ def fitted_circle(z: Complex) -> tuple[complex, float]:
 
 
 def crossing_polygons(curves: Sequence[Complex]) -> tuple[int, int] | None:
-    """Return two closed polygons that cross or touch each other; None where there are none.
+    """Return two closed polygons that cross or touch each other; None if there are none.
 
-    Two equal numbers for a polygon that crosses or touches itself; a point that is repeated in a
-    row counts once.
+    Two equal indices mean a polygon that crosses or touches itself. Consecutive equal points count
+    once.
     """
-    import shapely  # here: every measured process would wait for it
+    import shapely  # imported here: every measured process would wait for it
 
     rings = [shapely.linearrings(np.stack([z.real, z.imag], axis=1)) for z in curves]
     for k in np.flatnonzero(~shapely.is_simple(rings)):
@@ -126,12 +126,12 @@ def crossing_polygons(curves: Sequence[Complex]) -> tuple[int, int] | None:
 
 
 def overlap_share(curves: Sequence[Complex]) -> float:
-    """Return what share of a region lies over other parts of it, by its boundary alone.
+    """Return the share of a region that lies over other parts of it, from its boundary alone.
 
-    The curves are the closed polygons that bound the region, holes clockwise. A place that they go
-    round w times is covered w times, if nothing is folded: of these, w - 1 are too many. The share
-    is their area over the area of all layers; 0 where the curves do not cross, infinite where
-    they cross more than :data:`MOST_CROSSINGS` times or enclose nothing.
+    The curves are the closed polygons that bound the region, holes clockwise. Without folds, a
+    point with winding number w is covered w times, of which w - 1 are too many. The share is the
+    area of these over the area of all layers; 0 if the curves do not cross, infinite if they cross
+    more than :data:`MOST_CROSSINGS` times or enclose nothing.
 
     Examples
     --------
@@ -167,9 +167,9 @@ def overlap_share(curves: Sequence[Complex]) -> float:
 
 
 def windings(points: Complex, starts: Complex, ends: Complex) -> NDArray[np.int64]:
-    """How often do closed curves go counter-clockwise round points (k,)?
+    """Return the winding numbers of closed curves around points (k,).
 
-    The curves are given by their sides, from `starts` to `ends` (b,); no point lies on one.
+    The curves are given by their sides, from `starts` to `ends` (b,); no point lies on a side.
     """
     found = np.empty(len(points), dtype=np.int64)
     step = max(1, AT_ONCE // len(starts))

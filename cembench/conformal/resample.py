@@ -1,8 +1,8 @@
-"""A surface sampled through its map: geometry images, and meshes with equilateral triangles.
+"""Resample a surface through its map: geometry images, and meshes with equilateral triangles.
 
-Both need points of the plane found on the surface. A conformal map keeps small shapes, so squares
+Both locate points of the plane on the surface. A conformal map preserves small shapes, so squares
 and equilateral triangles of the plane are nearly squares and equilateral on the surface; their
-sizes follow the map's scaling.
+sizes follow the scaling of the map.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 Grid = Literal["square", "disk"]
 
-#: Samples along a side that are allowed.
+#: Allowed numbers of samples along a side.
 LEAST, MOST = 4, 8192
-#: A map lies on the disk if its boundary is this close to the unit circle.
+#: Allowed distance of a disk map's boundary from the unit circle.
 _ON_CIRCLE = 1e-9
 
 
@@ -40,8 +40,9 @@ def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "squa
     side : int
         Samples along a side of the grid, 4 to 8192.
     grid : {"square", "disk"}
-        ``"square"`` maps the disk to the square, conformally but for the corners, so that all of
-        the grid is surface; only for maps onto the disk. ``"disk"`` lays the grid over the map.
+        ``"square"`` maps the disk to the square, conformally except at the corners, so that the
+        surface covers the whole grid; only for maps onto the disk. ``"disk"`` lays the grid over
+        the map.
 
     Returns
     -------
@@ -51,7 +52,7 @@ def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "squa
     Raises
     ------
     ParameterError
-        The side is out of its range, or the map is not onto the disk.
+        The side is out of range, or the map is not onto the disk.
 
     References
     ----------
@@ -77,11 +78,11 @@ def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "squa
 
 
 def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh, Complex]:
-    """Mesh a surface anew with triangles that are equilateral on its disk.
+    """Remesh a surface with triangles that are equilateral on its disk.
 
-    A triangular lattice of the disk, and points at even distances on its circle, are joined by a
-    Delaunay triangulation (Qhull) and lifted to the surface. Where the map shrinks the surface, the
-    new triangles are large: a lattice of the disk cannot be even on the surface too.
+    A triangular lattice in the disk and evenly spaced points on its circle are joined by a Delaunay
+    triangulation (Qhull) and lifted to the surface. The new triangles are large where the map
+    shrinks the surface: a lattice that is even on the disk cannot be even on the surface too.
 
     Parameters
     ----------
@@ -97,12 +98,12 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh,
     mesh : DiskMesh
         The new mesh; its vertices lie on triangles of the old one.
     z : complex128 (k,)
-        Where they lie on the disk.
+        Their positions in the disk.
 
     Raises
     ------
     ParameterError
-        The side is out of its range, or the map is not onto the disk.
+        The side is out of range, or the map is not onto the disk.
 
     """
     _check_side(side)
@@ -133,8 +134,8 @@ def locate(z: Complex, F: Ints, points: Complex, *, nearest: bool = False) -> tu
     points : complex128 (k,)
         Points of the plane.
     nearest : bool
-        Whether a point outside is moved to the nearest triangle, as on the thin caps between the
-        boundary's polygon and the circle.
+        Whether to move a point outside to the nearest triangle, e.g. on the thin caps between the
+        boundary polygon and the circle.
 
     Returns
     -------
@@ -160,7 +161,7 @@ def locate(z: Complex, F: Ints, points: Complex, *, nearest: bool = False) -> tu
 
 
 def square_to_disk(w: Complex) -> Complex:
-    """Map the square with corners (+-1, +-1) to the unit disk, conformally; the middle stays.
+    """Map the square with corners (+-1, +-1) conformally to the unit disk; the centre stays.
 
     The map is an elliptic function of modulus 1/sqrt(2) [1]_; corners go to the diagonals.
 
@@ -178,6 +179,7 @@ def square_to_disk(w: Complex) -> Complex:
 
 
 def _weights(corners: Complex, points: Complex) -> Real:
+    """Return the barycentric coordinates of points, clipped to the triangle."""
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     p = points - a
     area = (np.conj(u) * v).imag
@@ -188,11 +190,13 @@ def _weights(corners: Complex, points: Complex) -> Real:
 
 
 def _check_side(side: int) -> None:
+    """Raise :class:`ParameterError` for a side out of range."""
     if not LEAST <= side <= MOST:
         raise ParameterError(f"the side is {side}; allowed: {LEAST} to {MOST} samples.")
 
 
 def _check_disk(mesh: TriangleMesh, z: Complex) -> None:
+    """Raise :class:`ParameterError` for a map that is not onto the disk."""
     if len(mesh.loops) == 1:
         off = float(np.abs(np.abs(z[mesh.loops[0]]) - 1).max())
         if off <= _ON_CIRCLE:
@@ -202,5 +206,5 @@ def _check_disk(mesh: TriangleMesh, z: Complex) -> None:
         why = f"the surface has {len(mesh.loops)} boundaries"
     raise ParameterError(
         f"the map of {mesh.name} is not onto the disk: {why}. Use an algorithm whose target is the "
-        "disk, as direct-cem on a surface with one boundary."
+        "disk, such as direct-cem on a surface with one boundary."
     )

@@ -17,7 +17,7 @@ Pole = Literal["north", "south"]
 
 
 def to_plane(S: NDArray[np.float64], pole: Pole = "north") -> Complex:
-    """Where do points S (n, 3) go when projected from a pole? Shape (n,); infinite at the pole."""
+    """Project points S (n, 3) of the sphere from a pole; (n,), infinite at the pole."""
     distance = 1 - S[:, 2] if pole == "north" else 1 + S[:, 2]
     z = np.full(len(S), complex(np.inf))
     np.divide(S[:, 0] + 1j * S[:, 1], distance, out=z, where=distance != 0)
@@ -25,7 +25,7 @@ def to_plane(S: NDArray[np.float64], pole: Pole = "north") -> Complex:
 
 
 def to_sphere(z: Complex, pole: Pole = "north") -> NDArray[np.float64]:
-    """Which points of the sphere are projected to z (n,)? Shape (n, 3); the pole to infinity."""
+    """Return the points (n, 3) of the sphere that project to z (n,); infinity gives the pole."""
     modulus = np.abs(z)
     far = modulus > 1
     # The larger of |z| and 1 / |z| is never squared, so nothing overflows.

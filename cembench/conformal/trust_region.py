@@ -17,10 +17,10 @@ Linear = Callable[[Real], Real]
 
 @dataclass(frozen=True)
 class Step:
-    """A step p, what a quadratic model promises of it, its length, and how far CG got.
+    """A step p, its predicted decrease, its length and the number of products.
 
-    `decrease` is -(g p + p H p / 2) > 0; `length` is the norm |p|_M of the preconditioner M;
-    `at_edge` tells whether the trust region's radius cut it short.
+    `decrease` is -(g p + p H p / 2) > 0; `length` is the norm of p in the preconditioner M;
+    `at_edge` is whether the trust region's radius cut it short.
     """
 
     p: Real
@@ -39,22 +39,23 @@ def newton_step(
     accuracy: float,
     most: int = 200,
 ) -> Step:
-    """Which p with |p|_M <= radius makes g p + p H p / 2 small?
+    """Return a step p of norm at most `radius` that makes g p + p H p / 2 small.
 
     Parameters
     ----------
-    g : (N,)
+    g : float (N,)
         Gradient; not zero.
     uphill : float (N,)
         M^-1 g.
-    hessian, precondition : functions (N,) -> (N,)
-        H p, symmetric, and M^-1 r, symmetric positive definite (on a subspace: p stays in it).
+    hessian, precondition : callable
+        Map (N,) to H p, symmetric, and to M^-1 r, symmetric positive definite (on a subspace, in
+        which p then lies).
     radius : float
-        Of the trust region, in the norm of M.
+        Radius of the trust region in the norm of M.
     accuracy : float
-        CG ends when the residual's norm, of M^-1, is this share of the gradient's.
+        CG ends if the residual's norm in M^-1 is this share of the gradient's.
     most : int
-        Products with H, at most.
+        Maximal number of products with H.
 
     """
     p, Hp = np.zeros_like(g), np.zeros_like(g)

@@ -1,12 +1,12 @@
-"""Patches of a planar map laid out without folds while everything around them is held.
+"""Lay out patches of a planar map without folds, with everything around them fixed.
 
-With the map of a triangle of the surface written as f_z and f_zbar, let N = |f_z|^2 + |f_zbar|^2
-and D = |f_z|^2 - |f_zbar|^2, its Jacobian, both in units of the local N. Minimised is
+For the map of a triangle with derivatives f_z and f_zbar, let ``N = |f_z|^2 + |f_zbar|^2``, and let
+``D = |f_z|^2 - |f_zbar|^2`` be its Jacobian, both in units of the local N. The objective is::
 
-    the mean of 2 |f_zbar|^2 + BARRIER (N + AREA) / chi(D), chi(D) = (D + sqrt(D^2 + eps^2)) / 2.
+    the mean of 2 |f_zbar|^2 + BARRIER (N + AREA) / chi(D), chi(D) = (D + sqrt(D^2 + eps^2)) / 2
 
-The first part is the density of the conformal energy, so that what is not folded hardly changes.
-The second one is a barrier against folds; chi is positive everywhere, which makes it finite for a
+The first term is the density of the conformal energy, so that unfolded parts hardly change. The
+second term is a barrier against folds. chi is positive everywhere, so the barrier is finite for a
 folded map, and eps goes to 0 while the folds disappear: Garanzha, Kaporin, Kudryavtseva, Protais,
 Ray and Sokolov, "Foldover-free maps in 50 lines of code", ACM Trans. Graph. 40 (2021). Steps are
 Newton's with the positive semi-definite part of the Hessian: N / chi is convex where chi is linear.
@@ -30,17 +30,17 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
-#: Newton steps at most; five to thirty are enough where it succeeds.
+#: Maximal number of Newton steps; five to thirty are enough if it succeeds.
 STEPS = 60
-#: Weight of the barrier: the smaller, the less E_C rises, but below 0.01 the last folds resist.
+#: Weight of the barrier: a smaller one raises E_C less, but below 0.01 the last folds remain.
 BARRIER = 0.05
-#: Weight of pure area in it: without it a patch may shrink to a point instead of unfolding.
+#: Weight of the area in it: without it a patch may shrink to a point instead of unfolding.
 AREA = 0.1
-#: eps starts here, in units of the local N; a step makes it smaller by no more than this factor.
+#: Initial eps in units of the local N; a step reduces it by at most this factor.
 FIRST, DECAY = 0.1, 0.7
-#: eps never falls below this share of the depth of the deepest fold, nor below the last figure.
+#: eps stays above this share of the depth of the deepest fold, and above the last value.
 DEPTH, LAST = 0.2, 1e-9
-#: A patch has settled when a step promises to lower its energy by less than this share.
+#: A patch has converged if the predicted relative decrease of its energy is below this.
 SETTLED = 0.1
 #: Added to the scaled Hessian, whose diagonal is 1.
 REGULAR = 1e-10
@@ -49,7 +49,7 @@ REGULAR = 1e-10
 def untangled(
     mesh: TriangleMesh, z: Complex, free: NDArray[np.bool_], graph: sparse.csr_array
 ) -> tuple[Complex, Indices]:
-    """Lay out the free vertices of a planar map without folds, if that can be found.
+    """Lay out the free vertices of a planar map without folds, if possible.
 
     Parameters
     ----------
@@ -58,17 +58,17 @@ def untangled(
     z : complex (n,)
         Its map.
     free : bool (n,)
-        Which vertices may move. Those that share edges make up a patch; patches do not see each
-        other.
+        Which vertices may move. Free vertices that share edges form a patch; patches are
+        independent.
     graph : sparse (n, n)
         Which vertices share an edge.
 
     Returns
     -------
     z : complex (n,)
-        The map, its free vertices moved; a patch may still be folded.
+        The map with its free vertices moved; a patch may still be folded.
     patch : int64 (m,)
-        To which patch each triangle belongs, -1 for those without a free vertex.
+        The patch of each triangle; -1 for triangles without a free vertex.
 
     """
     patches = _Patches(mesh, z, free, graph)
@@ -80,7 +80,7 @@ def untangled(
         try:
             step, slope = patches.newton_step(moving, eps)
         except NotPositiveDefinite:
-            break  # beyond what doubles resolve; the caller counts the folds that are left
+            break  # beyond the resolution of doubles; the caller counts the remaining folds
         moving, energy = patches.line_search(moving, step, slope, eps)
         if ((patches.least(moving) > 0) & (-slope < SETTLED * energy)).all():
             break
@@ -92,8 +92,8 @@ def untangled(
 class _Patches:
     """The energy of all patches at once, and its derivatives, as functions of their vertices.
 
-    Rows of `corners` are the triangles' corners as places among the moving vertices, -1 for a
-    corner that is held.
+    Rows of `corners` are the triangles' corners as indices of moving vertices, -1 for a fixed
+    corner.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class _Patches:
         self._held = z[T]
         to_z, to_zbar, area = _derivatives(mesh.V, T)
         self._to_z, self._to_zbar = to_z, to_zbar
-        # Sizes differ by orders of magnitude within a patch: N is measured in its local mean.
+        # Sizes vary by orders of magnitude within a patch, so N is scaled by its local mean.
         f_z, f_zbar = self._maps(z[self.vertices])
         size = np.repeat(np.abs(f_z) ** 2 + np.abs(f_zbar) ** 2, 3)
         at_vertices = np.bincount(T.ravel(), size) / np.maximum(np.bincount(T.ravel()), 1)
@@ -128,13 +128,13 @@ class _Patches:
         self._share = weight / self._sums(weight)[self._of]
 
     def _sums(self, values: Real) -> Real:
-        """Sum over the triangles of each patch."""
+        """Return the sums over the triangles of each patch."""
         return np.bincount(self._of, values, self.count).astype(np.float64)
 
     def _maps(self, moving: Complex) -> tuple[Complex, Complex]:
         """Return f_z and f_zbar of every triangle."""
         u = np.where(self._corners < 0, self._held, moving[self._corners])
-        u -= u[:, :1]  # what lies close together is subtracted exactly
+        u -= u[:, :1]  # nearby points are subtracted exactly
         return (self._to_z * u).sum(axis=1), (self._to_zbar * u).sum(axis=1)
 
     def least(self, moving: Complex) -> Real:
@@ -226,10 +226,11 @@ def _real_row(c: Complex) -> Real:
 
 
 def _hessian_of_square(c: Complex) -> Real:
-    """Return the second derivative of |c du|^2 by real and imaginary parts of du."""
+    """Return the second derivative of |c du|^2 in the real and imaginary parts of du."""
     C = 2 * _outer(np.conj(c), c)
     return np.asarray(np.block([[C.real, -C.imag], [C.imag, C.real]]), dtype=np.float64)
 
 
 def _outer(a: NDArray[Any], b: NDArray[Any]) -> NDArray[Any]:
+    """Return the outer products of the rows of a and b."""
     return a[:, :, None] * b[:, None, :]

@@ -1,1 +1,1 @@
-"""What everything else stands on: errors, the clock, whole files, what an algorithm returns."""
+"""Basics that every other room uses: errors, the phase clock, atomic files, return types."""

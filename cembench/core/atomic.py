@@ -1,8 +1,8 @@
-"""Files that are whole or not there: everything that the project writes to stay is written here.
+"""Atomic writes: a file is complete or absent. Everything the project keeps is written here.
 
-A draft beside the place takes the content. It is flushed to disk, checked, and only then given its
-name; whatever fails leaves what was there. The name of a draft says which file it is for and which
-process writes it, so that the next one to write the same file clears away what a kill left.
+The content goes to a draft in the same folder. The draft is flushed to disk, checked and then
+renamed; if anything fails, the previous file stays. A draft's name holds the name of its file and
+the process that writes it, so that the next writer of that file can delete what a kill left behind.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from cembench.core.names import digest
 M = TypeVar("M", bound=BaseModel)
 
 _DRAFT = re.compile(r"\.draft-([0-9a-f]{12})-(\d+)-[0-9a-f]{32}(\.\w+)?")
-#: Drafts of runs that were made before drafts said whose they are.
+#: Drafts from older versions, whose names do not hold a process.
 _OLDER_DRAFT = re.compile(r"\.draft-[0-9a-f]{32}")
-#: What the system says when no more fits: then another folder on the same disk is no remedy.
+#: Error codes of a full disk or quota: another folder on the same disk would not help.
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def read_model(path: Path, model: type[M]) -> M:
-    """Read what :func:`write_model` wrote; :class:`RecordError` says which file is damaged."""
+    """Read what :func:`write_model` wrote; a :class:`RecordError` names a damaged file."""
     noun = model.__name__.lower()
     return read_json(path, TypeAdapter(model), f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}")
 
@@ -51,12 +51,12 @@ def write_bytes(
     error: type[CembenchError] = RecordError,
     parents: bool = True,
 ) -> None:
-    """Write content; as :func:`write`."""
+    """Write bytes to a file; options as for :func:`write`."""
     write(path, lambda file: file.write(content), error=error, parents=parents)
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write text as UTF-8, with escapes for what is no character, as in names of files."""
+    """Write text as UTF-8; lone surrogates, as in file names, become escapes."""
     write_bytes(path, text.encode(errors="backslashreplace"))
 
 
@@ -68,9 +68,9 @@ def write(
     error: type[CembenchError] = RecordError,
     parents: bool = True,
 ) -> None:
-    """Let `fill` write to a file that was opened for it; as :func:`write_by` in all else.
+    """Write a file atomically by calling `fill` with it opened; options as for :func:`write_by`.
 
-    All bytes must have arrived, also where a library that `fill` calls drops an error.
+    The size is checked afterwards, because a library that `fill` calls may drop an error.
     """
     write_by(path, lambda draft: _fill(draft, fill), check=check, error=error, parents=parents)
 
@@ -83,27 +83,27 @@ def write_by(
     error: type[CembenchError] = RecordError,
     parents: bool = True,
 ) -> None:
-    """Let `make` write a draft, flush it to disk, check it, and only then give it its name.
+    """Write a file atomically: `make` writes a draft, which is flushed, checked and renamed.
 
-    Who may read it is up to the user's umask, as for any file.
+    The file's permissions follow the user's umask.
 
     Parameters
     ----------
     path : Path
-        The file. One that is there is replaced; a symbolic link is replaced and not followed.
-    make : function of a path
-        Writes the draft; for libraries that open their files themselves.
-    check : function of a path
-        Raises OSError where the draft does not hold what it should.
+        The file. An existing one is replaced; a symbolic link is replaced, not followed.
+    make : callable
+        Writes the draft at the path it is given; for libraries that open their files themselves.
+    check : callable
+        Raises OSError if the draft at the path it is given is incomplete.
     error : class
-        What is raised where the file cannot be written.
+        Raised if the file cannot be written.
     parents : bool
-        Whether folders that are missing are made.
+        Whether to create missing parent folders.
 
     Raises
     ------
     `error`
-        The disk is full, or the place cannot be written to.
+        The disk is full, or the folder is not writable.
 
     """
     try:
@@ -127,9 +127,9 @@ def write_by(
 
 @contextmanager
 def draft_folder(path: Path) -> Iterator[Path]:
-    """Give an empty folder beside a file or folder, for what will be moved there; gone at the end.
+    """Yield an empty folder beside `path` to prepare content in; it is deleted at the end.
 
-    Raises OSError where it cannot be made.
+    Raises OSError if it cannot be created.
     """
     draft = _new_draft(path, "")
     draft.mkdir()
@@ -140,9 +140,9 @@ def draft_folder(path: Path) -> Iterator[Path]:
 
 
 def clear_drafts(folder: Path, of: Path | None = None) -> None:
-    """Delete the drafts in a folder whose processes have ended; only those `of` one file, if given.
+    """Delete drafts in a folder whose processes have ended; only those `of` one file, if given.
 
-    Without `of` the folder must be one that we made: older drafts are deleted by their names alone.
+    Without `of` the folder must be one of ours, since older drafts are recognised by name alone.
     """
     for path in folder.glob(".draft-*"):
         named = _DRAFT.fullmatch(path.name)
@@ -158,26 +158,26 @@ def clear_drafts(folder: Path, of: Path | None = None) -> None:
 
 
 def is_draft(path: Path) -> bool:
-    """Whether a file has the name of a draft."""
+    """Whether a path has the name of a draft."""
     return bool(_DRAFT.fullmatch(path.name) or _OLDER_DRAFT.fullmatch(path.name))
 
 
 def unwritable(
     path: Path, error: OSError, kind: type[CembenchError] = RecordError
 ) -> CembenchError:
-    """Return the error to raise for a file that could not be written."""
+    """Return the error for a file that could not be written."""
     remedy = (
-        "Make room there, or choose a place on another disk."
+        "Free some space, or choose a path on another disk."
         if error.errno in _FULL
-        else "Choose another place."
+        else "Choose another path."
     )
     return kind(f"{path} cannot be written: {error.strerror or error}. {remedy}")
 
 
 def flush_folder(folder: Path) -> None:
-    """Let new names in a folder reach the disk too, where the system can do that.
+    """Flush the names in a folder to disk, where the system supports that.
 
-    Without it a power cut, unlike a kill, can take back the last files that :func:`write` named.
+    Without it a power cut, unlike a kill, can lose the last files that :func:`write` renamed.
     """
     if os.name != "posix":
         return
@@ -189,7 +189,7 @@ def flush_folder(folder: Path) -> None:
 
 
 def _new_draft(path: Path, suffix: str) -> Path:
-    """Return a path beside `path` that nothing has; drafts that a kill left of it are cleared."""
+    """Return an unused draft path for `path`, after deleting drafts that a kill left of it."""
     clear_drafts(path.parent, of=path)
     suffix = suffix if re.fullmatch(r"\.\w{1,20}", suffix) else ""
     name = f".draft-{digest(path.name)[:12]}-{os.getpid()}-{uuid.uuid4().hex}{suffix}"
@@ -197,12 +197,14 @@ def _new_draft(path: Path, suffix: str) -> Path:
 
 
 def _runs(pid: int) -> bool:
-    import psutil  # here, as it is needed only where something was left
+    """Whether a process with this id is running."""
+    import psutil  # imported here: needed only if a draft was left behind
 
     return bool(psutil.pid_exists(pid))
 
 
 def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
+    """Write a draft by `fill`, and raise its first disk error even if `fill` drops it."""
     opened = draft.open("xb")
     file = _Draft(opened)
     try:
@@ -210,7 +212,7 @@ def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
             fill(cast(BinaryIO, file))
         except Exception:
             if file.failure is None:
-                raise  # not the disk
+                raise  # not an error of the disk
         if file.failure is not None:
             raise file.failure
         opened.flush()
@@ -218,17 +220,17 @@ def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
         if arrived != file.end:
             raise OSError(errno.EIO, f"{arrived} of {file.end} bytes arrived")
     finally:
-        with suppress(OSError):  # what was said before counts
-            file.close()  # or it would be closed when it is deleted, and find `opened` closed
+        with suppress(OSError):  # the first error counts
+            file.close()  # otherwise its deletion would close `opened` a second time
         with suppress(OSError):
             opened.close()
 
 
 class _Draft(io.BufferedIOBase):
-    """A file that keeps the first error and from then on takes whatever it is given.
+    """A file that keeps its first error and silently accepts all further writes.
 
-    Libraries drop errors, or meet the next one while they tidy up after the first: a ZIP archive,
-    for one, is completed when it is deleted, where nobody can catch anything.
+    Libraries drop errors, or raise further ones while they clean up after the first. A ZIP archive,
+    for example, is completed when it is deleted, where no exception can be caught.
     """
 
     def __init__(self, file: BinaryIO) -> None:

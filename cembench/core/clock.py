@@ -1,8 +1,8 @@
-"""Where does the time go? Phases of a measured call, exclusive of the phases nested in them.
+"""Where does the time go? Phases of a timed call, each exclusive of the phases nested in it.
 
-A kernel marks what it does with ``with phase("factorisation"):``. Outside a measurement that costs
-a dictionary look-up and nothing is kept; inside :func:`measure` the seconds of all phases, with the
-remainder under ``"other"``, add up to the total.
+A kernel marks its work with ``with phase("factorisation"):``. Outside a measurement that costs one
+dictionary look-up. Inside :func:`measure` the seconds of all phases, with the remainder as
+``"other"``, add up to the total.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from typing import TypeVar
 
 T = TypeVar("T")
 
-#: Name under which time is booked that no phase claims.
+#: Phase for time that no other phase claims.
 OTHER = "other"
 
 
 @dataclass
 class _Ledger:
+    """The seconds of each phase, and the stack of open phases."""
+
     seconds: dict[str, float] = field(default_factory=dict)
     stack: list[str] = field(default_factory=lambda: [OTHER])
     since: float = field(default_factory=perf_counter)
@@ -29,7 +31,7 @@ class _Ledger:
     def book(self, clock: Callable[[], float] = perf_counter) -> None:
         """Credit the time since the last change to the phase on top of the stack.
 
-        The clock is bound here, so whoever puts another in its place in a module changes nothing.
+        The clock is bound here, so replacing it in a module has no effect.
         """
         now = clock()
         name = self.stack[-1]
@@ -42,7 +44,7 @@ _ledger: ContextVar[_Ledger | None] = ContextVar("cembench_ledger", default=None
 
 @dataclass(frozen=True)
 class Timing:
-    """Wall-clock seconds of one call: the total, and by phase (they add up to the total)."""
+    """Wall-clock seconds of one call: the total, and by phase (the phases add up to the total)."""
 
     total: float
     phases: dict[str, float]
@@ -50,7 +52,29 @@ class Timing:
 
 @contextmanager
 def phase(name: str) -> Iterator[None]:
-    """Book the enclosed time under `name`, less what nested phases claim for themselves."""
+    """Credit the enclosed time to the phase `name`, less what nested phases claim.
+
+    Parameters
+    ----------
+    name : str
+        The phase, such as "laplacian", "factorisation" or "solve".
+
+    Yields
+    ------
+    None
+        Control, while the time is credited.
+
+    Examples
+    --------
+    >>> import time
+    >>> def call():
+    ...     with phase("solve"):
+    ...         time.sleep(0.001)
+    >>> _, timing = measure(call)
+    >>> sorted(timing.phases)
+    ['other', 'solve']
+
+    """
     ledger = _ledger.get()
     if ledger is None:
         yield
@@ -65,7 +89,7 @@ def phase(name: str) -> Iterator[None]:
 
 
 def measure(call: Callable[[], T], clock: Callable[[], float] = perf_counter) -> tuple[T, Timing]:
-    """Call once: what does it return, and how long does each of its phases take?"""
+    """Call once; return the result and the seconds of the call, by phase."""
     ledger = _Ledger()
     token = _ledger.set(ledger)
     try:

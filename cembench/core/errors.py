@@ -1,60 +1,146 @@
-"""Every error that cembench raises on purpose; all derive from :class:`CembenchError`.
+"""The errors that cembench raises on purpose. All derive from :class:`CembenchError`.
 
-A message says what is wrong, where, what is allowed and what to do about it.
+A message names what is wrong, where, what is allowed and what to do.
 """
 
 
 class CembenchError(Exception):
-    """Base of all errors whose message is written for the user."""
+    """Base class of all errors whose message is written for the user.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> try:
+    ...     cembench.surface("no-such-surface")
+    ... except cembench.CembenchError as error:
+    ...     print(type(error).__name__)
+    RegistryError
+
+    """
 
 
 class MeshError(CembenchError):
-    """A mesh, or the file that should hold one, cannot be used."""
+    """A mesh, or the file it is read from, cannot be used.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.DiskMesh([[0, 0]], [[0, 0, 0]])
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.MeshError: vertices have shape (1, 2); allowed is (n, 3), a row per vertex.
+
+    """
 
 
 class RegistryError(CembenchError):
-    """An algorithm or surface is unknown, declared twice, or declared wrongly."""
+    """An algorithm or surface is unknown, declared twice, or declared wrongly.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.surface("no-such-surface")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.RegistryError: unknown surface 'no-such-surface'; known: ...
+
+    """
 
 
 class ParameterError(CembenchError):
-    """A parameter has an unknown name, or a value outside its range."""
+    """A parameter has an unknown name or a value outside its range.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.surface("cone", 600, angle=120)  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.ParameterError: cone: angle=120 is not allowed: ... (default 30.0).
+
+    """
 
 
 class RecordError(CembenchError):
-    """A run directory, or a record in it, cannot be read or written."""
+    """A run folder, or a record in it, cannot be read or written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from cembench.core.loading import read_bytes
+    >>> read_bytes(Path("nowhere.json"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.RecordError: 'nowhere.json' cannot be read: ...
+
+    """
 
 
 class DatasetError(CembenchError):
-    """A real mesh is unknown, cannot be fetched, or is not what its checksum says."""
+    """A dataset is unknown, cannot be fetched, or does not match its checksum."""
 
 
 class AlgorithmFailed(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
-    """An algorithm gave up; the message is the cause."""
+    """An algorithm could not compute a map; the message gives the cause.
+
+    Solvers raise it themselves. The harness records it as the status of that run.
+
+    Examples
+    --------
+    >>> from cembench import AlgorithmFailed
+    >>> raise AlgorithmFailed("the boundary is too crowded")
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.AlgorithmFailed: the boundary is too crowded
+
+    """
 
 
 class NotThere(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
-    """What an algorithm needs is not on this machine; the message says what, and what brings it."""
+    """A program or library that an algorithm needs is missing; the message says how to get it."""
 
 
 class NotPositiveDefinite(AlgorithmFailed):
-    """A Cholesky factorisation met a pivot that is not positive."""
+    """A Cholesky factorisation met a pivot that is not positive.
+
+    Examples
+    --------
+    >>> from scipy import sparse
+    >>> from cembench.linear_algebra.cholesky import Cholesky
+    >>> Cholesky(-sparse.eye_array(2, format="csc"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.NotPositiveDefinite: the matrix of order 2 is not positive definite ...
+
+    """
 
 
 class RenderError(CembenchError):
-    """A picture cannot be drawn or written."""
+    """A picture cannot be drawn or written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from cembench.drawing.texture import read_texture
+    >>> read_texture(Path("nowhere.png"))  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    ...
+    cembench.core.errors.RenderError: the texture nowhere.png cannot be read: ...
+
+    """
 
 
-#: The longest text that is kept of an exception, in characters.
+#: Longest exception text that is kept, in characters.
 LONGEST_MESSAGE = 2_000
 
 
 def said_by(error: BaseException) -> str:
-    """Return an exception's type and message, of bounded length."""
+    """Return the type and message of an exception, cut to a bounded length."""
     return shortened(f"{type(error).__name__}: {message_of(error)}")
 
 
 def message_of(error: BaseException) -> str:
-    """Return the message of an exception, even of one that cannot say it."""
+    """Return the message of an exception, even if its ``__str__`` raises."""
     try:
         return str(error)
     except BaseException as another:
@@ -62,7 +148,7 @@ def message_of(error: BaseException) -> str:
 
 
 def shortened(text: str, length: int = LONGEST_MESSAGE) -> str:
-    """Return a text of at most this length, cut in the middle, without what UTF-8 cannot hold."""
+    """Return a text of at most `length` characters, cut in the middle, that UTF-8 can encode."""
     if len(text) > length:
         half = (length - 5) // 2
         text = f"{text[:half]} ... {text[-half:]}"

@@ -1,8 +1,8 @@
-"""Libraries that only some uses need: which extra of the package brings each.
+"""Optional libraries, and the extra of the package that installs each.
 
-The default installation has what mapping, measuring and looking at surfaces need. What reports,
-stand-ins, films and the like need beyond it comes with an extra, and is asked for here when it is
-needed, so that one that is missing is named with the command that brings it.
+The default installation can map, measure and inspect surfaces. Reports, stand-ins, films and the
+like need more libraries, which come with extras. They are checked here when they are needed, so
+that the error for a missing one names the command that installs it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cembench.core.errors import CembenchError
 
 
 class Extra(StrEnum):
-    """What can be installed beside the default: ``pip install 'cembench[NAME]'``."""
+    """An optional set of libraries: ``pip install 'cembench[NAME]'``."""
 
     FETCH = "fetch"
     FORMATS = "formats"
@@ -28,7 +28,7 @@ class Extra(StrEnum):
     XATLAS = "xatlas"
 
 
-#: The modules that each extra brings.
+#: The modules that each extra installs.
 MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.FETCH: ("pooch", "requests"),
     Extra.FORMATS: ("OpenEXR", "meshio", "nibabel", "trimesh"),
@@ -43,7 +43,25 @@ MODULES: Mapping[Extra, tuple[str, ...]] = {
 
 
 class MissingExtra(CembenchError):  # noqa: N818 - what is not there, as the message says
-    """A library is not installed that this use needs; `extra` says which extra brings it."""
+    """An optional library is not installed; `extra` names the extra that installs it.
+
+    Parameters
+    ----------
+    extra : Extra
+        The extra that installs the library.
+    purpose : str
+        What needs it, as the message begins: "a report".
+    missing : sequence of str
+        The modules that are not installed.
+
+    Examples
+    --------
+    >>> from cembench import MissingExtra
+    >>> error = MissingExtra(Extra.TABLES, "a table", ["pandas"])
+    >>> error.extra
+    <Extra.TABLES: 'tables'>
+
+    """
 
     def __init__(self, extra: Extra, purpose: str, missing: list[str]) -> None:
         self.extra = extra
@@ -54,7 +72,7 @@ class MissingExtra(CembenchError):  # noqa: N818 - what is not there, as the mes
 
 
 def command(extra: Extra) -> str:
-    """Return the command that brings an extra.
+    """Return the command that installs an extra.
 
     >>> command(Extra.VIDEO)
     "pip install 'cembench[video]'"
@@ -63,26 +81,26 @@ def command(extra: Extra) -> str:
 
 
 def missing(extra: Extra, *modules: str) -> list[str]:
-    """Return which of an extra's modules are not installed; of all, or of those named."""
+    """Return the modules of an extra that are not installed; of all, or of those named."""
     return [name for name in modules or MODULES[extra] if find_spec(name) is None]
 
 
 def require(extra: Extra, purpose: str, *modules: str) -> None:
-    """Check that an extra is installed, before work is done in vain.
+    """Check that an extra is installed, before any work is done.
 
     Parameters
     ----------
     extra : Extra
-        What brings the modules.
+        The extra that installs the modules.
     purpose : str
         What needs them, as the message begins: "a report".
     *modules : str
-        Those that are needed, where that is not all of the extra.
+        The modules that are needed (default: all of the extra).
 
     Raises
     ------
     MissingExtra
-        One is not installed.
+        A module is not installed.
 
     Examples
     --------

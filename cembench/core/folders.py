@@ -1,7 +1,7 @@
-"""Folders that cembench makes, known by a marker: a file that says so.
+"""Folders that cembench creates, recognised by a marker file.
 
-Nothing is written into a folder with other files in it, unless it has a marker. A marker of a
-report also says, by their hashes, which files are the report's; only those are replaced or deleted.
+Nothing is written into a folder that holds other files, unless it has a marker. The marker of a
+report also lists the report's files with their hashes; only those are replaced or deleted.
 """
 
 from __future__ import annotations
@@ -18,50 +18,50 @@ from pydantic import BaseModel, Field, ValidationError
 from cembench.core.atomic import is_draft, unwritable, write_text
 from cembench.core.errors import RecordError
 
-#: What a folder of ours can be.
+#: Kinds of folders that cembench creates.
 Kind = Literal["run", "report", "validation"]
-#: The marker's name.
+#: Name of the marker file.
 MARKERS: dict[Kind, str] = {
     "run": "cembench.json",
     "report": "contents.json",
     "validation": "cembench.json",
 }
-#: So many names of files in the way are told.
+#: At most this many conflicting files are named in a message.
 _NAMED = 3
 
 
 class Marker(BaseModel):
-    """What a folder is; the fields that its kind does not need are None."""
+    """The kind of a folder and its files; fields that a kind does not use are None."""
 
     project: Literal["cembench"] = "cembench"
     kind: Kind
     schema_version: Literal[1] = 1
     made_at: str | None = None
-    #: A part of the names of what is only there for a while, so that nobody else has such names.
+    #: Random part of the names of temporary files, so that no other process uses them.
     token: str | None = Field(default=None, pattern=r"^[0-9a-f]{32}$")
-    #: SHA-256 of the files that we wrote, by their paths in the folder; while they are being
-    #: replaced, of the old and of the new one.
+    #: SHA-256 of the files that we wrote, by path in the folder; while a file is being replaced,
+    #: both the old and the new hash.
     files: dict[str, tuple[str, ...]] | None = None
 
 
 def check(
     folder: Path, kind: Kind, is_older: Callable[[Path], bool] = lambda folder: False
 ) -> Marker | None:
-    """Return the marker of a folder, or None where it may get one; nothing is changed.
+    """Return the marker of a folder, or None if it may get one; change nothing.
 
     Parameters
     ----------
     folder : Path
-        A folder of this kind, an empty one, or one that is not there.
+        A folder of this kind, an empty folder, or one that does not exist.
     kind : str
-        What it is to be.
-    is_older : function of a folder
-        Whether it is of this kind, made before there were markers.
+        The kind of folder that is needed.
+    is_older : callable
+        Whether the folder it is given is of this kind, made before markers existed.
 
     Raises
     ------
     RecordError
-        A file, or a folder that holds other files.
+        The path is a file, or a folder that holds other files.
 
     """
     if folder.exists() and not folder.is_dir():
@@ -77,7 +77,7 @@ def check(
         raise RecordError(f"{folder} cannot be read: {error.strerror or error}.") from error
     held = ", ".join(others[:_NAMED]) + (", ..." if len(others) > _NAMED else "")
     raise RecordError(
-        f"{folder} is not a {kind} of cembench, and not empty: it holds {held}. Nothing was "
+        f"{folder} is not empty and not a {kind} of cembench: it holds {held}. Nothing was "
         f"changed. Name a new or empty folder with -o, or the folder of an earlier {kind}."
     )
 
@@ -85,7 +85,7 @@ def check(
 def claim(
     folder: Path, kind: Kind, is_older: Callable[[Path], bool] = lambda folder: False
 ) -> Marker:
-    """Make a folder ours, as :func:`check` allows, and return its marker."""
+    """Mark a folder as ours if :func:`check` allows it, and return the marker."""
     found = check(folder, kind, is_older)
     if found is not None:
         return found
@@ -96,15 +96,15 @@ def claim(
 
 
 def publish(draft: Path, folder: Path, kind: Kind) -> None:
-    """Move all files of a draft into a folder of ours; delete those of before that it has not.
+    """Move all files of a draft into a folder of ours; delete earlier files that it lacks.
 
-    Files that we did not write, or that somebody has changed since, are left alone.
+    Files that we did not write, or that were changed since, are left alone.
 
     Raises
     ------
     RecordError
-        The folder is not ours, or such a file is where one of the draft belongs: then nothing is
-        changed. Or the folder cannot be written to.
+        The folder is not ours, or a foreign or changed file has the name of a draft's file (nothing
+        is changed then), or the folder cannot be written to.
 
     """
     marker = check(folder, kind) or Marker(kind=kind)
@@ -135,11 +135,12 @@ def publish(draft: Path, folder: Path, kind: Kind) -> None:
 
 
 def is_link_or_not_folder(path: Path) -> bool:
-    """Whether something is at a path that is not a folder, or only leads to one."""
+    """Whether a path exists and is a symbolic link or not a folder."""
     return path.is_symlink() or (path.exists() and not path.is_dir())
 
 
 def _may_be_replaced(folder: Path, name: str, before: dict[str, tuple[str, ...]]) -> bool:
+    """Whether a name in a folder is free, or holds a file as we wrote it."""
     above = [folder / parent for parent in PurePosixPath(name).parents if parent.name]
     if any(is_link_or_not_folder(parent) for parent in above):
         return False
@@ -148,23 +149,24 @@ def _may_be_replaced(folder: Path, name: str, before: dict[str, tuple[str, ...]]
 
 
 def _is_unchanged(folder: Path, name: str, before: dict[str, tuple[str, ...]]) -> bool:
-    """Whether a file is still what we wrote; a name that leads out of the folder never is."""
+    """Whether a file is still as we wrote it; never for a name that leads out of the folder."""
     path = folder / name
     own = path.resolve() == folder.resolve() / name and ".." not in PurePosixPath(name).parts
     return own and path.is_file() and _sha256(path) in before.get(name, ())
 
 
 def _is_passing(path: Path) -> bool:
-    """Whether a file says nothing of its folder: a draft, or the lock of a run that just began."""
+    """Whether a file is temporary: a draft, or the lock of a run that has just begun."""
     return is_draft(path) or (path.name == "lock" and is_empty_file(path))
 
 
 def is_empty_file(path: Path) -> bool:
-    """Whether this is a regular file of no bytes, as the lock of a run is."""
+    """Whether a path is an empty regular file, as the lock of a run is."""
     return not path.is_symlink() and path.is_file() and path.stat().st_size == 0
 
 
 def _read(folder: Path, kind: Kind) -> Marker:
+    """Return the marker of a folder of this kind; :class:`RecordError` if there is none."""
     path = folder / MARKERS[kind]
     try:
         if path.is_symlink() or not path.is_file():
@@ -175,8 +177,8 @@ def _read(folder: Path, kind: Kind) -> Marker:
     if marker is None or marker.kind != kind or (kind != "report" and marker.token is None):
         what = f"says that this is a {marker.kind}" if marker else "was not written by cembench"
         raise RecordError(
-            f"{path} {what}, so {folder} is not taken for a {kind}; or an older cembench wrote it. "
-            "Nothing was changed. Name a new or empty folder with -o, or delete this one."
+            f"{path} {what}, so {folder} is not accepted as a {kind}; an older cembench may have "
+            "written it. Nothing was changed. Name a new folder with -o, or delete this one."
         )
     return marker
 

@@ -1,7 +1,7 @@
-"""Read files that anybody may have changed: whatever is wrong with one is a :class:`RecordError`.
+"""Read files that may have been changed by others; every defect is a :class:`RecordError`.
 
-Nothing is taken on trust. What is not a regular file is not opened (a FIFO would block for ever),
-an array is read only if its header announces no more than memory can hold, and pickles never.
+Nothing is trusted. Only regular files are opened (a FIFO would block forever), an array is read
+only if its header declares no more than memory can hold, and pickles are never loaded.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ REMEDY = "Delete it and run again."
 
 
 def damaged(path: Path, what: str, why: object) -> RecordError:
-    """Return the error for a file that does not hold what it should."""
+    """Return the error for a file with unexpected content."""
     return RecordError(f"{path} is not {what}: {why}. {REMEDY}")
 
 
-#: What asking the system for a file raises; ValueError for a name that no file can have.
+#: Errors of file system calls; ValueError is raised for an impossible file name.
 _REFUSED = (OSError, ValueError)
 
 
 def unreadable(path: Path, error: Exception) -> RecordError:
-    """Return the error for what the system does not let us read."""
+    """Return the error for a file or folder that the system refuses to read."""
     why = getattr(error, "strerror", None) or error
     return RecordError(f"{str(path)!r} cannot be read: {why}. Check its name and permissions.")
 
@@ -49,7 +49,7 @@ def read_bytes(path: Path) -> bytes:
     Raises
     ------
     RecordError
-        It is missing, is not a file, or may not be read.
+        The file is missing, is not a regular file, or may not be read.
 
     """
     try:
@@ -61,12 +61,12 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_json(path: Path, schema: TypeAdapter[T], what: str) -> T:
-    """Return what a JSON file holds; `what` names it in the message ("a record").
+    """Return the validated content of a JSON file; `what` names it in messages ("a record").
 
     Raises
     ------
     RecordError
-        As :func:`read_bytes`, or the content does not fit the schema.
+        As for :func:`read_bytes`, or the content does not fit the schema.
 
     """
     content = read_bytes(path)
@@ -79,12 +79,12 @@ def read_json(path: Path, schema: TypeAdapter[T], what: str) -> T:
 
 
 def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """Return these arrays of an ``.npz`` archive.
+    """Return the named arrays of an ``.npz`` archive.
 
     Raises
     ------
     RecordError
-        It is missing, damaged, lacks one of them, or holds one that memory could not take.
+        The archive is missing or damaged, lacks an array, or declares one that exceeds memory.
 
     """
     try:
@@ -102,22 +102,24 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
 
 
 def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Return one array of an archive, after comparing its header with its size and with memory."""
     member = archive.getinfo(f"{name}.npy")
     with archive.open(member) as file:
         shape, dtype = _header(file)
         announced = math.prod(shape) * dtype.itemsize
         if dtype.hasobject:
-            raise ValueError(f"{name} is pickled, which is never read")
+            raise ValueError(f"{name} is pickled; pickles are never read")
         if file.tell() + announced != member.file_size:
-            raise ValueError(f"{name} announces {announced:,} bytes and has another number")
+            raise ValueError(f"{name} declares {announced:,} bytes but has another number")
         if announced > psutil.virtual_memory().available:
-            raise ValueError(f"{name} announces {announced:,} bytes, more than memory can hold")
+            raise ValueError(f"{name} declares {announced:,} bytes, more than memory can hold")
     with archive.open(member) as file:
         array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
         return array
 
 
 def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Return the shape and type that the header of an ``.npy`` file declares."""
     version = npy.read_magic(file)
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, _, dtype = read(file)
@@ -125,12 +127,12 @@ def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
 
 
 def files_in(folder: Path, pattern: str) -> list[Path]:
-    """Return what lies in a folder under names that match, in order; nothing where it is missing.
+    """Return the paths in a folder whose names match, sorted; none if the folder is missing.
 
     Raises
     ------
     RecordError
-        It is not a folder, or may not be listed (``Path.glob`` would find nothing, silently).
+        It is not a folder, or cannot be listed (``Path.glob`` would silently find nothing).
 
     """
     try:
@@ -143,12 +145,12 @@ def files_in(folder: Path, pattern: str) -> list[Path]:
 
 
 def is_there(path: Path) -> bool:
-    """Whether something lies at this path; a folder that may not be searched is an error.
+    """Whether a path exists; an unsearchable parent folder is an error.
 
     Raises
     ------
     RecordError
-        The system does not tell (``Path.exists`` would say no, or raise).
+        The system does not answer (``Path.exists`` would return False, or raise).
 
     """
     try:

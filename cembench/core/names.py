@@ -1,7 +1,7 @@
-"""File names out of names that anybody may have chosen: of meshes, algorithms, exhibits, machines.
+"""Safe file names from names that anyone may have chosen: of meshes, algorithms, machines.
 
-A name is data: it may hold slashes or bytes that are no text, be longer than a file system allows,
-or be reserved on some system. Every name that becomes a part of a path goes through this module.
+A name is data. It may hold slashes or bytes that are not text, be longer than a file system allows,
+or be reserved on some system. Every name that becomes part of a path goes through this module.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import hashlib
 import re
 from collections.abc import Mapping
 
-#: Bytes of a file name that every common file system allows are 255; two names and a key share it.
+#: Common file systems allow 255 bytes per file name; two names and a key share them.
 LONGEST = 100
-#: Digits of the hash that stands for what a file name cannot hold.
+#: Digits of the hash that replaces what a file name cannot hold.
 DIGITS = 12
 
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*]')
@@ -21,7 +21,7 @@ _MADE_HERE = re.compile(rf"~[0-9a-f]{{{DIGITS}}}$")
 
 
 def printable(name: str) -> str:
-    r"""Return a name with what cannot be printed as escapes; bytes that are not UTF-8 too.
+    r"""Return a name with unprintable characters, and bytes that are not UTF-8, as escapes.
 
     >>> printable("caf\udce9"), printable("one\ntwo"), printable("ß")
     ('caf\\udce9', 'one\\ntwo', 'ß')
@@ -30,9 +30,9 @@ def printable(name: str) -> str:
 
 
 def file_name(name: str, longest: int = LONGEST) -> str:
-    """Return a name for a file or folder: `name` itself where every system takes it.
+    """Return a name for a file or folder: `name` itself if every system accepts it.
 
-    Otherwise what is left of it, with a hash, so that different names give different files. The
+    Otherwise its usable part plus a hash, so that different names give different files. The
     result never leads out of its folder and has at most `longest` bytes.
 
     >>> file_name("face (1)"), file_name("../x")
@@ -45,7 +45,7 @@ def file_name(name: str, longest: int = LONGEST) -> str:
 
 
 def slug(name: str, longest: int = LONGEST) -> str:
-    """Return a name of small letters, digits and hyphens alone, of at most `longest` characters.
+    """Return a name of lower-case letters, digits and hyphens, of at most `longest` characters.
 
     Different names may have the same slug: see :func:`distinct_slugs`.
 
@@ -59,7 +59,7 @@ def slug(name: str, longest: int = LONGEST) -> str:
 
 
 def distinct_slugs(names: Mapping[str, str]) -> dict[str, str]:
-    """Return a slug for each name, no two the same; keys are hashes that tell equal names apart.
+    """Return a unique slug for each name; keys are hashes that distinguish equal names.
 
     >>> distinct_slugs({"12ab": "A b", "34cd": "a-b", "56ef": "c"})
     {'12ab': 'a-b-12ab', '34cd': 'a-b-34cd', '56ef': 'c'}
@@ -77,11 +77,12 @@ def distinct_slugs(names: Mapping[str, str]) -> dict[str, str]:
 
 
 def digest(name: str) -> str:
-    """Return the SHA-256 of a name, in hexadecimal digits."""
+    """Return the SHA-256 of a name as hexadecimal digits."""
     return hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
 
 
 def _is_ordinary(name: str, longest: int) -> bool:
+    """Whether every common system accepts a name as a file name."""
     return (
         0 < len(name.encode("utf-8", "surrogatepass")) <= longest
         and name.isprintable()

@@ -1,6 +1,7 @@
-"""What the user should know of a mesh or a map that is no fault: a kind for programs, a text.
+"""Notices: what the user should know about a mesh or map that is not an error.
 
-Whoever decides something decides on the kind; the texts are free to be reworded.
+Each has a kind, for programs, and a text, for people. Code decides on the kind alone, so texts can
+be reworded.
 """
 
 from __future__ import annotations
@@ -11,50 +12,50 @@ from enum import StrEnum
 
 
 class NoticeKind(StrEnum):
-    """What a notice is about."""
+    """The subject of a notice."""
 
-    # Of a file, or of a mesh.
-    #: Lines of a file that its format does not know were ignored.
+    # About a file or a mesh.
+    #: Lines that the file format does not define were ignored.
     LINES_IGNORED = "lines_ignored"
     POLYGONS_CUT = "polygons_cut"
-    #: Two arrays of a file were taken for vertices and triangles, because they fit.
+    #: Two arrays of a file were used as vertices and triangles, because they fit.
     ARRAYS_GUESSED = "arrays_guessed"
-    #: Something was mended on request.
+    #: The mesh was repaired on request.
     REPAIRED = "repaired"
     CUT_OPEN = "cut_open"
     ORIENTATION_REPAIRED = "orientation_repaired"
-    #: Triangles so thin that cotangents lose digits.
+    #: Triangles are so thin that their cotangents lose digits.
     SLIVERS = "slivers"
     #: The mesh is not well-conditioned in the sense of the paper's Definition 1.
     DEFINITION_1 = "definition_1"
-    #: A surface was remeshed without the filter that its generator prefers.
+    #: The surface was remeshed without its generator's preferred filter.
     REMESHED_WITHOUT_FILTER = "remeshed_without_filter"
 
-    # Of a map, or of its measurement.
+    # About a map or its measurement.
     IMAGE_OVERLAPS = "image_overlaps"
     HOLES_NOT_CIRCULAR = "holes_not_circular"
-    #: A figure is not finite, or only rounding can have made it.
+    #: A metric is not finite, or is dominated by rounding.
     LOST_IN_ROUNDING = "lost_in_rounding"
-    #: Triangles fold in a file, because it holds fewer digits than the map needs.
+    #: Triangles fold in the file, which holds fewer digits than the map needs.
     FOLDED_BY_ROUNDING = "folded_by_rounding"
     #: The iteration ended early, because the boundary is too crowded for it.
     CROWDED_BOUNDARY = "crowded_boundary"
     FAR_FROM_CONFORMAL = "far_from_conformal"
-    #: Timed calls returned other bits than the checked one.
+    #: Timed calls returned a different result than the checked call.
     NOT_DETERMINISTIC = "not_deterministic"
     PROCESSES_LEFT = "processes_left"
-    #: The first call of a process took far longer than the later ones.
+    #: The first call of a process took much longer than the later ones.
     COLD_FIRST_CALL = "cold_first_call"
-    #: What is to be known of the seconds of an external program.
+    #: How the seconds of an external program were measured.
     PROGRAM_SECONDS = "program_seconds"
 
-    #: Anything else, as in records that hold no kinds.
+    #: Anything else, e.g. from records without kinds.
     OTHER = "other"
 
 
 @dataclass(frozen=True)
 class Notice:
-    """A notice; printing it prints its text."""
+    """A notice with its kind; ``str`` gives its text."""
 
     kind: NoticeKind
     text: str
@@ -69,9 +70,9 @@ def of_kind(kind: NoticeKind, notices: Iterable[Notice]) -> tuple[Notice, ...]:
 
 
 def notice_of_old(text: str) -> Notice:
-    """Return the notice that a file holds as a plain text, as all did before there were kinds.
+    """Return the notice for a plain text, as files written before notices had kinds hold it.
 
-    This is the one place that looks at the wording of a message, and only at wording of that time.
+    This is the only place that looks at the wording of a message, and only at the old wording.
     """
     breaks_definition_1 = text.startswith("Definition 1")
     return Notice(NoticeKind.DEFINITION_1 if breaks_definition_1 else NoticeKind.OTHER, text)

@@ -1,4 +1,4 @@
-"""What an algorithm returns."""
+"""The types that algorithms return."""
 
 from __future__ import annotations
 
@@ -19,14 +19,22 @@ class Parameterization:
         Image of each vertex. Triangles that are counter-clockwise on the surface are
         counter-clockwise in the plane.
     iterations : int
-        Iterations that were run; 0 for a direct method.
+        Number of iterations; 0 for a direct method.
     energy_history : tuple of float
-        E_C (Eq. 7) of the start and after each iteration; empty for a direct method.
+        E_C (Eq. 7) at the start and after each iteration; empty for a direct method.
     extras : dict
-        Whatever else the algorithm has to tell; values that JSON can hold. Where the energies are
-        of another kind, ``energy_of`` says of which; ``stopped: "crowded"`` says that an iteration
-        ended early because the boundary is too crowded, and ``fold_repairs`` counts the solves that
-        laid folds flat: the harness then names this where the angles are bad.
+        Further results as JSON values. The harness knows some keys: ``energy_of`` names the kind of
+        energy if it is not E_C, ``stopped: "crowded"`` marks an iteration that ended early because
+        the boundary is too crowded, and ``fold_repairs`` counts the solves that repaired folds. The
+        last two are reported where the angles are bad.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> disk = cembench.surface("flat-disk", 600)
+    >>> map_of_itself = cembench.Parameterization(disk.V[:, 0] + 1j * disk.V[:, 1])
+    >>> map_of_itself.uv.shape == (disk.n,)
+    True
 
     """
 
@@ -38,15 +46,21 @@ class Parameterization:
 
 @dataclass(frozen=True)
 class Atlas:
-    """A map of a surface that was cut into islands: a point for each corner of a triangle.
+    """A map of a surface cut into islands, with one image point per triangle corner.
 
     Parameters
     ----------
     corners : complex128 (m, 3)
-        Image of each triangle's corners. Two triangles hang together at an edge where the images
-        of its ends are the same numbers in both.
+        Image of each triangle's corners. Two triangles are joined at an edge if both triangles
+        have exactly the same image points at its ends.
     extras : dict
         As in :class:`Parameterization`.
+
+    Examples
+    --------
+    >>> import cembench, numpy as np
+    >>> cembench.Atlas(np.array([[0, 1, 1j], [1, 1 + 1j, 1j]])).corners.shape
+    (2, 3)
 
     """
 
@@ -56,22 +70,29 @@ class Atlas:
 
 @dataclass(frozen=True)
 class MapStep:
-    """One step of a method that opens one boundary at a time, as pictures and tables show it.
+    """One step of a method that opens one boundary at a time, for pictures and tables.
 
     Parameters
     ----------
     sweep : int
-        Counted from 1.
+        Number of the sweep, from 1.
     boundary : int
-        The boundary that became a circle: 0 the outer one, then the holes, longest first.
+        The boundary that became a circle: 0 is the outer one, then the holes, longest first.
     before : complex128 (n,) or None
-        The image that the step started from; None where that was the surface itself.
+        The image before the step; None if the step started from the surface itself.
     uv : complex128 (n,)
         The image after the step.
     energies : tuple of float
         E_C before and after each iteration within the step.
     result : complex128 (n,) or None
-        The finished map if the method ended here; only after the last step of a sweep.
+        The finished map if the method ended here; set only for the last step of a sweep.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> from cembench.algorithms.koebe_cem.steps import shown_steps
+    >>> [step.boundary for step in shown_steps(cembench.surface("catenoid-ring", 400))]
+    [1, 0]
 
     """
 

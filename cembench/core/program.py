@@ -1,4 +1,4 @@
-"""What an external program or a foreign library promises, by which it is an algorithm here."""
+"""Declarations of external programs and libraries that run as algorithms."""
 
 from __future__ import annotations
 
@@ -11,25 +11,25 @@ from pathlib import Path
 
 from cembench.core.errors import RegistryError
 
-#: Formats that a program can read its mesh from, and those that it can leave UVs in.
+#: Formats of the mesh that a program reads, and of the UVs that it writes.
 INPUTS = (".obj", ".off", ".ply", ".mat", ".npz")
 OUTPUTS = (".obj", ".off", ".ply", ".mat", ".npz", ".txt")
-#: Names that a command may use besides its parameters.
+#: Placeholders that a command may use besides its parameters.
 PLACES = ("input", "output", "folder", "threads")
 _PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
-#: What a pattern's group may be called, and how many seconds one of it is.
+#: Names that a pattern's group may have, and the seconds in one unit of each.
 UNITS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 
 @dataclass(frozen=True)
 class Library:
-    """A library of others that an algorithm calls in its own process."""
+    """A third-party library that an algorithm calls in its own process."""
 
-    #: What is imported.
+    #: Name of the module that is imported.
     module: str
-    #: Under which name its version is known.
+    #: Name of the distribution, for its version.
     package: str
-    #: As :attr:`Program.circle`, for one that computes in single precision.
+    #: As :attr:`Program.circle`, for a library that computes in single precision.
     circle: float = 1e-9
 
 
@@ -40,27 +40,27 @@ class Program:
     Parameters
     ----------
     command : tuple of str
-        Its words; ``{input}``, ``{output}``, ``{folder}``, ``{threads}`` and the parameters' names
-        in braces are filled in. No shell reads them.
+        The command's words. ``{input}``, ``{output}``, ``{folder}``, ``{threads}`` and parameter
+        names in braces are filled in. No shell is involved.
     input : str
-        Format of the mesh file, as ".obj".
+        Format of the mesh file, e.g. ".obj".
     output : str
-        Format of the file with UVs, as ".obj"; or its name, for a program that chooses it itself.
+        Format of the file with UVs, e.g. ".obj"; or its file name, if the program chooses it.
     seconds : str
-        A regular expression that finds the program's own solve time in what it prints; the last hit
-        counts. Its group holds seconds, or is called ``ms`` or ``us``. Empty: it prints none.
+        A regular expression that finds the program's own solve time in its output; the last match
+        counts. Its group holds seconds, or is named ``ms`` or ``us``. Empty: none is printed.
     version : tuple of str
-        A command whose first line of output is the program's version. Empty: not known.
+        A command whose first line of output is the program's version. Empty: unknown.
     circle : float
-        How far off the unit circle the boundary of a disk may lie: a program that writes few digits
-        cannot do better. Wider than the 1e-9 of our own only where this says so.
+        Allowed distance of a disk's boundary from the unit circle, for a program that writes few
+        digits. The default is that of built-in algorithms, 1e-9.
     fit : bool
-        Whether the image is first moved and scaled until its outer boundary lies on the unit
-        circle: for programs that put the disk into the unit square.
+        Whether to first shift and scale the image until its outer boundary lies on the unit circle,
+        for programs that place the disk in the unit square.
     flat : bool
-        Whether the file holds the flattened surface, the UVs being x and y of its vertices.
+        Whether the file holds the flattened surface; its x and y are then the UVs.
     remedy : str
-        What brings the program to a machine that lacks it.
+        How to install the program.
 
     """
 
@@ -76,37 +76,37 @@ class Program:
 
     @property
     def output_format(self) -> str:
-        """The suffix of the file that it writes."""
+        """The suffix of the output file."""
         return Path(self.output_name).suffix.lower()
 
     @property
     def output_name(self) -> str:
-        """What the file that it writes is called."""
+        """The name of the output file."""
         return self.output if self.names_its_file else f"uv{self.output}"
 
     @property
     def names_its_file(self) -> bool:
-        """Whether the program itself chooses what its file is called."""
+        """Whether the program itself chooses the name of its output file."""
         return re.fullmatch(r"\.\w+", self.output) is None
 
     def words(self, values: Mapping[str, object]) -> list[str]:
-        """Fill in the command."""
+        """Return the command with its placeholders filled in."""
         return [_PLACEHOLDER.sub(lambda m: str(values[m[1]]), word) for word in self.command]
 
     def __str__(self) -> str:
-        """The command with the names of files, not where they lie on this machine."""
+        """Return the command with file names instead of full paths."""
         shown = (Path(w).name if Path(w).is_absolute() else w for w in self.command)
         return " ".join(w if _PLACEHOLDER.fullmatch(w) else shlex.quote(w) for w in shown)
 
 
 def checked_program(name: str, program: Program, parameters: Iterable[str]) -> Program:
-    """Return a declaration that can be right.
+    """Return a program's declaration after checking it.
 
     Raises
     ------
     RegistryError
-        An empty command, one that does not say where the mesh goes, an unknown name in braces, an
-        unknown format, or a pattern that is none.
+        The command is empty, does not name the mesh file or has an unknown placeholder; a format is
+        unknown; or the pattern is not a valid regular expression.
 
     """
     allowed = (*PLACES, *parameters)
@@ -122,8 +122,8 @@ def checked_program(name: str, program: Program, parameters: Iterable[str]) -> P
         wrong = "its command does not say where the mesh file goes; write {input} there"
     elif not program.names_its_file and not {"output", "folder"} & set(used):
         wrong = (
-            "its command does not say where the UVs go; write {output} there, or name the file "
-            "that it writes as its output"
+            "its command does not say where the UVs go; write {output} there, or give the "
+            "name of the file that it writes as output"
         )
     elif program.input not in INPUTS:
         wrong = f"input {program.input!r} is unknown; allowed: {', '.join(INPUTS)}"
@@ -140,6 +140,7 @@ def checked_program(name: str, program: Program, parameters: Iterable[str]) -> P
 
 
 def _wrong_pattern(pattern: str) -> str:
+    """Return what is wrong with the pattern of a solve time; empty if nothing is."""
     try:
         groups = re.compile(pattern)
     except re.error as error:
@@ -156,8 +157,7 @@ def _wrong_pattern(pattern: str) -> str:
 def of_matlab_function(file: Path) -> dict[str, str]:
     """Return the declaration of a MATLAB function ``uv = f(V, F)`` in a file, F counted from 1.
 
-    Octave runs it, or MATLAB where there is no Octave. The solve time is that of the function
-    alone.
+    Octave runs it, or MATLAB if Octave is missing. The solve time is that of the function alone.
     """
     octave = next((name for name in ("octave-cli", "octave") if shutil.which(name)), "")
     code = (
@@ -179,14 +179,14 @@ def of_matlab_function(file: Path) -> dict[str, str]:
 
 
 def found_words(command: str, folder: Path) -> tuple[str, ...]:
-    """Split a command into words; files of this folder become absolute paths.
+    """Split a command into words and make files of `folder` absolute paths.
 
-    A program runs in a folder of its own, where relative paths would lead nowhere.
+    A program runs in a folder of its own, where relative paths would not resolve.
 
     Raises
     ------
     RegistryError
-        An open quotation mark.
+        A quotation mark is not closed.
 
     """
     try:
@@ -197,6 +197,7 @@ def found_words(command: str, folder: Path) -> tuple[str, ...]:
 
 
 def _absolute(word: str, folder: Path) -> str:
+    """Return a word as an absolute path if it names a file in this folder."""
     try:
         is_file = not _PLACEHOLDER.search(word) and (folder / word).is_file()
     except (OSError, ValueError):

@@ -1,1 +1,1 @@
-"""Pictures of a surface and of its map."""
+"""Pictures of surfaces and their maps."""

@@ -1,4 +1,4 @@
-"""From where should a surface be looked at? The same mesh always gets the same answer."""
+"""The default view of a surface; it depends on the mesh alone."""
 
 from __future__ import annotations
 
@@ -10,32 +10,32 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
-#: From where to look if y points up, and if z does: faces look along +z then, and along -y.
+#: Viewing directions if y is up, and if z is up: faces look along +z, and along -y.
 Y_UP, Z_UP = np.stack([Z, X, -Z, -X]), np.stack([-Y, X, Y, -X])
-#: ... and if nothing tells what points up.
+#: ... and if the up direction is unknown.
 ANY = np.stack([Z, Y, X, -Z, -Y, -X])
-#: From the first of these unless another one shows this many times its area.
+#: The first of these is taken unless another shows this many times its area.
 HABIT = 1.5
-#: Below this share of net to total area a surface is nearly closed: it stands on its cut, or hangs
-#: from it, if the cut's middle is this far (share of the size) from its own ...
+#: Below this ratio of net to total area a surface is nearly closed: it stands on its cut, or hangs
+#: from it, if the centre of the cut is this far (share of the size) from its own ...
 CLOSED, APART = 0.25, 0.08
-#: ... and does so along one of y and z if it is this many times farther there than along the other.
+#: ... and does so along y or z if the distance there is this many times that along the other.
 LEANING = 1.5
-#: Above this share of net to total area a surface is a relief, seen obliquely from above ...
+#: Above this ratio of net to total area a surface is a relief, seen obliquely from above ...
 RELIEF = 0.7
-#: ... and above this one it is flat, and seen straight on.
+#: ... and above this one it is flat, and seen face on.
 FLAT = 0.999
-#: Degrees by which the viewer moves to the right and upwards, so that depth can be read.
+#: Degrees by which the viewer moves right and up, to make depth visible.
 PORTRAIT, OBLIQUE = (14.0, 8.0), (12.0, -42.0)
-#: Cells across in the estimate of what hides what, and the most triangles that it looks at.
+#: Grid cells across in the estimate of hidden area, and the most triangles that it samples.
 CELLS, SAMPLE = 48, 100_000
 
 
 def view_rotation(mesh: TriangleMesh) -> Real:
-    """Which rotation brings the surface before the viewer?
+    """Return the rotation that turns a surface towards the viewer.
 
-    The viewer stands on a coordinate axis that shows much of the surface, moved a little aside. Up
-    is y, or z for what is cut along z: a bust that stands on its cut, a foot cut at the ankle.
+    The viewer looks along a coordinate axis that shows much of the surface, moved slightly aside.
+    Up is y, or z for a surface cut along z: a bust that stands on its cut, a foot cut at the ankle.
 
     Returns
     -------
@@ -56,10 +56,10 @@ def view_rotation(mesh: TriangleMesh) -> Real:
 
 
 def viewpoints(mesh: TriangleMesh) -> dict[str, Real]:
-    """How does one look at the surface from the front, from the side and three-quarter?
+    """Return the rotations for the front, side and three-quarter views of a surface.
 
-    Rotations as in :func:`view_rotation`; the front is the coordinate axis that shows most, the
-    side a quarter turn to the viewer's right about the vertical.
+    Rotations as in :func:`view_rotation`. The front is along the coordinate axis that shows most;
+    the side view is a quarter turn to the viewer's right about the vertical.
     """
     front = _front(mesh)
     angles = {"front": 0.0, "three-quarter": 45.0, "side": 90.0}
@@ -67,7 +67,7 @@ def viewpoints(mesh: TriangleMesh) -> dict[str, Real]:
 
 
 def _front(mesh: TriangleMesh) -> Real:
-    """Straight along the coordinate axis that shows most, what points up upwards."""
+    """Return the view along the coordinate axis that shows most, with up pointing up."""
     middles, normals, areas = _samples(mesh)
     nearly_closed = np.linalg.norm(areas @ normals) < CLOSED * areas.sum()
     axes, up = _views(mesh, middles, areas) if nearly_closed else (ANY, Y)
@@ -75,7 +75,7 @@ def _front(mesh: TriangleMesh) -> Real:
 
 
 def _samples(mesh: TriangleMesh) -> tuple[Real, Real, Real]:
-    """Middles (k, 3), unit normals (k, 3) and areas (k,) of an even choice of triangles."""
+    """Return centres (k, 3), unit normals (k, 3) and areas (k,) of evenly chosen triangles."""
     corners = mesh.V[mesh.F[:: -(-mesh.m // SAMPLE)]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     doubled = np.linalg.norm(normals, axis=1)
@@ -83,7 +83,7 @@ def _samples(mesh: TriangleMesh) -> tuple[Real, Real, Real]:
 
 
 def _views(mesh: TriangleMesh, middles: Real, areas: Real) -> tuple[Real, Real]:
-    """Axes to look along and what points up, by the way from the middle of the cut to its own."""
+    """Return candidate viewing axes and the up direction, judged by where the surface is cut."""
     if mesh.loops:
         cut = mesh.V[np.concatenate(mesh.loops)].mean(axis=0)
         way = np.abs(areas @ middles / areas.sum() - cut) / np.ptp(middles, axis=0).max()
@@ -95,7 +95,7 @@ def _views(mesh: TriangleMesh, middles: Real, areas: Real) -> tuple[Real, Real]:
 
 
 def _best_view(axes: Real, up: Real, middles: Real, normals: Real, areas: Real) -> Real:
-    """Which of these axis directions shows most, by custom rather the first?"""
+    """Return the axis direction that shows most, with a preference for the first."""
     frames = [_frame(axis, up) for axis in axes]
     shown = np.array([_area_shown(frame, middles, normals, areas) for frame in frames])
     best = int(np.argmax(shown))
@@ -103,7 +103,7 @@ def _best_view(axes: Real, up: Real, middles: Real, normals: Real, areas: Real) 
 
 
 def _area_shown(frame: Real, middles: Real, normals: Real, areas: Real) -> float:
-    """How much area faces the viewer with nothing in front, as he sees it (foreshortened)?"""
+    """Return the visible area that faces the viewer, foreshortened."""
     seen = middles @ frame.T
     extent = float(np.ptp(seen, axis=0).max())
     cells = ((seen[:, :2] - seen[:, :2].min(axis=0)) / extent * (CELLS - 1e-9)).astype(np.int64)
@@ -116,7 +116,7 @@ def _area_shown(frame: Real, middles: Real, normals: Real, areas: Real) -> float
 
 
 def _frame(toward: Real, up: Real = Y) -> Real:
-    """Right, up and towards the viewer; for a view along y, up is the direction of -z or z."""
+    """Return right, up and towards the viewer; for a view along y, up is -z or z."""
     if abs(toward @ up) > 0.99:
         up = np.array([0.0, 0.0, -np.sign(toward[1])])
     right = np.cross(up, toward)
@@ -125,7 +125,7 @@ def _frame(toward: Real, up: Real = Y) -> Real:
 
 
 def _moved(frame: Real, aside: float, upward: float) -> Real:
-    """The frame of a viewer who has moved by these angles and still looks at the same place."""
+    """Return the frame of a viewer who moved by these angles and still looks at the same point."""
     a, u = np.deg2rad([aside, upward])
     right, up, toward = frame
     horizontal = np.cos(a) * toward + np.sin(a) * right

@@ -1,7 +1,7 @@
-"""A checkerboard whose squares are divided where they would be large on the surface.
+"""A checkerboard whose squares are subdivided where they would be large on the surface.
 
-A square is divided whole, 3 by 3, or not at all, so that finer squares never lie as fragments among
-coarser ones. The finer ones are divided again where they are still too large.
+A square is divided 3 by 3 as a whole or not at all, so that finer squares never appear as fragments
+among coarser ones. The parts are divided again if they are still too large.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: A divided square has this many along its side; odd, so that the corners keep their colour.
+#: Parts along the side of a divided square; odd, so that corners keep their colour.
 FINER = 3
-#: How often a square may be divided.
+#: Maximal depth of the subdivision.
 MOST_LEVELS = 10
 
 
 @dataclass(frozen=True)
 class Checkerboard:
-    """Which squares are divided: a tree, its roots the squares of side 1.
+    """The subdivision of a checkerboard: a forest whose roots are the squares of side 1.
 
     Parameters
     ----------
     low : int64 (2,)
         Lower left corner of the lowest square.
     across : int
-        Squares of side 1 along the board's width; they come row by row.
+        Number of squares of side 1 along the board's width; they are stored row by row.
     first_part : int64 (k,)
-        Of each square the number of the first of its parts, row by row; -1 for one that is whole.
+        For each square the number of its first part, row by row; -1 for an undivided square.
 
     """
 
@@ -41,16 +41,16 @@ class Checkerboard:
 
     @classmethod
     def of(cls, places: Real, fineness: Real, weights: Real) -> Checkerboard:
-        """Divide the squares whose parts would still be large, judging by samples.
+        """Divide squares whose parts would still be large, judged by samples.
 
         Parameters
         ----------
         places : float64 (k, 2)
-            Samples on the board.
+            Sample points on the board.
         fineness : float64 (k,)
-            How often squares have to be divided there; not whole numbers.
+            Required depth of subdivision at the samples; not rounded.
         weights : float64 (k,)
-            How much a sample counts: its share of the surface.
+            Weight of each sample: its share of the surface.
 
         """
         low = np.floor(places.min(axis=0)).astype(np.int64)
@@ -74,13 +74,13 @@ class Checkerboard:
 
     @property
     def is_divided(self) -> bool:
-        """Whether any square is."""
+        """Whether any square is divided."""
         return bool((self.first_part >= 0).any())
 
     def at(self, places: Real) -> tuple[NDArray[np.bool_], Ints]:
-        """Return whether the board is dark at places (k, 2), and how often it is divided there.
+        """Return whether the board is dark at points (k, 2), and the depth of subdivision there.
 
-        Places off the board count as its nearest square.
+        Points off the board take the nearest square's value.
         """
         roots = len(self.first_part)
         node = np.clip(_roots(places, self.low, self.across), 0, roots - 1)
@@ -98,18 +98,20 @@ class Checkerboard:
 
 
 def _roots(places: Real, low: Ints, across: int) -> Ints:
+    """Return the square of side 1 that holds each point."""
     column = np.floor(places[:, 0]).astype(np.int64) - low[0]
     row = np.floor(places[:, 1]).astype(np.int64) - low[1]
     return np.asarray(column.clip(0, across - 1) + across * row)
 
 
 def _part(places: Real, level: int) -> Ints:
-    """Return which of its parent's parts the square of this level is that holds each place."""
+    """Return which of its parent's parts holds each point at this level."""
     place = np.floor(places * FINER**level).astype(np.int64) % FINER
     return np.asarray(place[:, 0] + FINER * place[:, 1])
 
 
 def _is_dark(places: Real, level: int) -> NDArray[np.bool_]:
+    """Whether points lie on dark squares of this level."""
     scale = FINER**level
     whole = np.floor(places[:, 0] * scale) + np.floor(places[:, 1] * scale)
     return np.asarray(whole.astype(np.int64) & 1 == 1)

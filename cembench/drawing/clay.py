@@ -1,4 +1,4 @@
-"""A surface as if of clay: one colour, lit from one side, before any camera."""
+"""Clay rendering: one colour, one light, no camera."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from cembench.drawing.draw_numpy import SAMPLES, Picture, averaged
 from cembench.drawing.rasterizer import rasterize
 from cembench.drawing.scene import INSIDE, brightness_of, doubled_areas
 
-#: Colour of a surface in full light, each 0 to 1.
+#: RGB colour of a fully lit surface, 0 to 1.
 CLAY = (0.90, 0.80, 0.71)
 
 
 def draw_clay(F: NDArray[np.int64], points: NDArray[np.float64], side: int) -> Picture:
-    """How does a surface look, its vertices in window coordinates (n, 3)? uint8 (side, side, 3)."""
+    """Draw a surface whose vertices are in window coordinates (n, 3); uint8 (side, side, 3)."""
     corners = points[F].reshape(-1, 3)
     raster = rasterize(corners, side * SAMPLES)
     light = raster.interpolate(brightness_of(F, points)[F].ravel())

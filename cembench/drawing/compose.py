@@ -1,4 +1,4 @@
-"""Puts the two panels of a preview on a page, with the boundary's image and the words."""
+"""Compose a preview page: two panels, the boundary of the image, and captions."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class Style:
-    """Place from the bottom up, in parts of the words' room; size in pixels; colour; weight."""
+    """A line of text: position from the bottom, size in pixels, colour and weight."""
 
     place: float
     pixels: int
@@ -31,37 +31,37 @@ class Style:
     bold: bool = False
 
 
-#: Pixels between and around the panels, and for the words below them, at the size 1600 x 940.
+#: Pixels between and around the panels, and for the text below them, at the size 1600 x 940.
 GAP, WORDS, DESIGN_WIDTH = 40, 160, 1600
-#: The lines of words, placed by their middles.
+#: The lines of text, placed by their centres.
 TITLE = Style(0.72, 30, "#1a2733", bold=True)
 CAPTION = Style(0.42, 23, "#33475a")
 NOTE = Style(0.13, 17, "#7a8894")
 INK = "#22384d"
-#: Diameter of a ring round a fold, in widths of its line.
+#: Diameter of a ring around a fold, in line widths.
 RING = 7.0
-#: Words are shrunk to the first share of their size, then broken into two lines and shrunk to the
-#: second, before they are cut.
+#: Long text is shrunk to the first share of its size, then broken into two lines and shrunk to the
+#: second, before it is cut.
 EASY, SMALLEST = 0.85, 0.6
-#: Height of a line of words, in sizes of its letters.
+#: Line height, in font sizes.
 LINE = 1.32
-#: Samples along each side of a pixel for lines; how hard the PNG is compressed.
+#: Samples along each side of a pixel for lines; PNG compression level.
 SAMPLES, COMPRESSION = 3, 4
 
 
 def gap_of(size: tuple[int, int]) -> int:
-    """How many pixels of white are there round the panels?"""
+    """Return the white space around the panels, in pixels."""
     return round(GAP * size[0] / DESIGN_WIDTH)
 
 
 def side_of(size: tuple[int, int]) -> int:
-    """How many pixels has the side of a panel on a page of this width and height?"""
+    """Return the side of a panel in pixels, for a page of this width and height."""
     gap, words = gap_of(size), round(WORDS * size[0] / DESIGN_WIDTH)
     return min((size[0] - 3 * gap) // 2, size[1] - gap - words)
 
 
 def panels_of(size: tuple[int, int]) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Column and row of the upper left pixel of the surface's and of the image's panel."""
+    """Return the column and row of the upper left pixels of the surface and image panels."""
     gap, side = gap_of(size), side_of(size)
     left = (size[0] - 2 * side - gap) // 2
     return (left, gap), (left + side + gap, gap)
@@ -69,14 +69,14 @@ def panels_of(size: tuple[int, int]) -> tuple[tuple[int, int], tuple[int, int]]:
 
 @dataclass(frozen=True)
 class Overlay:
-    """What lies on the image; points float64 (k, 2) in window coordinates, -1 to 1.
+    """Marks drawn over the image; points float64 (k, 2) in window coordinates, -1 to 1.
 
     Parameters
     ----------
     curves : tuple of array
-        Closed curves, the first point not repeated.
+        Closed curves; the first point is not repeated.
     marks : array
-        Places to be ringed in red.
+        Points to be ringed in red.
 
     """
 
@@ -91,16 +91,16 @@ def page(
     words: tuple[str, str, str],
     size: tuple[int, int],
 ) -> bytes:
-    """Which PNG shows these two pictures?
+    """Return the PNG file of a page with two pictures.
 
     Parameters
     ----------
     surface, image : uint8 (side, side, 3)
-        As large as :func:`side_of` says.
+        The pictures, of the size that :func:`side_of` returns.
     overlay : Overlay
-        What lies on the image.
+        Marks drawn over the image.
     words : tuple of str
-        Title, caption and a note, each possibly empty.
+        Title, caption and a note; each may be empty.
     size : tuple of int
         Width and height of the page in pixels.
 
@@ -115,7 +115,7 @@ def page(
 
 
 def png(picture: Picture) -> bytes:
-    """Compose a PNG file that says that it is ours."""
+    """Return a PNG file whose metadata names cembench as its maker."""
     about = PngInfo()
     about.add_text("Software", SOFTWARE)
     buffer = io.BytesIO()
@@ -152,13 +152,13 @@ def _add_overlay(whole: Image.Image, overlay: Overlay, size: tuple[int, int]) ->
 
 
 def _in_panel(points: NDArray[np.float64], side: int) -> list[tuple[float, float]]:
-    """Move window coordinates (k, 2) to pixels of a panel, rows downwards."""
+    """Convert window coordinates (k, 2) to pixels of a panel, rows downwards."""
     x, y = (points[:, 0] + 1) / 2 * side, (1 - points[:, 1]) / 2 * side
     return list(zip(x.tolist(), y.tolist(), strict=True))
 
 
 def _add_words(whole: Image.Image, text: str, style: Style, size: tuple[int, int]) -> None:
-    """Centre the text in its place below the panels, as large as fits."""
+    """Centre a text in its place below the panels, as large as it fits."""
     if not text:
         return
     scale = size[0] / DESIGN_WIDTH
@@ -172,14 +172,14 @@ def _add_words(whole: Image.Image, text: str, style: Style, size: tuple[int, int
 
 
 def _fitted(text: str, style: Style, pixels: float, width: float) -> tuple[list[str], float]:
-    """Shrink a little, else break into two lines and shrink more, else cut: nothing runs out.
+    """Shrink a text a little, else break it into two lines and shrink more, else cut it.
 
-    Returns the lines and the size of their letters in pixels.
+    Returns the lines and their font size in pixels.
     """
 
     def fits(lines: list[str], least: float) -> float | None:
-        """Return the largest share of the size at which they fit, if it is not below the least."""
-        share = 1.0  # step by step: letters are set on whole pixels, so widths do not just scale
+        """Return the largest size in pixels at which lines fit; None below the share `least`."""
+        share = 1.0  # in steps: glyphs are placed on whole pixels, so widths do not scale exactly
         while share >= least:
             font = _font(pixels * share, bold=style.bold)
             if max(font.getlength(line) for line in lines) <= width:
@@ -199,18 +199,18 @@ def _fitted(text: str, style: Style, pixels: float, width: float) -> tuple[list[
 
 @cache
 def _font(pixels: float, *, bold: bool) -> ImageFont.FreeTypeFont:
-    """Load the letters that come with matplotlib, without loading matplotlib."""
+    """Load the font that comes with matplotlib, without importing matplotlib."""
     found = find_spec("matplotlib")
     assert found is not None
     assert found.origin is not None
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     fonts = Path(found.origin).parent / "mpl-data" / "fonts" / "ttf"
-    plain = ImageFont.Layout.BASIC  # the other one loads a library for scripts that join letters
+    plain = ImageFont.Layout.BASIC  # the other layout engine loads a library for complex scripts
     return ImageFont.truetype(str(fonts / name), max(pixels, 4.0), layout_engine=plain)
 
 
 def _broken(text: str, lines: int) -> list[str]:
-    """Break into this many lines of about the same length."""
+    """Break a text into this many lines of similar length."""
     length = -(-len(text) // lines)
     while len(parts := textwrap.wrap(text, length)) > lines:
         length += 1

@@ -1,4 +1,4 @@
-"""Draws a scene without any graphics library: slower than a graphics card, but always there."""
+"""Draw a scene without a graphics library: slower than a graphics card, but always available."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ Picture = NDArray[np.uint8]
 
 #: Samples along each side of a pixel.
 SAMPLES = 2
-#: Squares of the board narrower than this many pixels begin to melt into grey-blue.
+#: Squares narrower than this many pixels fade to their mean colour, grey-blue.
 LEGIBLE = 2.5
-#: Samples that are coloured together: few enough to stay near the processor.
+#: Samples that are coloured together: few enough to stay in the cache.
 PORTION = 1 << 16
 
 
 def draw(scene: Scene, side: int) -> tuple[Picture, Picture]:
-    """How do the surface and its image look? Two pictures uint8 (side, side, 3), on white."""
+    """Draw the surface and its image; two pictures uint8 (side, side, 3) on white."""
     return _drawn(scene, scene.surface, side), _drawn(scene, scene.image, side)
 
 
 def averaged(samples: NDArray[Any]) -> NDArray[Any]:
     """Average the samples of each pixel: (SAMPLES s, SAMPLES s, ...) to (s, s, ...)."""
-    rows = np.add.reduce([samples[k::SAMPLES] for k in range(SAMPLES)])  # they lie together
+    rows = np.add.reduce([samples[k::SAMPLES] for k in range(SAMPLES)])  # they are contiguous
     return np.asarray(np.add.reduce([rows[:, k::SAMPLES] for k in range(SAMPLES)]) / SAMPLES**2)
 
 
@@ -41,8 +41,9 @@ def shrunk(picture: Real) -> Picture:
 
 
 def _drawn(scene: Scene, view: View, side: int) -> Picture:
+    """Draw one panel of a scene."""
     raster = rasterize(view.corners, side * SAMPLES)
-    # What is averaged over a pixel's samples: how much of it is empty, light, dark and folded.
+    # Averaged over a pixel's samples: its shares of empty, light, dark and folded.
     parts = np.zeros((4, raster.size**2), dtype=np.float32)
     parts[0] = 1
     sides = _square_sides(scene, view, side)
@@ -57,7 +58,7 @@ def _drawn(scene: Scene, view: View, side: int) -> Picture:
 def _fill(
     parts: NDArray[np.float32], scene: Scene, corners: Real, raster: Raster, sides: Real
 ) -> NDArray[np.int64]:
-    """Share the light of samples among the parts, in place; return the samples that are folded."""
+    """Distribute the light of samples among the parts, in place; return the folded samples."""
     found = raster.interpolate(corners)
     light, folded = found[:, 2], scene.folded[raster.face]
     dark = _darkness(scene, found[:, :2], sides[raster.face]) * light
@@ -71,14 +72,14 @@ def _fill(
 
 
 def _square_sides(scene: Scene, view: View, side: int) -> Real:
-    """How many pixels wide is a square of the board, as drawn, in each triangle? Shape (m,)."""
+    """Return the drawn width of a square of the board in each triangle, in pixels; shape (m,)."""
     board = np.abs(doubled_areas(scene.board))
     drawn = np.abs(doubled_areas(view.corners[:, :2])) * (side / 2) ** 2
     return np.sqrt(drawn / np.maximum(board, look.TINY))
 
 
 def _darkness(scene: Scene, places: Real, sides: Real) -> Real:
-    """How dark is the board at places? Half where squares, of sides in pixels, are too small."""
+    """Return the darkness of the board at points; half where its squares are too small to draw."""
     dark, level = scene.squares.at(places)
     smaller = float(FINER) ** -np.arange(MOST_LEVELS + 1)
     contrast = np.clip((sides * smaller[level] - 1) / (LEGIBLE - 1), 0, 1)
@@ -86,7 +87,7 @@ def _darkness(scene: Scene, places: Real, sides: Real) -> Real:
 
 
 def _outline(parts: NDArray[np.float32], folded: NDArray[np.int64], size: int) -> None:
-    """A fold may be smaller than a pixel: give it a rim of its colour, in place."""
+    """Outline folds in their colour, in place, since a fold may be smaller than a pixel."""
     if len(folded):
         seen = np.zeros(size * size, dtype=bool)
         seen[folded] = True

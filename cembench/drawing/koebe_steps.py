@@ -20,17 +20,17 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 Complex = NDArray[np.complex128]
 
-#: Pixels: side of a panel, space around, height of the words under a panel and at the top.
+#: Pixels: panel side, margin, height of the text under a panel and at the top.
 SIDE, GAP, LABEL, TITLE = 460, 26, 40, 64
 COLUMNS = 4
 DPI = 100
-#: Colour of the boundary that a step opens.
+#: Colour of the boundary that the step opens.
 OPEN = "#c8553d"
 
 
 @dataclass(frozen=True)
 class StepPanel:
-    """An image (n,), or the surface where it is None; `loop` is the boundary that is marked."""
+    """An image (n,), or the surface if None; `loop` is the highlighted boundary."""
 
     label: str
     uv: Complex | None = None
@@ -40,21 +40,21 @@ class StepPanel:
 def write_steps(
     mesh: TriangleMesh, panels: Sequence[StepPanel], final: Complex, path: Path, title: str
 ) -> None:
-    """Draw the panels in rows into a PNG file.
+    """Draw panels in rows into a PNG file.
 
     Parameters
     ----------
     mesh : TriangleMesh
         The surface.
-    panels : sequence of Panel
-        In order, four a row.
+    panels : sequence of StepPanel
+        In order, four per row.
     final : complex (n,)
-        The map whose checkerboard lies on all of them: where it is conformal, and so is the image,
-        small squares meet at right angles.
+        The map whose checkerboard is drawn on all panels. Where it and the panel's image are
+        conformal, small squares have right angles.
     path : Path
-        Where to write.
+        The PNG file.
     title : str
-        Words at the top.
+        Text at the top.
 
     """
     columns = min(COLUMNS, len(panels))
@@ -86,6 +86,7 @@ def _outline(
     corner: tuple[int, int],
     size: tuple[int, int],
 ) -> None:
+    """Draw the highlighted boundary of a panel."""
     assert panel.uv is not None
     window = image_in_window(panel.uv)[:, :2]
     for loop in mesh.loops:

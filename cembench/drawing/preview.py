@@ -1,13 +1,13 @@
-"""A picture in which a person sees at a glance whether a map keeps squares square.
+"""Previews: a picture that shows at a glance whether a map keeps squares square.
 
-On the left the surface under a checkerboard that was pulled back by the map, on the right the image
-under the same checkerboard, turned so that what is up on the surface is up in it. The board has 18
-squares across the image; a square that would be large on the surface is divided into 3 x 3, as
-often as needed, in both panels alike (the conformal factor of one map can range over a factor of
-thousands).
+On the left is the surface under a checkerboard pulled back by the map; on the right is the image
+under the same checkerboard, turned so that up on the surface is up in the image. The board has 18
+squares across the image. A square that would be large on the surface is divided into 3 x 3, as
+often as needed and in both panels alike, since the conformal factor of one map can vary by a factor
+of thousands.
 
-A rasterizer in numpy draws, so that no graphics card or display is needed and the same map gives
-the same bytes; Pillow puts the page together.
+A rasterizer in numpy draws the panels, so no graphics card or display is needed and the same map
+gives the same bytes; Pillow composes the page.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Complex = NDArray[np.complex128]
 Picture = NDArray[np.uint8]
 
-#: Width and height in pixels, and the smallest that can hold two panels and words.
+#: Default width and height in pixels, and the smallest that hold two panels and text.
 SIZE, LEAST = (1280, 752), (240, 150)
-#: Side in pixels of a picture of the surface alone.
+#: Side of a thumbnail of the surface alone, in pixels.
 THUMBNAIL = 480
 
 
@@ -46,27 +46,27 @@ def write_preview(
 ) -> None:
     """Draw a surface and its image under one checkerboard into a PNG file.
 
-    Triangles that the map folds over are red in both panels, and ringed where they are small.
+    Triangles that the map folds over are red in both panels, and ringed if they are small.
 
     Parameters
     ----------
     mesh : TriangleMesh
-        The surface; holes are no matter.
+        The surface, with or without holes.
     uv : complex128 (n,)
         Image of each vertex, in a disk or not.
     path : Path
-        Where to write; an older file is replaced in one step, or left alone on failure.
+        The PNG file; an existing file is replaced in one step, or kept on failure.
     title, caption : str
-        Words below the picture; broken into two lines where they are long.
+        Text below the picture; long text is broken into two lines.
     size : tuple of int
         Width and height of the picture in pixels.
     turned : bool
-        Whether the image is turned so that what is up on the surface is up in it.
+        Whether to turn the image so that up on the surface is up in it.
 
     Raises
     ------
     ParameterError
-        A map of the wrong shape or with values that are not finite; a size that is too small.
+        The map has the wrong shape or values that are not finite, or the size is too small.
     RenderError
         The file cannot be written, or the picture cannot be drawn.
 
@@ -84,7 +84,7 @@ def preview_png(
     size: tuple[int, int] = SIZE,
     turned: bool = True,
 ) -> bytes:
-    """Return the picture of :func:`write_preview` as PNG."""
+    """Return the picture of :func:`write_preview` as the bytes of a PNG file."""
     _check(mesh, uv, size)
     uv = upright(mesh, uv) if turned else uv
     scene = Scene.of(mesh, uv)
@@ -99,7 +99,7 @@ def preview_png(
 def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> None:
     """Draw a surface under the checkerboard of its map into a PNG file.
 
-    `side` in pixels; the rest, errors too, as in :func:`write_preview`.
+    `side` is in pixels; other arguments and errors as for :func:`write_preview`.
     """
     _check(mesh, uv, SIZE)
     surface, _ = _draw(Scene.of(mesh, uv), side)
@@ -107,18 +107,19 @@ def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = 
 
 
 def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Picture]:
-    """How do a surface and its image look under one checkerboard? uint8 (side, side, 3) each.
+    """Draw a surface and its image under one checkerboard; uint8 (side, side, 3) each.
 
-    Raises what :func:`write_preview` raises, except for files.
+    Raises the errors of :func:`write_preview`, except those about files.
     """
     _check(mesh, uv, SIZE)
     return _draw(Scene.of(mesh, uv), side)
 
 
 def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
+    """Raise :class:`ParameterError` for a map or a size that cannot be drawn."""
     if uv.shape != (mesh.n,):
         raise ParameterError(
-            f"the map has shape {uv.shape}; allowed is ({mesh.n},), one image a vertex."
+            f"the map has shape {uv.shape}; allowed is ({mesh.n},), one image per vertex."
         )
     bad = np.flatnonzero(~np.isfinite(uv))
     if len(bad):
@@ -134,6 +135,7 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
 
 
 def _note(scene: Scene, *, turned: bool) -> str:
+    """Return the note below a picture on how it was drawn."""
     up = "The image is turned so that up on the surface is up in it." if turned else ""
     finer = (
         f"Squares that would be large on the surface are divided {FINER} by {FINER}, in both "

@@ -1,4 +1,4 @@
-"""Which triangle is seen at each pixel? A z-buffer in numpy, for triangles of any size."""
+"""A z-buffer in numpy: the visible triangle at each pixel, for triangles of any size."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-#: Candidates (pixels in a triangle's bounding box) that are looked at together: it bounds the
-#: memory, and what is small stays near the processor.
+#: Candidates (pixels in a triangle's bounding box) that are tested together. This bounds the
+#: memory, and small portions stay in the cache.
 CHUNK = 100_000
-#: A pixel this little outside a triangle still counts, so that no cracks show along edges.
+#: A pixel this close outside a triangle still counts, so that edges show no cracks.
 TOLERANCE = 1e-9
 #: Barycentric coordinates of a triangle's first corner.
 START = (1.0, 0.0, 0.0)
@@ -23,18 +23,18 @@ START = (1.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Raster:
-    """What is seen: for each of the `size` times `size` pixels, row 0 on top.
+    """The visible triangles of `size` times `size` pixels, with row 0 at the top.
 
     Parameters
     ----------
     size : int
         Pixels along a side.
     pixel : int64 (k,)
-        Those where something is seen: row times size plus column.
+        The pixels that show a triangle: row times size plus column.
     face : int64 (k,)
-        The triangle there.
+        The triangle at each of them.
     weights : float64 (k, 3)
-        Where in the triangle: barycentric coordinates.
+        Barycentric coordinates in that triangle.
 
     """
 
@@ -44,14 +44,14 @@ class Raster:
     weights: Real
 
     def interpolate(self, corners: Real) -> Real:
-        """Values at the triangles' corners in turn, (3 m,) or (3 m, d), at the pixels: (k, ...)."""
+        """Interpolate corner values, (3 m,) or (3 m, d) in order, at the pixels: (k, ...)."""
         at_corners = corners.reshape(-1, 3, *corners.shape[1:])
         along = (slice(None), *([None] * (corners.ndim - 1)))
         parts = (self.weights[:, c][along] * at_corners[self.face, c] for c in range(3))
         return cast(Real, sum(parts))
 
     def portions(self, most: int) -> Iterator[Raster]:
-        """Give what is seen in portions of at most so many pixels."""
+        """Yield the raster in portions of at most `most` pixels."""
         for start in range(0, len(self.pixel), most):
             held = slice(start, start + most)
             yield Raster(self.size, self.pixel[held], self.face[held], self.weights[held])
@@ -63,8 +63,8 @@ def rasterize(corners: Real, size: int) -> Raster:
     Parameters
     ----------
     corners : float64 (3 m, 3)
-        The triangles' corners in turn, in window coordinates: x right, y up, -1 to 1; z towards
-        the viewer. Either side up; a triangle without area is not seen.
+        The triangles' corners in order, in window coordinates: x right, y up, -1 to 1; z towards
+        the viewer. Both sides are visible; a triangle without area is not.
     size : int
         Pixels along a side.
 
@@ -89,14 +89,14 @@ def rasterize(corners: Real, size: int) -> Raster:
 
 @dataclass(frozen=True)
 class _Triangles:
-    """Triangles in pixels: x is the column, y the row, from the first corner on.
+    """Triangles in pixel coordinates: x is the column, y the row, relative to the first corner.
 
-    The barycentric coordinate k of a pixel is START[k] + x * across[k] + y * down[k].
+    Barycentric coordinate k of a pixel is START[k] + x * across[k] + y * down[k].
     """
 
     size: int
     corner: Real  #: (2, m), the first corner's x and y
-    across: Real  #: (3, m); NaN where there is no area
+    across: Real  #: (3, m); NaN for a triangle without area
     down: Real  #: (3, m)
     depths: Real  #: (3, m), of the corners
     low: Ints  #: (2, m), lowest column and row of a pixel in the bounding box
@@ -116,14 +116,14 @@ class _Triangles:
 
     @property
     def boxes(self) -> Ints:
-        """How many pixels there are in each bounding box, (m,)."""
+        """Return the number of pixels in each bounding box, (m,)."""
         counts: Ints = np.maximum(self.high - self.low + 1, 0).prod(axis=0)
         return counts
 
     def covered(self, faces: Ints) -> tuple[Ints, Ints, Real]:
-        """Every pixel that one of these triangles covers: which triangle, which pixel, its z."""
+        """Return every pixel that these triangles cover: triangle, pixel and z."""
         tall = self.high[1, faces] - self.low[1, faces] + 1
-        face = np.repeat(faces, tall)  # a line of pixels each
+        face = np.repeat(faces, tall)  # one row of pixels each
         row = _counted(tall) + np.repeat(self.low[1, faces], tall)
         x, y = self.corner[:, face]
         y = row - y
@@ -148,7 +148,7 @@ class _Triangles:
         )
 
     def weights(self, face: Ints, pixel: Ints) -> Real:
-        """Barycentric coordinates (k, 3) of pixels in triangles."""
+        """Return the barycentric coordinates (k, 3) of pixels in triangles."""
         row = pixel // self.size
         x = pixel - row * self.size - self.corner[0][face]
         y = row - self.corner[1][face]
@@ -160,12 +160,12 @@ class _Triangles:
 
 
 def _portions(candidates: Ints) -> list[Ints]:
-    """The triangles that have candidates, in portions of about CHUNK candidates each."""
+    """Return the triangles with candidates, in portions of about CHUNK candidates each."""
     wanted = np.flatnonzero(candidates)
     portion = np.cumsum(candidates[wanted]) // CHUNK
     return np.split(wanted, np.flatnonzero(np.diff(portion)) + 1)
 
 
 def _counted(counts: Ints) -> Ints:
-    """Return 0, 1, ... up to each of these counts, one after the other."""
+    """Return 0, 1, ... up to each of these counts, concatenated."""
     return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

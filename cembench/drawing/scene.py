@@ -1,4 +1,4 @@
-"""What is in a preview: everything a renderer needs, and nothing about how it draws.
+"""The content of a preview: everything a renderer needs, independent of how it draws.
 
 Window coordinates: x to the right and y upwards, both from -1 to 1 in a square panel; z towards the
 viewer. A **square** of the checkerboard has side 1 in the coordinates `board`.
@@ -23,36 +23,36 @@ Complex = NDArray[np.complex128]
 
 #: Squares of the coarsest checkerboard across the image.
 SQUARES = 18
-#: Squares are divided where they would have more than this side on the drawn surface.
+#: Squares are divided where their side on the drawn surface would exceed this.
 LARGEST_SQUARE = 0.22
-#: How often the sizes of squares are averaged over neighbours, so that refinement has calm borders.
+#: Rounds of averaging the sizes of squares over neighbours, for smooth borders of refinement.
 CALMING = 3
-#: Side of the smallest thing in the image that a person does not overlook.
+#: Side of the smallest detail in the image that a person notices.
 LEAST_VISIBLE = 0.02
-#: Stands in for an area of zero.
+#: Replaces an area of zero.
 TINY = 1e-300
-#: How much of a panel's half width the drawing takes.
+#: Share of a panel's half width that the drawing takes.
 FILL = 0.97
-#: Colours, each 0 to 1: the board's two, and that of a triangle that is folded over.
+#: RGB colours, 0 to 1: the board's two, and that of a folded triangle.
 LIGHT, DARK, FOLDED = (0.95, 0.935, 0.90), (0.33, 0.52, 0.72), (0.86, 0.11, 0.13)
-#: Direction to the lamp in window coordinates; how bright a face is with its back to the lamp, how
-#: much is added when it faces the lamp, how fast it falls off between; the inside of the surface.
+#: Direction to the lamp in window coordinates; brightness of a face turned away from the lamp, what
+#: is added when it faces the lamp, the falloff between, and the factor for the surface's inside.
 LAMP = np.array([-0.45, 0.55, 0.70]) / np.sqrt(0.995)
 SHADOW, LAMPLIGHT, FALL_OFF, INSIDE = 0.30, 0.78, 1.6, 0.62
-#: The image shows the same light and shade, but fainter: half of the surface is turned away there.
+#: The image shows the same shading, but weaker: half of the surface faces away there.
 FAINTER = 0.55
 
 
 @dataclass(frozen=True)
 class View:
-    """One panel, triangle by triangle: nothing is shared, so neighbours may differ.
+    """One panel of separate triangles; no vertex is shared, so neighbours may differ.
 
     Parameters
     ----------
     corners : float64 (3 m, 3)
-        The triangles' corners in turn, in window coordinates.
+        The triangles' corners in order, in window coordinates.
     brightness : float64 (3 m,)
-        How much light each corner throws back, 0 to 1.
+        Brightness of each corner, 0 to 1.
 
     """
 
@@ -64,20 +64,20 @@ class View:
 class Scene:
     """A surface and its image, ready to be drawn side by side under one checkerboard.
 
-    Triangles stand alone, their corners in turn.
+    Triangles are separate, with their corners in order.
 
     Parameters
     ----------
     space, plane : float64 (3 m, 3)
-        Corners on the surface as the viewer sees it, and in the image; window coordinates.
+        Corners on the surface as seen by the viewer, and in the image; window coordinates.
     board : float64 (3 m, 2)
         Corners on the checkerboard.
     squares : Checkerboard
-        Which of its squares are divided.
+        Which squares are divided.
     brightness : float64 (3 m,)
-        How much light a corner throws back to the viewer, 0 to 1.
+        Brightness of each corner, 0 to 1.
     folded : bool (m,)
-        Triangles whose image has no positive area.
+        Whether a triangle's image has no positive area.
 
     """
 
@@ -90,7 +90,7 @@ class Scene:
 
     @classmethod
     def of(cls, mesh: TriangleMesh, uv: Complex, board_uv: Complex | None = None) -> Self:
-        """Place the surface before the viewer and the image into its frame, and light both.
+        """Place the surface before the viewer and the image in its frame, and light both.
 
         The checkerboard is that of the image, or of another map `board_uv` (n,).
         """
@@ -110,52 +110,52 @@ class Scene:
 
     @property
     def surface(self) -> View:
-        """The surface in space; its inner side, where it is turned to the viewer, is darker."""
+        """Return the surface panel; sides of it that show the inside are darker."""
         inside = np.repeat(doubled_areas(self.space[:, :2]) < 0, 3)
         return View(self.space, np.where(inside, INSIDE * self.brightness, self.brightness))
 
     @property
     def image(self) -> View:
-        """The image, folds on top, with the surface's light and shade so that features show."""
+        """Return the image panel, folds on top, with the surface's shading."""
         lifted = self.plane.copy()
         lifted[np.repeat(self.folded, 3), 2] += 1.0
         return View(lifted, 1 - FAINTER * (1 - self.brightness))
 
     @property
     def small_folds(self) -> Real:
-        """Middles (k, 2) of folds that are too small to be seen in the image."""
+        """Return the centres (k, 2) of folds that are too small to be seen in the image."""
         corners = self.plane[:, :2]
         small = self.folded & (np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2)
         return corners.reshape(-1, 3, 2)[small].mean(axis=1)
 
 
 def image_in_window(uv: Complex) -> Real:
-    """Where do the images of the vertices lie in the panel? Window coordinates (n, 3), z = 0."""
+    """Return the images of the vertices in the panel; window coordinates (n, 3), z = 0."""
     return framed(np.stack([uv.real, uv.imag, np.zeros(len(uv))], axis=1))
 
 
 def doubled_areas(corners: Real) -> Real:
-    """Twice the signed area of each triangle, its corners in turn (3 m, 2); shape (m,)."""
+    """Return twice the signed area of triangles, corners in order (3 m, 2); shape (m,)."""
     a, b, c = corners[0::3], corners[1::3], corners[2::3]
     u, v = b - a, c - a
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
 def framed(points: Real) -> Real:
-    """Move and scale so that x and y fill the panel; depth in the same units."""
+    """Shift and scale points so that x and y fill the panel; depth is scaled alike."""
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float((high - low)[:2].max()) or 1.0
     return (points - (low + high) / 2) * (2 * FILL / extent)
 
 
 def _normals(F: Ints, points: Real) -> Real:
-    """Twice the vector area of each triangle, shape (m, 3)."""
+    """Return twice the vector area of each triangle, shape (m, 3)."""
     corner = points[F[:, 0]]
     return np.cross(points[F[:, 1]] - corner, points[F[:, 2]] - corner)
 
 
 def _to_vertices(F: Ints, values: Real, n: int) -> Real:
-    """Sum of the values of the triangles round each vertex, shape (n,)."""
+    """Return the sum of the values of the triangles at each vertex, shape (n,)."""
     total = np.zeros(n)
     for c in range(3):
         total += np.bincount(F[:, c], weights=values, minlength=n)
@@ -163,7 +163,7 @@ def _to_vertices(F: Ints, values: Real, n: int) -> Real:
 
 
 def brightness_of(F: Ints, points: Real) -> Real:
-    """Light that wraps round the surface: no part is black, so the board stays legible."""
+    """Return brightness from wrapped lighting: no part is black, so the board stays visible."""
     normals = _normals(F, points)
     smooth = np.stack([_to_vertices(F, normals[:, k], len(points)) for k in range(3)], axis=1)
     length = np.linalg.norm(smooth, axis=1)
@@ -172,16 +172,16 @@ def brightness_of(F: Ints, points: Real) -> Real:
 
 
 def checkerboard_of(F: Ints, space: Real, board: Real) -> Checkerboard:
-    """Divide the board's squares that would be large on the surface, vertices (n, 3) and (n, 2)."""
+    """Divide the squares that would be large on the surface; vertices (n, 3) and (n, 2)."""
     fineness = fineness_of(F, space, board)
     area = np.linalg.norm(_normals(F, space), axis=1)
     return Checkerboard.of(board[F].mean(axis=1), fineness[F].mean(axis=1), area)
 
 
 def fineness_of(F: Ints, space: Real, board: Real) -> Real:
-    """How often must squares be divided at each vertex so that they are not too large in space?
+    """Return the depth of subdivision that each vertex needs for squares of the wanted size.
 
-    Shape (n,); not whole numbers: the next whole number above is the answer.
+    Shape (n,); not rounded: round up to a whole number.
     """
     n = len(space)
     area = np.linalg.norm(_normals(F, space), axis=1)

@@ -1,9 +1,9 @@
-"""Pictures of a surface and of its image, for a report: rasterized once, coloured in several ways.
+"""Pictures of a surface and its image for reports: rasterized once, coloured in several ways.
 
-A :class:`RasterPanel` knows which triangle is seen at every sample of a picture. On it one can
-paint a checkerboard, the mean curvature, or the edges of the mesh, on the surface and the image,
-without looking at the triangles again. No graphics library takes part, so that the same mesh
-gives the same bytes on every machine.
+A :class:`RasterPanel` knows the visible triangle at every sample of a picture. A checkerboard, the
+mean curvature or the mesh edges can then be painted on the surface and the image without
+rasterizing again. No graphics library is involved, so the same mesh gives the same bytes on every
+machine.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Picture = NDArray[np.uint8]
 
-#: White between panels that stand side by side, in pixels.
+#: White space between panels side by side, in pixels.
 GAP = 12
-#: JPEG quality: a picture of two panels stays near 30 kB.
+#: JPEG quality; a picture of two panels takes about 30 kB.
 QUALITY = 70
-#: Half the width of a drawn edge, in samples; colours of edges and of what lies between them.
+#: Half the width of a drawn edge, in samples; colours of edges and of triangles.
 EDGE, EDGE_COLOUR, BETWEEN = 0.5 * SAMPLES, (0.16, 0.25, 0.36), (0.93, 0.94, 0.95)
-#: Curvature from inwards over flat to outwards: blue, white, orange; also apart in grey and for
-#: the colour-blind.
+#: Curvature from inwards over flat to outwards: blue, white, orange; distinct in grey scale and for
+#: colour-blind readers.
 INWARDS, EVEN, OUTWARDS = (0.13, 0.33, 0.62), (0.96, 0.96, 0.94), (0.80, 0.35, 0.05)
-#: The colours end at this quantile of the curvature's absolute values.
+#: The colour scale ends at this quantile of the absolute curvature.
 EXTREME = 0.95
 
 
 @dataclass(frozen=True)
 class RasterPanel:
-    """What is seen of a mesh that was placed before the viewer.
+    """The rasterized view of a mesh that was placed before the viewer.
 
     Parameters
     ----------
@@ -53,11 +53,11 @@ class RasterPanel:
     points : float64 (n, 3)
         Vertices in window coordinates.
     raster : Raster
-        Which triangle is seen where.
+        The visible triangle at each sample.
     light : float64 (k,)
-        How bright it is there, 0 to 1.
+        Brightness there, 0 to 1.
     folded : bool (m,)
-        Triangles that the map folds over; they are red.
+        Triangles that the map folds over; they are drawn red.
 
     """
 
@@ -68,13 +68,13 @@ class RasterPanel:
     folded: NDArray[np.bool_]
 
     def at(self, values: Real) -> Real:
-        """Values at the vertices, (n,) or (n, d), at what is seen: (k,) or (k, d)."""
+        """Interpolate vertex values, (n,) or (n, d), at the visible samples: (k,) or (k, d)."""
         corners = values[self.F]
         return self.raster.interpolate(corners.reshape(-1, *values.shape[1:]))
 
 
 def surface_panel(mesh: TriangleMesh, side: int) -> RasterPanel:
-    """How does the surface look to the viewer? `side` in pixels."""
+    """Rasterize the surface as the viewer sees it; `side` in pixels."""
     points = look.framed(mesh.V @ view_rotation(mesh).T)
     light = look.brightness_of(mesh.F, points)
     panel = _panel(mesh, points, light, np.zeros(mesh.m, dtype=bool), side)
@@ -84,7 +84,7 @@ def surface_panel(mesh: TriangleMesh, side: int) -> RasterPanel:
 
 
 def image_panel(mesh: TriangleMesh, uv: Complex, side: int) -> RasterPanel:
-    """How does the image look, with the surface's light and shade on it but fainter?"""
+    """Rasterize the image with the surface's shading, weaker; `side` in pixels."""
     shade = look.brightness_of(mesh.F, look.framed(mesh.V @ view_rotation(mesh).T))
     folded = ~(signed_areas(uv, mesh.F) > 0)
     return _panel(mesh, look.image_in_window(uv), 1 - look.FAINTER * (1 - shade), folded, side)
@@ -93,6 +93,7 @@ def image_panel(mesh: TriangleMesh, uv: Complex, side: int) -> RasterPanel:
 def _panel(
     mesh: TriangleMesh, points: Real, light: Real, folded: NDArray[np.bool_], side: int
 ) -> RasterPanel:
+    """Rasterize triangles at these points, folds on top."""
     corners = points[mesh.F].reshape(-1, 3)
     corners[np.repeat(folded, 3), 2] += 1.0  # folds on top
     raster = rasterize(corners, side * SAMPLES)
@@ -100,7 +101,7 @@ def _panel(
 
 
 def paint(panel: RasterPanel, colour: Real) -> Picture:
-    """The picture uint8 (side, side, 3) on white; `colour` (k, 3) from 0 to 1."""
+    """Return the picture uint8 (side, side, 3) on white; `colour` is (k, 3), 0 to 1."""
     seen = np.where(panel.folded[panel.raster.face, None], look.FOLDED, colour)
     canvas = np.ones((panel.raster.size**2, 3))
     canvas[panel.raster.pixel] = seen * panel.light[:, None]
@@ -108,10 +109,9 @@ def paint(panel: RasterPanel, colour: Real) -> Picture:
 
 
 def checkerboard(panel: RasterPanel, mesh: TriangleMesh, uv: Complex, surface: RasterPanel) -> Real:
-    """The colours of a checkerboard on the image, pulled back where the panel is the surface.
+    """Return the colours of a checkerboard on the image, pulled back if the panel is the surface.
 
-    As in :mod:`cembench.drawing.scene`, squares are divided where they would be large on
-    `surface`.
+    As in :mod:`cembench.drawing.scene`, squares are divided where they would be large on `surface`.
     """
     board = look.image_in_window(uv)[:, :2] * (look.SQUARES / 2 / look.FILL)
     squares = look.checkerboard_of(mesh.F, surface.points, board)
@@ -126,7 +126,7 @@ def checkerboard(panel: RasterPanel, mesh: TriangleMesh, uv: Complex, surface: R
 
 
 def curvature(panel: RasterPanel, H: Real) -> Real:
-    """The colours of the mean curvature H (n,): blue inwards, orange outwards."""
+    """Return the colours of the mean curvature H (n,): blue inwards, orange outwards."""
     extreme = float(np.quantile(np.abs(H), EXTREME)) or 1.0
     share = np.clip(panel.at(H) / extreme, -1, 1)
     towards = np.where(share[:, None] < 0, INWARDS, OUTWARDS)
@@ -134,7 +134,7 @@ def curvature(panel: RasterPanel, H: Real) -> Real:
 
 
 def edges(panel: RasterPanel) -> Real:
-    """The colours of the mesh: dark edges; grey where triangles are too small to be told apart."""
+    """Return the colours of the mesh: dark edges, grey where triangles are too small to see."""
     corners = _samples(panel)
     doubled = np.abs(look.doubled_areas(corners.reshape(-1, 2)))
     opposite = side_lengths(corners.reshape(-1, 2), np.arange(3 * len(corners)).reshape(-1, 3))
@@ -144,7 +144,7 @@ def edges(panel: RasterPanel) -> Real:
 
 
 def _samples(panel: RasterPanel) -> Real:
-    """The triangles' corners (m, 3, 2) in samples of the picture."""
+    """Return the triangles' corners (m, 3, 2) in samples of the picture."""
     return panel.points[panel.F][:, :, :2] * (panel.raster.size / 2)
 
 
@@ -153,14 +153,14 @@ def _between(first: Sequence[float], second: Sequence[float], share: Real) -> Re
 
 
 def beside(pictures: Sequence[Picture]) -> Picture:
-    """Pictures of one height side by side."""
+    """Place pictures of equal height side by side."""
     white = np.full((len(pictures[0]), GAP, 3), 255, dtype=np.uint8)
     parts = [part for picture in pictures for part in (white, picture)]
     return np.hstack(parts[1:])
 
 
 def jpeg(picture: Picture) -> bytes:
-    """The file: the same bytes for the same picture."""
+    """Return a JPEG file; the same picture gives the same bytes."""
     buffer = io.BytesIO()
     Image.fromarray(picture).save(buffer, "JPEG", quality=QUALITY, optimize=True)
     return buffer.getvalue()

@@ -1,4 +1,4 @@
-"""Textures: a checkerboard, and one that was painted for other texture coordinates."""
+"""Textures: a checkerboard, and transfer of a texture to new texture coordinates."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from cembench.drawing.scene import DARK, LIGHT
 
 Real = NDArray[np.float64]
 
-#: Side of the checkerboard in pixels, and how many squares lie along it.
+#: Side of the checkerboard in pixels, and its number of squares along a side.
 SIDE, SQUARES = 1024, 32
-#: The longest side of a texture that is baked, in pixels.
+#: Longest side of a baked texture, in pixels.
 LONGEST = 4096
 
 
 @cache
 def checker_png() -> bytes:
-    """Compose a checkerboard as a PNG file, in the colours of our pictures."""
+    """Return a checkerboard in the colours of our pictures as a PNG file."""
     squares = np.indices((SQUARES, SQUARES)).sum(axis=0) % 2
     board = np.kron(squares, np.ones((SIDE // SQUARES,) * 2)).astype(np.uint8)
     picture = Image.fromarray(board, "P")
@@ -39,24 +39,24 @@ def read_texture(path: Path) -> Image.Image:
     Raises
     ------
     RenderError
-        It is missing, or no picture.
+        The file is missing or is not a picture.
 
     """
     try:
         with Image.open(path) as picture:
             return picture.convert("RGBA")
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        why = getattr(error, "strerror", None) or "it is no picture that can be read"
+        why = getattr(error, "strerror", None) or "it is not a picture in a known format"
         raise RenderError(
             f"the texture {path} cannot be read: {why}. Name a PNG or JPEG file."
         ) from None
 
 
 def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
-    """Paint a texture again, for other texture coordinates.
+    """Bake a texture for new texture coordinates.
 
-    Each texel of the new texture takes the colour that the old one has at the same point of the
-    surface; texels outside the map take that of the nearest inside.
+    Each texel of the new texture takes the colour that the old texture has at the same point of the
+    surface; texels outside the map take that of the nearest texel inside.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
     Returns
     -------
     bytes
-        A PNG file, a square whose side is the old texture's longer one (at most :data:`LONGEST`).
+        A square PNG file whose side is the old texture's longer side (at most :data:`LONGEST`).
 
     """
     side = min(max(texture.size), LONGEST)
@@ -88,7 +88,7 @@ def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
 
 
 def _looked_up(pixels: Real, place: Real) -> Real:
-    """Return the colours (k, 4) at texture coordinates (k, 2), between pixels bilinear."""
+    """Return the colours (k, 4) at texture coordinates (k, 2), with bilinear interpolation."""
     height, width = pixels.shape[:2]
     x = place[:, 0] * width - 0.5
     y = (1 - place[:, 1]) * height - 0.5

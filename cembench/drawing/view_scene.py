@@ -1,8 +1,8 @@
-"""What a page needs to turn a surface and its maps: one compressed block of bytes a surface.
+"""The data for the interactive viewer of a page: one compressed block of bytes per surface.
 
 The block is gzip of: the length of the head (uint32), the head (JSON), and arrays one after another
 in the order that the head lists them, little-endian, each at a multiple of four bytes. Coordinates
-are whole numbers from 0 to 65535 within a box. Distortions are a byte a triangle.
+are integers from 0 to 65535 within a box. Distortions take one byte per triangle.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Triangles of a surface that is shown; larger ones are simplified.
+#: Most triangles of a surface; larger ones are simplified.
 MOST = 50_000
-#: Triangles of all surfaces on one page, which keep it small; but each has some.
+#: Triangles of all surfaces on one page together, to keep it small; each gets some.
 TOGETHER, LEAST = 200_000, 5_000
-#: Where the scales of the colours end: degrees, |mu|, and powers of two of the area's scaling.
+#: Ends of the colour scales: degrees, abs(mu), and powers of two of the area scaling.
 DEGREES, MU, DOUBLINGS = 10.0, 0.3, 6.0
-#: Maps up to this many keep image coordinates as float32, for squares far within a finger.
+#: Up to this many maps, image coordinates are float32, for detail inside fingers.
 FEW = 2
 
 
 @dataclass(frozen=True)
 class ViewedMap:
-    """A map that is shown: its name, image (n,) and a line about it."""
+    """A map for the viewer: its name, image (n,) and a caption."""
 
     label: str
     z: Complex
@@ -45,22 +45,22 @@ class ViewedMap:
 
 
 def upright(mesh: TriangleMesh, z: Complex) -> Complex:
-    """Turn a map about its middle so that what is up on the surface, as it is shown, is up in it.
+    """Turn a map about its centre so that up on the drawn surface is up in the image.
 
-    Maps of one surface, which a conformal map leaves free to turn, can so be compared by eye.
+    Conformal maps are free to rotate; turned alike, maps of one surface can be compared by eye.
     """
     seen = mesh.V @ view_rotation(mesh).T
     return turned_onto(z, seen[:, 0] + 1j * seen[:, 1])
 
 
 def turned_onto(z: Complex, other: Complex) -> Complex:
-    """Turn a map about the origin so that it is nearest to another, in the mean over vertices."""
+    """Turn a map about the origin so that it is closest to another, averaged over vertices."""
     overlap = complex(np.vdot(z, other - other.mean()))
     return z if overlap == 0 else z * (overlap / abs(overlap))
 
 
 def most_each(surfaces: int) -> int:
-    """Return how many triangles each of several surfaces on one page may show."""
+    """Return the number of triangles that each of several surfaces on one page may have."""
     return min(MOST, max(LEAST, TOGETHER // max(surfaces, 1)))
 
 
@@ -76,14 +76,14 @@ def view_scene(
     maps : sequence of ViewedMap
         At least one; the first is shown first. They are turned alike.
     title : str
-        What the surface is called.
+        Name of the surface.
     most : int
-        Triangles above which it is simplified; the page says so.
+        The surface is simplified above this number of triangles, and the page says so.
 
     Returns
     -------
     bytes
-        The block; the same for the same input.
+        The block; the same input gives the same bytes.
 
     """
     chosen = _simplified(mesh, most)
@@ -125,7 +125,7 @@ def view_scene(
 
 @dataclass(frozen=True)
 class _Simplified:
-    """Which vertices stay, the triangles between them, and the triangle each of these was."""
+    """The vertices that remain, the triangles between them, and each one's original triangle."""
 
     vertices: NDArray[np.int64]
     F: NDArray[np.int64]
@@ -133,7 +133,7 @@ class _Simplified:
 
 
 def _simplified(mesh: TriangleMesh, most: int) -> _Simplified:
-    """Choose vertices by edge collapses (libigl); all of them where there are few triangles."""
+    """Choose vertices by edge collapses (libigl); all of them if there are few triangles."""
     everything = _Simplified(np.arange(mesh.n), mesh.F, np.arange(mesh.m))
     if mesh.m <= most:
         return everything
@@ -144,7 +144,7 @@ def _simplified(mesh: TriangleMesh, most: int) -> _Simplified:
 
 
 def _in_box(z: Complex, vertices: NDArray[np.int64], *, precise: bool) -> NDArray[Any]:
-    """Place a map in the square from 0 to 1, its middle in the middle; (2 k,) u then v."""
+    """Centre a map in the unit square; (2 k,) u then v."""
     low = complex(z.real.min(), z.imag.min())
     size = complex(np.ptp(z.real), np.ptp(z.imag))
     extent = max(size.real, size.imag) or 1.0
@@ -156,9 +156,9 @@ def _in_box(z: Complex, vertices: NDArray[np.int64], *, precise: bool) -> NDArra
 
 
 def _distortions(mesh: TriangleMesh, z: Complex) -> dict[str, NDArray[np.uint8]]:
-    """Measure each triangle: largest error of its angles, |mu|, and scaling of the area.
+    """Return each triangle's largest angle error, |mu| and area scaling as bytes.
 
-    The scaling is that of the image relative to the whole, 128 where it is even.
+    The scaling is relative to the whole image; 128 means even.
     """
     P = mesh.V[mesh.F]
     area = np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1) / 2

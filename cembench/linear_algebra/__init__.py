@@ -1,1 +1,1 @@
-"""Sparse Cholesky factorisations, their back ends, dense blocks."""
+"""Sparse Cholesky factorisations, their back ends, and dense blocks."""

@@ -1,4 +1,4 @@
-"""Which libraries can factor here: looked up without loading one."""
+"""The libraries that can factor on this machine, found without importing them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ def available_backends() -> list[Backend]:
 
 
 def default_backend() -> Backend:
-    """Return the back end that is used unless one is named: cvxopt, superlu where it is missing.
+    """Return the default back end: cvxopt, or superlu if cvxopt is missing.
 
-    cvxopt is under the GPL; whoever must do without it uninstalls it.
+    cvxopt is under the GPL; users who must avoid it can uninstall it.
     """
     return "cvxopt" if "cvxopt" in available_backends() else "superlu"

@@ -1,7 +1,7 @@
-"""The one sparse Cholesky class that all algorithms use, so that none wins by a better solver.
+"""The sparse Cholesky class that all algorithms share, so that none wins by a better solver.
 
-Which library factors, and whether a factor is kept, is decided by whoever measures, through
-:func:`linear_algebra`, and cannot be seen by the algorithm.
+The library that factors, and whether a factor is reused, are set by the caller through
+:func:`linear_algebra`. Algorithms cannot see them.
 """
 
 from __future__ import annotations
@@ -31,20 +31,25 @@ Solves = Literal["reuse", "backslash"]
 class LinearAlgebra:
     """How linear systems are solved.
 
-    solves : "reuse" keeps a factor while its matrix stands; "backslash" factors anew at every
-        solve, as the paper's MATLAB did.
-    backend : the library that factors.
+    Parameters
+    ----------
+    solves : {"reuse", "backslash"}
+        "reuse" uses a factorisation as long as its matrix does not change; "backslash" factors
+        again for every solve, as the paper's MATLAB code did.
+    backend : str
+        The library that factors.
+
     """
 
     solves: Solves = "reuse"
     backend: Backend = field(default_factory=default_backend)
 
 
-#: Right-hand sides that are solved for together: enough to be fast, few enough to need no memory.
+#: Right-hand sides per solve: enough to be fast, few enough to use little memory.
 _COLUMNS_AT_ONCE = 64
 
-#: Up to this order the block behind a leading one is kept dense, as it fills up when the leading
-#: block is eliminated: beyond it its n^3 operations and n^2 numbers are worth avoiding.
+#: Largest order at which the block after a leading one is stored dense. Eliminating the leading
+#: block fills it; above this order its n^3 operations and n^2 numbers cost too much.
 LARGEST_DENSE = 5_000
 
 _DEFAULT = LinearAlgebra()
@@ -53,12 +58,33 @@ _current: ContextVar[LinearAlgebra] = ContextVar("cembench_linear_algebra", defa
 
 @contextmanager
 def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterator[LinearAlgebra]:
-    """Let everything enclosed solve its systems this way.
+    """Use this policy and back end for all systems solved inside the ``with`` block.
+
+    Parameters
+    ----------
+    solves : {"reuse", "backslash"}
+        Whether to reuse a factorisation or to factor for every solve.
+    backend : {"cvxopt", "superlu", "pardiso"}, optional
+        The library that factors (default: cvxopt, or superlu if cvxopt is missing).
+
+    Yields
+    ------
+    LinearAlgebra
+        The settings.
 
     Raises
     ------
     ParameterError
-        An unknown policy or backend, or one whose library is not installed.
+        The policy or back end is unknown, or its library is not installed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scipy import sparse
+    >>> with linear_algebra("backslash", "superlu"):
+    ...     x = Cholesky(2 * sparse.eye_array(3)).solve(np.ones(3))
+    >>> x
+    array([0.5, 0.5, 0.5])
 
     """
     if solves not in get_args(Solves):
@@ -73,7 +99,7 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
             f"{', '.join(available_backends())}."
         )
     choice = LinearAlgebra(solves, backend)  # type: ignore[arg-type]  # checked above
-    _factor_class(choice.backend)  # loads the library now, not inside what is timed
+    _factor_class(choice.backend)  # import the library now, outside the timed code
     token = _current.set(choice)
     try:
         yield choice
@@ -82,6 +108,7 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
 
 
 def _names(kind: Any) -> str:
+    """Return the allowed values of a Literal type for a message."""
     return ", ".join(repr(name) for name in get_args(kind))
 
 
@@ -90,6 +117,8 @@ SolverOf = Callable[[sparse.csc_array], Solver]
 
 
 class _Factor(Protocol):
+    """The interface of the factors of all back ends."""
+
     def update(self, A: sparse.csc_array) -> None: ...
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
@@ -99,20 +128,29 @@ class _Factor(Protocol):
 
 
 class Cholesky:
-    """Solves systems with a sparse symmetric positive definite matrix.
+    """Solve systems with a sparse symmetric positive definite matrix.
 
     Parameters
     ----------
     A : sparse (n, n)
-        Symmetric positive definite, both triangles stored.
+        Symmetric positive definite, with both triangles stored.
     leading : int, optional
-        Also solve with the block ``A[:leading, :leading]``; under "reuse" from the same factor,
-        unless more than :data:`LARGEST_DENSE` rows follow it: then it has a factor of its own.
+        Also solve with the block ``A[:leading, :leading]``. Under "reuse" the same factor is used,
+        unless more than :data:`LARGEST_DENSE` rows follow the block; then it has its own factor.
 
     Raises
     ------
     NotPositiveDefinite
-        At construction or, under "backslash", at the first solve.
+        The matrix is not positive definite; raised at construction or, under "backslash", at the
+        first solve.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scipy import sparse
+    >>> A = sparse.csc_array([[2.0, 1.0], [1.0, 2.0]])
+    >>> Cholesky(A).solve(np.array([3.0, 3.0]))
+    array([1., 1.])
 
     """
 
@@ -125,20 +163,20 @@ class Cholesky:
             self._kept = _factor(self._how.backend, self._A, leading)
 
     def update(self, A: sparse.sparray) -> None:
-        """Turn to another matrix with the same pattern; under "reuse" its analysis is kept."""
+        """Replace the matrix by one with the same pattern; "reuse" keeps the symbolic analysis."""
         self._A = sparse.csc_array(A)
         if self._kept is not None:
             self._kept.update(self._A)
 
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
-        """A x = b; b (n,) or (n, k), real or complex; x alike."""
+        """Return x with A x = b; b is (n,) or (n, k), real or complex, and so is x."""
         factor = self._kept or _factor(self._how.backend, self._A, None)
         _count(b)
         with phase("solves"):
             return by_real_columns(factor.solve, b)
 
     def solve_leading(self, b: NDArray[Any]) -> NDArray[Any]:
-        """A[:leading, :leading] x = b; b (leading,) or (leading, k), real or complex; x alike."""
+        """Return x with A[:leading, :leading] x = b; shapes as for :meth:`solve`."""
         if self._leading is None:
             raise ValueError("solve_leading needs the order of the leading block at construction")
         _count(b)
@@ -150,12 +188,12 @@ class Cholesky:
             return by_real_columns(factor.solve, b)
 
     def schur_factor(self) -> NDArray[np.float64]:
-        """What is the Cholesky factor of the Schur complement of the leading block?
+        """Return the Cholesky factor C of the Schur complement of the leading block.
 
-        With A = [[B, E^T], [E, D]], B the leading block, that is the lower triangular C, dense,
-        with C C^T = D - E B^-1 E^T. A factor of A holds it as its trailing block; where a library
-        does not show that, or under "backslash", it takes one solve with as many right-hand sides
-        as E has rows.
+        With A = [[B, E^T], [E, D]] and B the leading block, C is lower triangular and dense, with C
+        C^T = D - E B^-1 E^T. A factor of A contains C as its trailing block. If the library does
+        not expose that, or under "backslash", C takes one solve with as many right-hand sides as E
+        has rows.
         """
         if self._leading is None:
             raise ValueError("schur_factor needs the order of the leading block at construction")
@@ -164,10 +202,10 @@ class Cholesky:
         return self._schur_factor_by_solves() if C is None else C
 
     def condensed(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
-        """What is left of a right-hand side b = (c, d) when the leading block is eliminated?
+        """Return d - E B^-1 c for right-hand sides b = (c, d): B eliminated, forward only.
 
-        d - E B^-1 c, in the letters of :meth:`schur_factor`; b (n, k), the result
-        (n - leading, k). With a factor that shows its trailing block that is half a solve.
+        Letters as in :meth:`schur_factor`; b is (n, k), the result (n - leading, k). If the factor
+        exposes its trailing block, this takes half a solve.
         """
         k = self._leading
         if self._kept is not None:
@@ -179,9 +217,9 @@ class Cholesky:
         return b[k:] - sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
 
     def extended(self, x: NDArray[Any]) -> NDArray[Any]:
-        """Which solution of B y + E^T x = 0 has these trailing values x, real or complex?
+        """Return the y with B y + E^T x = 0 for given trailing values x, real or complex.
 
-        x (n - leading,) or (n - leading, k), y alike; half a solve as in :meth:`condensed`.
+        x is (n - leading,) or (n - leading, k), and so is y; half a solve as in :meth:`condensed`.
         """
         k = self._leading
         if self._kept is not None and self._kept.schur_factor() is not None:
@@ -191,13 +229,13 @@ class Cholesky:
         return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
 
     def schur_times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """S x for the Schur complement S of :meth:`schur_factor`, by one solve; x (m, k)."""
+        """Return S x for the Schur complement S of :meth:`schur_factor`, by one solve; x (m, k)."""
         k = self._leading
         E, D = sparse.csr_array(self._A[k:, :k]), self._A[k:, k:]
         return D @ x - E @ self.solve_leading(E.T @ x)
 
     def schur_solved(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
-        """S^-1 x, likewise: what A^-1 has in the place of S^-1."""
+        """Return S^-1 x by one solve, as A^-1 contains S^-1 as a block; x (m, k)."""
         padded = np.zeros((self._A.shape[0], x.shape[1]))
         padded[self._leading :] = x
         return self.solve(padded)[self._leading :]
@@ -232,6 +270,7 @@ def _count(b: NDArray[Any], share: float = 1.0) -> None:
 
 
 def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
+    """Factor a matrix with a back end."""
     if backend == "cvxopt" and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
         from cembench.linear_algebra.cholmod import cholmod_solver
 
@@ -240,7 +279,8 @@ def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Fact
 
 
 def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], _Factor]:
-    # Imported on demand: an extra may be missing, and starting up should load no solver.
+    """Return the constructor of a back end's factors."""
+    # Imported on demand: an extra may be missing, and start-up should not load a solver.
     if backend == "cvxopt":
         from cembench.linear_algebra.cholmod import CholmodFactor
 
@@ -255,9 +295,9 @@ def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], 
 
 
 class _SeparateFactors:
-    """For factors that solve only as a whole: the leading block gets one of its own.
+    """A factor for libraries that only solve as a whole: the leading block has its own factor.
 
-    It is factored when first used. Nothing is kept over an update.
+    The leading block is factored when first used; nothing is kept after an update.
     """
 
     def __init__(self, solver_of: SolverOf, A: sparse.csc_array, leading: int | None) -> None:
@@ -279,10 +319,10 @@ class _SeparateFactors:
         return self._solve_leading(B)
 
     def schur_factor(self) -> None:
-        """These factors are not shown."""
+        """Return None: the library does not expose its factor."""
 
     def condensed(self, B: NDArray[np.float64]) -> None:
-        """Nor half a solve."""
+        """Return None: the library has no half solves."""
 
     def extended(self, B: NDArray[np.float64]) -> None:
-        """Nor half a solve."""
+        """Return None: the library has no half solves."""

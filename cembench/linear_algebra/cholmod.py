@@ -1,9 +1,9 @@
-"""Sparse Cholesky by cvxopt's CHOLMOD: the default, the fastest that installs as a wheel.
+"""Sparse Cholesky by cvxopt's CHOLMOD, the default: the fastest library that installs as a wheel.
 
-cvxopt keeps its options in one dictionary for the process, so they are set before each use:
-``supernodal = 2`` (which also makes an indefinite matrix an error), ``nmethods = 1`` (without it a
-permutation handed over may be ignored) and ``postorder``, which would mix a leading block that is
-not connected with what follows it.
+cvxopt keeps its options in one dictionary per process, so they are set before each use:
+``supernodal = 2`` (which also makes an indefinite matrix an error), ``nmethods = 1`` (otherwise a
+given permutation may be ignored), and ``postorder``, which would mix a disconnected leading block
+with the rows after it.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
 
 
 class CholmodFactor:
-    """A factor of the symmetric positive definite matrix A, only whose lower triangle is read.
+    """A factor of a symmetric positive definite matrix A; only its lower triangle is read.
 
-    `leading` is the order of the leading block to keep first: its own factor is then the leading
-    block of this one, which is what :meth:`solve_leading` uses.
+    `leading` is the order of the block to keep first. Its factor is then the leading block of this
+    factor, which :meth:`solve_leading` uses.
     """
 
     def __init__(self, A: sparse.csc_array, leading: int | None) -> None:
@@ -61,22 +61,22 @@ class CholmodFactor:
             count_factorisation(self._lower.size[0], lambda: factor_entries(self._symbolic))
 
     def update(self, A: sparse.csc_array) -> None:
-        """Factor another matrix of the same pattern, keeping ordering and symbolic analysis."""
+        """Factor another matrix of the same pattern; ordering and symbolic analysis are kept."""
         with phase("factorisation"):
             self._lower.V = matrix(_in_order(A).data[self._below])
         if self._leading is not None:
-            # Partial solves are wrong on a factor that was computed over an older one.
+            # Partial solves are wrong with a factor that overwrote an older one.
             self._analyse()
         self._factor()
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A x = B for real columns B (n, k)."""
+        """Return X with A X = B for real columns B (n, k)."""
         x = matrix(np.asfortranarray(B))
         cholmod.solve(self._symbolic, x, sys=_ALL)
         return np.array(x)
 
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """A_ii x = B for the leading block, out of the one factor; B (leading, k)."""
+        """Return X with A_ii X = B for the leading block, from the one factor; B (leading, k)."""
         assert self._leading is not None
         padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
         padded[: self._leading] = B
@@ -89,14 +89,14 @@ class CholmodFactor:
         return np.array(x)[: self._leading]
 
     def schur_factor(self) -> NDArray[np.float64] | None:
-        """The factor's own trailing block, after the leading one; None where it cannot be seen."""
+        """Return the trailing block of the factor, after the leading one; None if inaccessible."""
         assert self._leading is not None
         if self._trailing is None:
             self._trailing = trailing_block(self._symbolic, self._lower.size[0], self._leading)
         return self._trailing
 
     def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """B_t - A_tl A_ll^-1 B_l for B (n, k): L y = B ends in y_t with C y_t the result."""
+        """Return B_t - A_tl A_ll^-1 B_l for B (n, k): C y_t, where L y = B ends in y_t."""
         C = self.schur_factor()
         if C is None:
             return None
@@ -106,7 +106,7 @@ class CholmodFactor:
         return triangle_times(C, np.array(x)[self._leading :])
 
     def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """-A_ll^-1 A_lt B for B (n - leading, k): L^T x = (0, C^T B) ends in B."""
+        """Return -A_ll^-1 A_lt B for B (n - leading, k): the solution of L^T x = (0, C^T B)."""
         C = self.schur_factor()
         if C is None:
             return None
@@ -119,18 +119,19 @@ class CholmodFactor:
 
 
 def cholmod_solver(A: sparse.csc_array) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Factor A as a whole; the result solves with it."""
+    """Factor A and return a function that solves with it."""
     return CholmodFactor(A, None).solve
 
 
 def _set_options() -> None:
+    """Set the options of CHOLMOD, which are global."""
     cholmod.options["supernodal"] = 2
     cholmod.options["nmethods"] = 1
     cholmod.options["print"] = 0
 
 
 def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
-    """A's lower triangle, and which of A's entries it has."""
+    """Return the lower triangle of A, and which entries of A it has."""
     A = _in_order(A)
     columns = np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
     below = np.flatnonzero(A.indices >= columns)
@@ -139,12 +140,12 @@ def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
 
 
 def _in_order(A: sparse.csc_array) -> sparse.csc_array:
-    """A with every column's entries from top to bottom, as cvxopt keeps them."""
+    """Return A with the entries of each column sorted by row, as cvxopt requires."""
     return A if A.has_sorted_indices else A.sorted_indices()
 
 
 def _fill_reducing_order(lower: spmatrix, leading: int | None) -> matrix:
-    """Approximate minimum degree; of the leading block alone where there is one."""
+    """Return the approximate minimum degree ordering, of the leading block alone if given."""
     if leading is None:
         return amd.order(lower)
     n = lower.size[0]

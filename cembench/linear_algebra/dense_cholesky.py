@@ -1,4 +1,4 @@
-"""Cholesky factors of the small dense matrices that are left when an interior is eliminated."""
+"""Cholesky factors of the small dense matrices that remain after eliminating an interior."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ Real = NDArray[np.float64]
 
 
 class DenseCholesky:
-    """Solves systems with a small dense Hermitian positive definite matrix, real or complex.
+    """Solve systems with a small dense Hermitian positive definite matrix, real or complex.
 
     Raises
     ------
     NotPositiveDefinite
-        It is not.
+        The matrix is not positive definite.
 
     """
 
@@ -39,7 +39,7 @@ class DenseCholesky:
             count_dense(len(A))
 
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
-        """A x = b, real or complex."""
+        """Return x with A x = b, real or complex."""
         with phase("solves"):
             if np.iscomplexobj(self._C):
                 return np.asarray(linalg.cho_solve((self._C, True), b, check_finite=False))

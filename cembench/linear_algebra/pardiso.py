@@ -1,4 +1,4 @@
-"""Sparse Cholesky by MKL Pardiso; needs the extra ``cembench[pardiso]``."""
+"""Sparse Cholesky by MKL Pardiso; requires the extra ``cembench[pardiso]``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _SPD = 2
 def pardiso_solver(
     A: sparse.csc_array,
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Factor A: which function solves A x = B for real columns B (n, k)?
+    """Factor A and return a function that solves A X = B for real columns B (n, k).
 
     Raises
     ------
@@ -31,7 +31,7 @@ def pardiso_solver(
 
     """
     with phase("factorisation"):
-        # Pardiso reads the upper triangle by rows and wants every diagonal entry stored.
+        # Pardiso reads the upper triangle by rows and needs every diagonal entry stored.
         upper = sparse.csr_matrix(sparse.triu(A, format="csr"))
         solver = pypardiso.PyPardisoSolver(mtype=_SPD)
         try:

@@ -1,4 +1,4 @@
-"""Vectors and complex numbers for what knows only real columns."""
+"""Apply real linear maps to vectors and complex numbers."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ Real = NDArray[np.float64]
 
 
 def by_real_columns(linear: Callable[[Real], Any], b: NDArray[Any]) -> NDArray[Any]:
-    """What does a linear map of real columns (n, k), in Fortran order, make of b?
+    """Apply a linear map of real columns (n, k), in Fortran order, to b.
 
-    b is (n,) or (n, k), real or complex; so is the result, of as many rows as the map gives.
+    b is (n,) or (n, k), real or complex. The result has the same form, with as many rows as the map
+    returns.
     """
     columns = b.reshape(len(b), -1)
     k = columns.shape[1]

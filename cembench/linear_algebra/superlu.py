@@ -1,4 +1,4 @@
-"""Sparse factorisation by SciPy's SuperLU in symmetric mode: the fallback that always works."""
+"""Sparse factorisation by SciPy's SuperLU in symmetric mode: the fallback that is always there."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cembench.linear_algebra.work import count_analysis, count_factorisation
 def superlu_solver(
     A: sparse.csc_array,
 ) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Factor A: which function solves A x = B for real columns B (n, k)?
+    """Factor A and return a function that solves A X = B for real columns B (n, k).
 
     Raises
     ------
@@ -37,7 +37,7 @@ def superlu_solver(
             raise NotPositiveDefinite(f"the matrix is singular ({error})") from None
         count_analysis()
         count_factorisation(A.shape[0], lambda: int(factor.nnz) // 2)
-        # With the diagonal as pivots, these are the D of L D L^T: all positive or not definite.
+        # With diagonal pivots, these are the D of L D L^T: all positive if A is definite.
         pivots = factor.U.diagonal()
         if not (pivots > 0).all():
             raise NotPositiveDefinite(

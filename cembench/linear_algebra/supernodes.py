@@ -1,8 +1,8 @@
-"""What stands in CHOLMOD's supernodal factor that cvxopt has no function for: its trailing block.
+"""The trailing block of CHOLMOD's supernodal factor, for which cvxopt has no function.
 
-cvxopt hands out a factor as a capsule round CHOLMOD's ``cholmod_factor``, a structure whose layout
-is the same in all versions from 2 to 5 (SuiteSparse 4 to 7). It is looked at, never changed, and
-only after its plain numbers have shown that the layout is the expected one.
+cvxopt returns a factor as a capsule around CHOLMOD's ``cholmod_factor``, a structure whose layout
+is the same in versions 2 to 5 (SuiteSparse 4 to 7). It is only read, and only after its plain
+numbers have confirmed the expected layout.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ _FLAGS = ("ordering", "is_ll", "is_super", "is_monotonic", "itype", "xtype", "dt
 
 
 class _CholmodFactor(ctypes.Structure):
-    # Sizes and pointers are as wide as each other; a null pointer reads as 0.
+    """The layout of CHOLMOD's factor."""
+
+    # Sizes and pointers have the same width; a null pointer reads as 0.
     _fields_ = [
         *((name, ctypes.c_size_t) for name in _NUMBERS_BEFORE + _POINTERS),
         *((name, ctypes.c_size_t) for name in _SIMPLICIAL + _SUPERNODAL),
@@ -30,20 +32,20 @@ class _CholmodFactor(ctypes.Structure):
 
 
 def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | None:
-    """What are the last rows and columns of this factor, from `leading` on?
+    """Return the last rows and columns of a factor, from `leading` on.
 
     Parameters
     ----------
     factor : capsule
         A numeric factor by ``cvxopt.cholmod`` of a matrix of order n, whose permutation leaves the
-        rows from `leading` on in their places.
+        rows from `leading` on in place.
     n, leading : int
-        The order, and where the block begins.
+        The order of the matrix, and where the block begins.
 
     Returns
     -------
     C : float64 (n - leading, n - leading), Fortran order
-        Lower triangular, with positive diagonal; None where the structure is not as expected.
+        Lower triangular with positive diagonal; None if the structure is not as expected.
 
     """
     held = _held(factor)
@@ -70,18 +72,19 @@ def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | N
             C[below[0] : below[-1] + 1, here] = dense[top:, left:]
         else:
             C[below, here] = dense[top:, left:]
-        # Above its diagonal a supernode holds numbers that mean nothing.
+        # Entries above the diagonal of a supernode are undefined.
         C[here, here] = np.tril(C[here, here])
     return C
 
 
 def factor_entries(factor: Any) -> int:
-    """How many numbers does a supernodal factor hold? 0 where the structure is not as expected."""
+    """Return the number of entries of a supernodal factor; 0 for an unexpected structure."""
     held = _held(factor)
     return int(held.xsize) if held is not None and _as_expected(held, held.n) else 0
 
 
 def _held(factor: Any) -> _CholmodFactor | None:
+    """Return the structure in a capsule; None if the capsule is not as expected."""
     api = ctypes.pythonapi
     name_of, pointer_of = api.PyCapsule_GetName, api.PyCapsule_GetPointer
     name_of.restype, name_of.argtypes = ctypes.c_char_p, [ctypes.py_object]
@@ -93,11 +96,12 @@ def _held(factor: Any) -> _CholmodFactor | None:
 
 
 def _as_expected(held: _CholmodFactor, n: int) -> bool:
-    """A real supernodal factor L L^T with 64-bit indices, of order n, finished?"""
+    """Whether this is a finished real supernodal factor L L^T of order n with 64-bit indices."""
     flags = (held.is_ll, held.is_super, held.itype, held.xtype, held.dtype)
     sizes = 0 < held.nsuper <= n <= held.xsize and held.nsuper <= held.ssize
     return flags == (1, 1, 2, 1, 0) and held.n == held.minor == n and sizes
 
 
 def _array(address: int, kind: Any, length: int) -> NDArray[Any]:
+    """Return the array at an address, without a copy."""
     return np.ctypeslib.as_array(ctypes.cast(address, ctypes.POINTER(kind)), (length,))

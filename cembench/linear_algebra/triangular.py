@@ -10,25 +10,26 @@ from scipy.linalg.blas import dtrmm, dtrmv, dtrsm, dtrsv
 
 Real = NDArray[np.float64]
 
-#: Up to so many columns BLAS is faster one by one: its routines for many pack the triangle first.
+#: Up to this many columns, BLAS is faster column by column: its block routines copy the triangle.
 _FEW = 4
 
 
 def triangle_times(C: Real, X: Real, *, transposed: bool = False) -> Real:
-    """C X or C^T X for lower triangular C (B, B) in Fortran order and X (B, k)."""
+    """Return C X or C^T X for lower triangular C (B, B) in Fortran order and X (B, k)."""
     if X.shape[1] > _FEW:
         return np.asarray(dtrmm(1.0, C, X, lower=1, trans_a=transposed))
     return _by_column(lambda x: dtrmv(C, x, lower=1, trans=transposed), X)
 
 
 def triangle_solved(C: Real, X: Real, *, transposed: bool = False) -> Real:
-    """C^-1 X or C^-T X, alike."""
+    """Return C^-1 X or C^-T X; arguments as for :func:`triangle_times`."""
     if X.shape[1] > _FEW:
         return np.asarray(dtrsm(1.0, C, X, lower=1, trans_a=transposed))
     return _by_column(lambda x: dtrsv(C, x, lower=1, trans=transposed), X)
 
 
 def _by_column(one: Callable[[Real], Real], X: Real) -> Real:
+    """Apply a function to each column."""
     found = np.empty(X.shape, order="F")
     for k in range(X.shape[1]):
         found[:, k] = one(X[:, k])

@@ -1,6 +1,6 @@
-"""Count factorisations and solves: what an algorithm asks of linear algebra, whatever the clock.
+"""Count factorisations and solves: the linear algebra of an algorithm, independent of any clock.
 
-Outside :func:`counting` a look at one variable is all that it costs.
+Outside :func:`counting` the cost is one look at a variable.
 """
 
 from __future__ import annotations
@@ -13,14 +13,21 @@ from dataclasses import dataclass
 
 @dataclass
 class Work:
-    """What was asked of linear algebra.
+    """Counts of the linear algebra that was requested.
 
-    symbolic, numeric : sparse analyses (an ordering and the pattern of a factor) and factorisations
-    right_hand_sides : real columns that sparse systems were solved for; a complex one counts twice,
-        half a solve (one of the two triangles) counts half
-    order, entries : the largest order of a sparse matrix, and the most entries of a factor;
-        0 where the library does not tell
-    dense, dense_order : dense factorisations, and the largest order of one
+    Attributes
+    ----------
+    symbolic, numeric : int
+        Sparse analyses (an ordering and the pattern of a factor) and factorisations.
+    right_hand_sides : float
+        Real columns that sparse systems were solved for. A complex column counts twice, half a
+        solve (one of the two triangles) counts half.
+    order, entries : int
+        Largest order of a sparse matrix, and most entries of a factor; 0 if the library does not
+        report it.
+    dense, dense_order : int
+        Dense factorisations, and the largest order of one.
+
     """
 
     symbolic: int = 0
@@ -37,7 +44,12 @@ _work: ContextVar[Work | None] = ContextVar("cembench_work", default=None)
 
 @contextmanager
 def counting() -> Iterator[Work]:
-    """Count what everything enclosed asks for.
+    """Count the factorisations and solves inside the ``with`` block.
+
+    Yields
+    ------
+    Work
+        The counts so far; final after the block.
 
     Examples
     --------
@@ -60,14 +72,14 @@ def counting() -> Iterator[Work]:
 
 
 def count_analysis() -> None:
-    """Count an ordering with the pattern of its factor."""
+    """Count a symbolic analysis."""
     work = _work.get()
     if work is not None:
         work.symbolic += 1
 
 
 def count_factorisation(order: int, entries: Callable[[], int]) -> None:
-    """Count the factorisation of a sparse matrix; `entries` tells those of its factor."""
+    """Count a sparse factorisation; `entries` returns the entries of its factor."""
     work = _work.get()
     if work is not None:
         work.numeric += 1
@@ -83,7 +95,7 @@ def count_columns(columns: float) -> None:
 
 
 def count_dense(order: int) -> None:
-    """Count the factorisation of a dense matrix."""
+    """Count a dense factorisation."""
     work = _work.get()
     if work is not None:
         work.dense += 1

@@ -1,1 +1,1 @@
-"""Surfaces: triangle meshes, their checks, files and datasets."""
+"""Triangle meshes: their checks, file formats, repair, cuts and datasets."""

@@ -1,4 +1,4 @@
-"""Which two of a file's arrays are the vertices and the triangles?"""
+"""Find the vertices and triangles among a file's arrays."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup
 
-#: Names that are taken before any guess, vertices and triangles.
+#: Usual names of vertices and triangles, tried before any guess.
 USUAL = (("v", "f"), ("V", "F"))
-#: A pair of names is enough for one of these ranges of corners: 1 to n, or 0 to n - 1.
+#: Two arrays fit if the indices span one of these ranges exactly: 1 to n, or 0 to n - 1.
 _COUNTED_FROM = (1, 0)
 
 
 def soup_of_arrays(
     found: Mapping[str, NDArray[Any]], asked: tuple[str, str] | None, counted_from: int | None
 ) -> Soup:
-    """Return the surface in arrays: of the names asked for, the usual ones, or the two that fit.
+    """Return the surface in arrays: those asked for, those with usual names, or the two that fit.
 
-    Two arrays fit where one is (n, 3) or (n, 2) and the other one (m, 3) with whole numbers, the
-    first vertex and the last among them. Flat vertices are taken where no others
-    fit, and get z = 0.
+    Two arrays fit if one is (n, 3) or (n, 2) and the other is (m, 3) with whole numbers that
+    include the first and the last vertex. Two-dimensional vertices are used only if no others fit,
+    and get z = 0.
 
     Parameters
     ----------
     found : mapping of str to array
-        The arrays of numbers of two dimensions.
+        The two-dimensional arrays of numbers.
     asked : tuple of two str, optional
         The names of vertices and triangles.
     counted_from : int or None
-        What the file's first vertex is called, 1 in MATLAB; None where that is to be found out.
+        Index of the file's first vertex, 1 in MATLAB; None to find out.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def soup_of_arrays(
                 "cembench.read_mesh."
             )
         pair = pairs[0]
-        told = f"the arrays {pair[0]!r} and {pair[1]!r} were taken for vertices and triangles"
+        told = f"the arrays {pair[0]!r} and {pair[1]!r} were used as vertices and triangles"
         notices = (Notice(NoticeKind.ARRAYS_GUESSED, told),)
     for name in pair:
         if name not in found:
@@ -78,14 +78,17 @@ def soup_of_arrays(
 
 
 def _fits(v: NDArray[Any], f: NDArray[Any]) -> bool:
+    """Whether two arrays can be the vertices and the triangles of a surface."""
     if v.shape[1] not in (2, 3) or f.shape[1] != 3 or not len(f) or not _whole(f):
         return False
     return any(f.min() == first and f.max() == len(v) - 1 + first for first in _COUNTED_FROM)
 
 
 def _whole(f: NDArray[Any]) -> bool:
+    """Whether all numbers are whole and exact in float64."""
     return bool((np.abs(f.astype(np.float64)) < 2**53).all() and (np.round(f) == f).all())
 
 
 def _listed(found: Mapping[str, NDArray[Any]]) -> str:
+    """Return the names and shapes of arrays for a message."""
     return ", ".join(f"{name} {array.shape}" for name, array in found.items()) or "none"

@@ -1,14 +1,14 @@
 """Cut a surface open along short curves until it is a disk.
 
-The curves form a *cut graph*: what is left of the surface when it is taken away is one disk. A
-first one comes from a tree and a cotree [1]_: the tree of shortest paths from a root, and a
-spanning tree of the triangles that crosses the edges farthest from it; the edges in neither, with
-their paths to the root, cut every handle. Holes are joined to it by the tree. Then each arc of the
-graph is replaced by the shortest one that does the same, which is a shortest path between the two
-boundaries of the annulus that is left when the arc alone is healed, until none becomes shorter.
+The curves form a *cut graph*: removing it from the surface leaves one disk. An initial cut graph
+comes from a tree-cotree decomposition [1]_: a tree of shortest paths from a root, and a spanning
+tree of the triangles that crosses the edges farthest from the root. The edges in neither tree, with
+their paths to the root, cut every handle; the tree joins holes to them. Then each arc of the graph
+is replaced by the shortest one that serves the same purpose, until none becomes shorter. That arc
+is a shortest path between the two boundaries of the annulus that remains if only this arc is glued.
 
-A sphere needs no cut to be simply connected, but a boundary to be mapped to the disk: it is cut
-along a shortest path between two far points.
+A sphere is simply connected without a cut, but needs a boundary to be mapped to the disk. It is cut
+along a shortest path between two distant points.
 
 References
 ----------
@@ -40,24 +40,24 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Edge = tuple[int, int]
 
-#: An arc is replaced when that shortens it by more than this share.
+#: An arc is replaced if that shortens it by more than this share.
 _SHORTER = 1e-9
-#: Rounds over all arcs; each replaces every arc once, and few surfaces need more than three.
+#: Rounds over all arcs; few surfaces need more than three.
 _ROUNDS = 10
-#: Roots that are tried for the tree, far from each other.
+#: Number of roots tried for the tree, far from each other.
 _ROOTS = 4
 
 
 @dataclass(frozen=True)
 class Cut:
-    """A surface that was cut open into a disk."""
+    """A surface cut open into a disk."""
 
-    #: The disk. Its triangles are those of the surface, in their order.
+    #: The disk. Its triangles are those of the surface, in the same order.
     mesh: DiskMesh
-    #: The vertex of the surface that each vertex of the disk is a copy of; vertex i below the
-    #: surface's number of vertices is vertex i.
+    #: The vertex of the surface that each vertex of the disk is a copy of. The first n vertices of
+    #: the disk are the n vertices of the surface.
     origin: Indices
-    #: The edges (k, 2) of the surface that were cut, and their length.
+    #: The edges (k, 2) of the surface that were cut, and their total length.
     edges: Indices
     length: float
 
@@ -68,22 +68,22 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
     Parameters
     ----------
     mesh : TriangleMesh
-        A connected surface: closed or with boundary loops, of any genus.
+        A connected surface, closed or with boundary loops, of any genus.
     through : sequence of int
-        Vertices that the cut has to reach, counted from 0. A sphere without any is cut between
-        two points that lie far from each other.
+        Vertices that the cut has to pass, counted from 0. Without any, a sphere is cut between two
+        distant points.
 
     Returns
     -------
     Cut
-        The disk, and how its vertices belong to the surface's.
+        The disk, and how its vertices correspond to the surface's.
 
     Raises
     ------
     UnusableMeshError
         The surface is not connected.
     ParameterError
-        A vertex that the mesh does not have, or two neighbours and nothing else on a sphere.
+        A vertex is not in the mesh, or two neighbours are the only vertices given on a sphere.
 
     """
     pieces = components(mesh.F, mesh.n)
@@ -105,7 +105,7 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
         a, b = points[:2]
         raise ParameterError(
             f"vertices {a} and {b} are neighbours; a cut of one edge leaves the surface closed. "
-            "Name two vertices that lie farther from each other."
+            "Name two vertices that lie farther apart."
         )
     F, origin = net.cut(graph)
     told = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
@@ -116,7 +116,7 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
 
 
 def write_seam(path: Path, cut: Cut) -> None:
-    """Write a CSV file with the vertex of the surface for each vertex of the disk, from 0."""
+    """Write a CSV file with the surface vertex of each disk vertex, counted from 0."""
     rows = "".join(f"{k},{v}\n" for k, v in enumerate(cut.origin.tolist()))
     content = f"vertex,original\n{rows}".encode()
     write_bytes(path, content, error=MeshError, parents=False)
@@ -124,7 +124,7 @@ def write_seam(path: Path, cut: Cut) -> None:
 
 @dataclass(frozen=True)
 class _Net:
-    """The edges of a surface; a cut graph is a set of numbers of interior ones."""
+    """The edges of a surface; a cut graph is a set of indices of interior edges."""
 
     V: Points
     F: Indices
@@ -161,7 +161,7 @@ class _Net:
         return found
 
     def roots(self, points: list[int]) -> list[int]:
-        """Return where trees of shortest paths may begin."""
+        """Return the vertices at which trees of shortest paths may start."""
         if points:
             return points[:1]
         if self.loops:
@@ -169,11 +169,11 @@ class _Net:
         return self.far_points([], _ROOTS)
 
     def extremities(self, points: list[int]) -> list[int]:
-        """Return two points far from each other, the first of them given perhaps."""
+        """Return two points far from each other; the first may be given."""
         return self.far_points(points, 2)
 
     def far_points(self, points: list[int], count: int) -> list[int]:
-        """Add vertices, each as far as possible from those before it."""
+        """Add vertices, each as far as possible from the previous ones."""
         graph = self._distances()
         if not points:
             points = [int(np.argmax(csgraph.dijkstra(graph, indices=0)))]
@@ -183,7 +183,7 @@ class _Net:
         return points
 
     def cut_graph(self, root: int, marks: frozenset[int]) -> frozenset[int]:
-        """Return a cut graph by tree and cotree that reaches these vertices."""
+        """Return a tree-cotree cut graph that reaches these vertices."""
         away, before = csgraph.dijkstra(self._distances(), indices=root, return_predecessors=True)
         child = np.flatnonzero(before >= 0)
         in_tree = np.zeros(len(self.edges), dtype=bool)
@@ -204,7 +204,7 @@ class _Net:
         return _pruned(self, graph, marks)
 
     def cut(self, graph: Iterable[int]) -> tuple[Indices, Indices]:
-        """Return the triangles with these edges cut, and the vertices that theirs are copies of."""
+        """Return the triangles cut along these edges, and the original of each vertex."""
         open_ = np.zeros(len(self.edges), dtype=bool)
         open_[list(graph)] = True
         return glue(self.F, self.pairs[~open_[self.edge[self.pairs[:, 0]]]], self.n)
@@ -214,12 +214,12 @@ class _Net:
         return np.searchsorted(keys, np.minimum(i, j) * self.n + np.maximum(i, j))
 
     def _distances(self) -> sparse.csr_array:
-        """Return the graph of the edges, those of the boundary next to nothing: they are cut."""
+        """Return the weighted edge graph; boundary edges cost almost nothing, as they are open."""
         weights = np.where(self.rim, 1e-9 * self.lengths.mean(), self.lengths)
         return _graph(self.edges, weights, self.n)
 
     def _cotree(self, away: Points, in_tree: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return which edges a spanning tree of the triangles crosses: far ones, not the tree's."""
+        """Return the edges that a spanning tree of the triangles crosses, farthest first."""
         number = self.edge[self.pairs[:, 0]]
         loop_length = away[self.edges[number]].sum(axis=1) + self.lengths[number]
         most = loop_length.max() + self.lengths.mean()
@@ -237,6 +237,7 @@ class _Net:
 
 
 def _graph(edges: Indices, weights: Points, n: int) -> sparse.csr_array:
+    """Return the symmetric weighted graph of edges (k, 2) on n vertices."""
     i, j = edges.T
     both = np.concatenate([weights, weights])
     ends = (np.concatenate([i, j]), np.concatenate([j, i]))
@@ -244,7 +245,7 @@ def _graph(edges: Indices, weights: Points, n: int) -> sparse.csr_array:
 
 
 def _neighbours(net: _Net, graph: Iterable[int]) -> dict[int, list[Edge]]:
-    """Return for each vertex of a cut graph its edges there, as (edge, other end)."""
+    """Return the edges of a cut graph at each of its vertices, as (edge, other end)."""
     found: dict[int, list[Edge]] = defaultdict(list)
     for number in sorted(graph):
         i, j = net.edges[number].tolist()
@@ -254,12 +255,12 @@ def _neighbours(net: _Net, graph: Iterable[int]) -> dict[int, list[Edge]]:
 
 
 def _held(net: _Net, marks: frozenset[int]) -> frozenset[int]:
-    """Return the vertices where a cut may end: on the boundary, and where it has to reach."""
+    """Return the vertices at which a cut may end: on the boundary, and those it has to reach."""
     return marks.union(*(loop.tolist() for loop in net.loops))
 
 
 def _pruned(net: _Net, graph: Iterable[int], marks: frozenset[int]) -> frozenset[int]:
-    """Take away what ends in the middle of the surface."""
+    """Remove the branches that end in the interior of the surface."""
     left = set(graph)
     around = _neighbours(net, left)
     held = _held(net, marks)
@@ -275,7 +276,7 @@ def _pruned(net: _Net, graph: Iterable[int], marks: frozenset[int]) -> frozenset
 
 
 def _arcs(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> list[list[int]]:
-    """Return the graph's arcs between branching points, ends and the boundary, longest first."""
+    """Return the arcs between branch points, ends and the boundary, longest first."""
     around = _neighbours(net, graph)
     held = _held(net, marks)
     nodes = [v for v, there in around.items() if len(there) != 2 or v in held]
@@ -294,11 +295,11 @@ def _arcs(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> list[list[
 
 
 def _shortened(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> frozenset[int]:
-    """Replace arcs by shorter ones until no single arc can be."""
+    """Replace arcs by shorter ones until no single arc can be shortened."""
     for _ in range(_ROUNDS):
         before = net.length(graph)
         for arc in _arcs(net, graph, marks):
-            if arc not in _arcs(net, graph, marks):  # another replacement has ended on it
+            if arc not in _arcs(net, graph, marks):  # another replacement now ends on it
                 continue
             rest = graph.difference(arc)
             shorter = _pruned(net, rest.union(_shortest_arc(net, rest, arc, marks)), marks)
@@ -317,11 +318,11 @@ def _shortest_arc(
     *,
     spare_rim: bool = False,
 ) -> list[int]:
-    """Return the shortest arc that makes a disk again of what the rest of the graph leaves.
+    """Return the shortest arc that turns the surface, cut along the rest of the graph, into a disk.
 
-    It joins the two boundaries of an annulus; or an end that must be reached to the one boundary
-    of a disk, or to the other end on a sphere. With `spare_rim` it does not run along triangles
-    that have a side on the boundary, if there is another way.
+    It joins the two boundaries of an annulus; or it joins an end that must be reached to the
+    boundary of a disk, or to the other end on a sphere. With `spare_rim` it avoids triangles that
+    have a side on the boundary, if another path exists.
     """
     F, origin = net.cut(rest)
     edges, edge, faces = edges_of_half_edges(F)
@@ -336,19 +337,19 @@ def _shortest_arc(
         sources, targets = np.array(tips), loops[0]
     elif len(tips) == 2 and not loops:
         sources, targets = np.array(tips[:1]), np.array(tips[1:])
-    else:  # the arc joins marked points in another way: it stays
+    else:  # the arc joins marked points in another way: keep it
         return arc
     points = net.V[origin]
     lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
     if spare_rim:
         sides = edge.reshape(-1, 3)
         beside = np.unique(sides[(faces[sides] == 1).any(axis=1)])
-        lengths[beside] += lengths.sum()  # longer than any other way
+        lengths[beside] += lengths.sum()  # longer than any other path
     away, before, source = csgraph.dijkstra(
         _graph(edges, lengths, n), indices=sources, min_only=True, return_predecessors=True
     )
     reached = away[targets]
-    if spare_rim:  # four arcs in one vertex leave some of them little room
+    if spare_rim:  # where four arcs meet, some have little room
         reached = reached + (origin[source[targets]] == origin[targets]) * lengths.sum()
     path = [int(targets[np.argmin(reached)])]
     while before[path[-1]] >= 0:
@@ -357,10 +358,10 @@ def _shortest_arc(
 
 
 def _without_ears(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> frozenset[int]:
-    """Reroute arcs whose cut would leave triangles hanging by one side.
+    """Reroute arcs whose cut would leave triangles attached by one side only.
 
-    The tip of such a triangle has no way inside, and a map may have to fold it. They come about
-    where arcs meet at a narrow angle.
+    The tip of such a triangle has no interior neighbour, and a map may have to fold it. These
+    triangles appear where arcs meet at a small angle.
     """
     sides = net.edge.reshape(-1, 3)
 
@@ -382,7 +383,7 @@ def _without_ears(net: _Net, graph: frozenset[int], marks: frozenset[int]) -> fr
             rest = graph.difference(arc)
             rerouted = _shortest_arc(net, rest, arc, marks, spare_rim=True)
             moved = _pruned(net, rest.union(rerouted), marks)
-            if len(ears(moved)) <= len(hanging):  # a move aside may make room for the next arc
+            if len(ears(moved)) <= len(hanging):  # moving one arc may make room for the next
                 graph = moved
         best = min(best, graph, key=lambda one: (len(ears(one)), net.length(one)))
     return best

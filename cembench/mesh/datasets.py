@@ -1,12 +1,11 @@
-"""Surfaces in files that can be fetched: once, checked, and kept.
+"""Surfaces in files that are downloaded once, verified and kept.
 
-`CEMBENCH_CACHE` says where they are kept. `CEMBENCH_DATA_URL` points to a mirror: a directory that
-holds the files under their own names. The libraries that download load when something is fetched:
-every process that measures reads this file.
+`CEMBENCH_CACHE` names the folder in which they are kept. `CEMBENCH_DATA_URL` names a mirror: a
+folder that holds the files under their own names. The download libraries are imported only when
+something is fetched, since every measuring process imports this module.
 
-A file is used only while it is what was published: its SHA-256 is the known one, or, where none is
-known, the mesh in it is. A file that lies there already is known by its content, whatever it is
-called.
+A file is used only if it is the published one: its SHA-256 matches or, if none is known, the mesh
+in it does. A file that is already in the folder is recognised by its content, whatever its name.
 """
 
 from __future__ import annotations
@@ -29,78 +28,77 @@ from cembench.core.errors import CembenchError, DatasetError, MeshError, RecordE
 from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
 
-#: Overrides the directory of the cache.
+#: Environment variable for the cache folder.
 CACHE_VARIABLE = "CEMBENCH_CACHE"
-#: Overrides where files are fetched from.
+#: Environment variable for the download mirror.
 MIRROR_VARIABLE = "CEMBENCH_DATA_URL"
 
 
 def cache_directory() -> Path:
-    """Where are surfaces and downloads kept? `CEMBENCH_CACHE`, or the user's cache directory."""
+    """Return the folder of surfaces and downloads: `CEMBENCH_CACHE`, or the user's cache."""
     return Path(os.environ.get(CACHE_VARIABLE) or user_cache_dir("cembench"))
 
 
 class Progress(Protocol):
-    """What is told how a download gets on, in bytes."""
+    """Receives the progress of a download in bytes."""
 
     total: int
 
     def update(self, count: int) -> None:
-        """So many more have arrived."""
+        """Receive the number of bytes that have arrived since the last call."""
 
     def reset(self) -> None:
-        """None have arrived."""
+        """Start again from zero bytes."""
 
     def close(self) -> None:
-        """It has ended."""
+        """End the display."""
 
 
 @dataclass(frozen=True)
 class Part:
-    """How a file of a model is kept: its place, what is kept of it, whether that is whole."""
+    """How to keep a file of a model: its path, the part that is kept, and a completeness check."""
 
     path: Callable[[], Path]
     converted: Callable[[Path], bytes]
     is_whole: Callable[[Path], bool]
 
 
-#: The licence of a dataset whose publisher states none: fetch it for yourself, do not pass it on.
+#: Licence of a dataset whose publisher states none: it may be fetched, but not redistributed.
 NONE_STATED = "none stated"
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """A mesh file that can be fetched: pure data, offered as an entry point.
+    """A mesh file that can be fetched: plain data, declared by an entry point.
 
     Parameters
     ----------
     name, title : str
-        What the command line calls it, and what people do.
+        Name on the command line, and in tables.
     source_url : str
-        Where it was published, ending with the file's name.
+        Where the file was published; ends with the file name.
     sha256 : str
-        Of the file.
+        Checksum of the file.
     licence : str
         SPDX identifier.
     size : int or None
         Bytes, if known.
     paper_row : str
-        The model of the paper's Table 1 that it is, if any.
+        The model of the paper's Table 1 that the mesh is, if any.
     mesh_hash : str
-        Hash of the mesh in it, by which the same surface in another file is recognised; "" if not
-        known.
+        Hash of the mesh, by which it is recognised in other files; "" if unknown.
     group : str
-        What it is fetched with: "disks".
+        Name of the group it is fetched with, e.g. "disks".
     faces : int or None
-        Triangles of its mesh, if known.
+        Number of triangles, if known.
     arrays : tuple of two str, optional
-        The arrays of vertices and triangles, where its file holds several meshes.
+        Names of the vertex and triangle arrays, if the file holds several meshes.
     polygons : tuple of two int, optional
-        The first and the last polygon of the surface, counted from 0, where its file holds more.
+        First and last polygon of the surface, counted from 0, if the file holds more.
     note : str
-        What is to be known of it.
+        A remark for the user.
     part : Part, optional
-        For a file that is no surface but belongs to a model: what is kept of it.
+        For a file that is part of a model and not a surface: what is kept of it.
 
     """
 
@@ -121,39 +119,40 @@ class Dataset:
 
     @property
     def file(self) -> str:
-        """The file's name."""
+        """The name of the file."""
         return self.source_url.rpartition("/")[2]
 
     @property
     def url(self) -> str:
-        """Where it is fetched from: the mirror if one is set."""
+        """The URL to fetch it from; on the mirror, if one is set."""
         mirror = os.environ.get(MIRROR_VARIABLE)
         return f"{mirror.rstrip('/')}/{quote(self.file)}" if mirror else self.source_url
 
     @property
     def path(self) -> Path:
-        """Where it lies once it has been fetched."""
+        """The path of the file once it is fetched."""
         if self.part:
             return self.part.path()
         return cache_directory() / "datasets" / file_name(self.file)
 
     @property
     def fetch_only(self) -> bool:
-        """Whether no licence is stated that would allow to pass it on."""
+        """Whether no stated licence permits redistribution."""
         return self.licence == NONE_STATED
 
     @property
     def origin(self) -> str:
-        """What declares it, for messages."""
+        """The declaring package, for messages."""
         return self.source_url
 
 
 def is_fetched(dataset: Dataset) -> bool:
-    """Does the file lie in the cache, whole? Nothing is fetched."""
+    """Whether the complete file is in the cache; nothing is fetched."""
     return dataset.path.is_file() and _is_whole(dataset, dataset.path)
 
 
 def _is_whole(dataset: Dataset, path: Path) -> bool:
+    """Whether the file at a path is the dataset's, by its checksum or by its mesh."""
     if dataset.part and path == dataset.path:
         return dataset.part.is_whole(path)
     if dataset.sha256:
@@ -162,6 +161,7 @@ def _is_whole(dataset: Dataset, path: Path) -> bool:
 
 
 def _hash_of_mesh(dataset: Dataset, path: Path) -> str | None:
+    """Return the hash of the mesh in a file; None if it holds no valid mesh."""
     from cembench.mesh.files import read_mesh
     from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -178,18 +178,33 @@ def fetch(
     progress: Progress | None = None,
     have: Sequence[Path] = (),
 ) -> Path:
-    """Where is this dataset's file? Fetched if it is not in the cache, or not whole there.
+    """Return the path of a dataset's file; it is fetched unless the cache has it complete.
 
-    `timeout` in seconds is that of the server's answer, not of the whole download. A file of the
-    same content in the cache or in a folder of `have` is taken, whatever it is called.
+    A file of the same content in the cache, or in a folder of `have`, is used whatever its name.
+
+    Parameters
+    ----------
+    dataset : Dataset
+        What to fetch.
+    timeout : float
+        Seconds to wait for the server's answer; the download itself may take longer.
+    progress : Progress, optional
+        Receives the progress.
+    have : sequence of Path
+        Folders with files that were downloaded before.
+
+    Returns
+    -------
+    Path
+        The verified file in the cache.
 
     Raises
     ------
     DatasetError
-        A server that does not answer, a download that breaks off, a file whose checksum is wrong;
-        the message names file and URL.
+        The server does not answer, the download breaks off, or the checksum is wrong; the message
+        names the file and the URL.
     MissingExtra
-        The libraries that download are not installed.
+        The download libraries are not installed.
     RecordError
         The cache cannot be written to, or its disk is full.
 
@@ -211,7 +226,7 @@ def fetch(
 
 
 def _keep(dataset: Dataset, fill: Callable[[BinaryIO], object]) -> None:
-    """Put what `fill` writes to its place once it has been found to be whole."""
+    """Move what `fill` writes to its final path after verifying it."""
     if not dataset.part:
         write(dataset.path, fill, check=lambda draft: _check_whole(dataset, draft))
         return
@@ -230,7 +245,7 @@ def _copied(path: Path, file: BinaryIO) -> None:
 
 
 def _of_same_content(dataset: Dataset, have: Sequence[Path]) -> Path | None:
-    """Return a file with this dataset's content, in the cache's folder or in one of `have`."""
+    """Return a file with this dataset's content in the cache or in a folder of `have`."""
     if not dataset.sha256:
         return None
     for folder in (dataset.path.parent, *have):
@@ -241,9 +256,9 @@ def _of_same_content(dataset: Dataset, have: Sequence[Path]) -> Path | None:
 
 
 def _holds(path: Path, dataset: Dataset) -> bool:
-    """Whether this is a file with the dataset's content; one that cannot be read is not.
+    """Whether a file has the dataset's content; never for an unreadable file.
 
-    Drafts are left out: another download renames or clears them at any moment.
+    Drafts are skipped, since another download may rename or delete them at any moment.
     """
     if is_draft(path):
         return False
@@ -257,7 +272,7 @@ def _holds(path: Path, dataset: Dataset) -> bool:
 
 @dataclass(frozen=True)
 class Fetched:
-    """How it went with a dataset: its place, or the error."""
+    """The outcome for one dataset: its path, or the error."""
 
     dataset: Dataset
     path: Path | None
@@ -272,15 +287,15 @@ def fetch_all(
     have: Sequence[Path] = (),
     progress: Callable[[Dataset], Progress | None] = lambda dataset: None,
 ) -> Iterator[Fetched]:
-    """Fetch several datasets at once, and give each as it ends; an error stops none of the others.
+    """Fetch several datasets at once and yield each as it ends; an error does not stop the others.
 
-    Datasets of one file fetch it once. What was fetched before an interruption stays, so that
-    the same call again goes on from there.
+    Datasets with the same file fetch it once. Files fetched before an interruption are kept, so the
+    same call continues from there.
 
     Raises
     ------
     RecordError
-        The cache cannot be written to, or its disk is full: nothing more is begun.
+        The cache cannot be written to, or its disk is full; no further download is started.
 
     """
     by_place: dict[Path, list[Dataset]] = {}
@@ -305,9 +320,9 @@ def fetch_all(
 
 
 def surface_file(dataset: Dataset) -> Path:
-    """Return the file to read a fetched dataset's surface from.
+    """Return the file from which a fetched dataset's surface is read.
 
-    It is the fetched file, or an OBJ of the part of it that the dataset is.
+    It is the fetched file, or an OBJ file with the part of it that the dataset is.
     """
     if dataset.arrays is None and dataset.polygons is None:
         return dataset.path
@@ -323,6 +338,7 @@ def surface_file(dataset: Dataset) -> Path:
 
 
 def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progress | None) -> None:
+    """Download a dataset's file; :class:`DatasetError` if that fails."""
     import pooch
     import requests
 
@@ -338,6 +354,7 @@ def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progre
 
 
 def _check_whole(dataset: Dataset, path: Path) -> None:
+    """Raise :class:`DatasetError` if a downloaded file is not the dataset's."""
     if _is_whole(dataset, path):
         return
     what = f"SHA-256 is not {dataset.sha256}"
@@ -350,7 +367,7 @@ def _check_whole(dataset: Dataset, path: Path) -> None:
 
 
 def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:
-    """Which dataset is it that was read from this file? Known by its bytes, or by its mesh."""
+    """Return the dataset that a file holds, by its bytes or by its mesh; None if unknown."""
     checksum = _sha256(path)
     for dataset in datasets:
         whole = dataset.arrays is None and dataset.polygons is None

@@ -1,7 +1,7 @@
-"""What is wrong with vertices and triangles that are to be a surface.
+"""Defects of vertices and triangles that should form a surface.
 
-Every defect has a kind, a count and a sentence, and :class:`UnusableMeshError` holds all of them,
-so that a user mends a file once and not once for each message.
+Every defect has a kind, a count and a sentence. :class:`UnusableMeshError` holds all defects of a
+mesh, so that a user can repair them in one go.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-#: A triangle counts as degenerate when its area is below this share of its longest edge squared.
+#: A triangle is degenerate if its area is below this share of its longest edge squared.
 DEGENERATE_AREA = 1e-15
-#: Below this share a triangle is kept, with a notice: cotangents lose digits with its square.
+#: Below this share a triangle is kept with a notice: its cotangents lose digits.
 SLIVER_AREA = 1e-6
-#: Coordinates and edges in between: the fourth powers of lengths are computed with.
+#: Allowed range of coordinates and edges, since fourth powers of lengths are computed.
 LARGEST_LENGTH = 1e60
 SMALLEST_LENGTH = 1e-60
 
 
 class Defect(StrEnum):
-    """What can be wrong with a surface, in the order in which a repair goes about it."""
+    """Kinds of defects of a surface, in the order in which a repair treats them."""
 
     not_finite = "not finite"
     out_of_range = "out of range"
@@ -55,7 +55,7 @@ class Defect(StrEnum):
 
 
 class Remedy(StrEnum):
-    """What does away with a defect; most are commands."""
+    """Ways to remove a defect; most are commands."""
 
     repair = "repair"
     fill = "fill"
@@ -75,24 +75,24 @@ _REMEDIES = {
 
 @dataclass(frozen=True)
 class Problem:
-    """One kind of defect of a surface: how often it occurs, and where first."""
+    """One kind of defect of a surface, its count and its first occurrence."""
 
     defect: Defect
-    #: How many vertices, triangles, edges, pieces, loops or handles have it.
+    #: Number of affected vertices, triangles, edges, pieces, loops or handles.
     count: int
-    #: What is wrong, where, and what is allowed; no full stop at the end.
+    #: What is wrong, where, and what is allowed; without a full stop.
     text: str
-    #: For holes: so many edges has the largest of those that would have to be filled.
+    #: For holes: number of edges of the largest one that would have to be filled.
     edges: int = 0
 
     @property
     def remedy(self) -> Remedy:
-        """What does away with it."""
+        """The way to remove this defect."""
         return _REMEDIES.get(self.defect, Remedy.repair)
 
 
 class UnusableMeshError(MeshError):
-    """A surface with defects; `problems` are all of them, and the message names the remedies."""
+    """A surface with defects: `problems` lists them all, and the message names the remedies."""
 
     def __init__(self, problems: Sequence[Problem], path: Path | None = None) -> None:
         self.problems = tuple(problems)
@@ -110,7 +110,7 @@ class UnusableMeshError(MeshError):
 
 
 def _remedies(problems: Sequence[Problem], path: Path | None) -> str:
-    """Return the commands that mend a surface, in the order in which they are to be used."""
+    """Return the commands that repair a surface, in the order of their use."""
     needed = {p.remedy for p in problems}
     given = "IN" if path is None else shlex.quote(str(path))
     mended = "OUT" if path is None else f"{shlex.quote(path.stem + '_repaired')}.obj"
@@ -143,7 +143,7 @@ def _remedies(problems: Sequence[Problem], path: Path | None) -> str:
 
 
 def located(error: MeshError, path: Path | None) -> MeshError:
-    """Return the same error with the file it is about, if there is one."""
+    """Return the same error with the path of its file, if there is one."""
     if path is None:
         return error
     if isinstance(error, UnusableMeshError):
@@ -162,11 +162,11 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
     """
     points, faces = np.asarray(V), np.asarray(F)
     if points.ndim != 2 or points.shape[1] != 3:
-        raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), one row a vertex.")
+        raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), a row per vertex.")
     if points.dtype.kind not in "fiub":
         raise MeshError(f"coordinates are of type {points.dtype}; allowed are real numbers.")
     if not len(points):
-        raise MeshError("the mesh has no vertices; a surface needs some.")
+        raise MeshError("the mesh has no vertices; a surface needs at least three.")
     if faces.size == 0:
         raise MeshError(
             f"the mesh has {len(points)} vertices but no faces; a surface needs triangles. "
@@ -174,7 +174,7 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
         )
     if faces.ndim != 2 or faces.shape[1] != 3:
         raise MeshError(
-            f"faces have shape {faces.shape}; allowed is (m, 3), three vertex indices a triangle."
+            f"faces have shape {faces.shape}; allowed is (m, 3), three vertex indices per triangle."
         )
     if not np.issubdtype(faces.dtype, np.integer):
         raise MeshError(f"face indices are of type {faces.dtype}; allowed are integers.")
@@ -182,22 +182,22 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
 
 
 class Examination(NamedTuple):
-    """What was found out about triangles."""
+    """The result of examining triangles."""
 
-    #: The triangles, those turned over that faced the other way than the rest of their piece.
+    #: The triangles, oriented consistently in each connected piece.
     F: Indices
-    #: What was changed, and which triangles are sound but hardly.
+    #: What was changed, and which valid triangles are nearly degenerate.
     notices: tuple[Notice, ...]
-    #: Every defect that keeps them from being a manifold; none if this is empty.
+    #: Every defect that keeps them from being a manifold; empty for a manifold.
     problems: tuple[Problem, ...]
 
 
 def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
     """Orient triangles, and find every defect that keeps them from being a manifold.
 
-    `connected` says that they must form a single piece too. On a sound surface only what can be
-    ruled out quickly is looked at. On one with defects, coincident vertices and turned triangles
-    are named as well: alone they are allowed, but they are often the cause.
+    With `connected` they must form a single piece too. For a valid surface only the quick checks
+    run. For a surface with defects, coincident vertices and inconsistently oriented triangles are
+    listed as well: they are allowed by themselves, but often the cause.
     """
     finite: Mask = np.asarray(np.isfinite(V).all(axis=1))
     inside: Mask = np.asarray(((F >= 0) & (len(V) > F)).all(axis=1))
@@ -238,12 +238,12 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
 
 
 def degenerate(V: Points, F: Indices) -> Mask:
-    """Whether each triangle is without an area, up to rounding."""
+    """Whether each triangle has no area, up to rounding."""
     return _thinner_than(DEGENERATE_AREA, V, F)
 
 
 def out_of_scale(V: Points, F: Indices) -> Problem | None:
-    """Return the problem that products of lengths would overflow or vanish, if they would."""
+    """Return the problem that products of lengths would overflow or underflow, or None."""
     finite = np.abs(V[np.isfinite(V).all(axis=1)])
     largest = finite.max(initial=0)
     if largest > LARGEST_LENGTH:
@@ -275,9 +275,9 @@ def duplicates(F: Indices) -> Mask:
 
 
 def representatives(V: Points, tolerance: float = 0.0) -> Indices:
-    """Return for each vertex the first vertex at its place, or within the tolerance of it.
+    """Return for each vertex the first vertex at its position, or within the tolerance of it.
 
-    Vertices that a chain of steps within the tolerance links count as one place.
+    Vertices that are linked by steps within the tolerance count as one.
     """
     if tolerance == 0:
         _, first, place = np.unique(V + 0.0, axis=0, return_index=True, return_inverse=True)
@@ -293,26 +293,26 @@ def representatives(V: Points, tolerance: float = 0.0) -> Indices:
 
 
 def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
-    """Orient all triangles of a piece alike, as most of them are.
+    """Orient all triangles of each piece consistently, as most of them are.
 
     Returns
     -------
     F : int64 (m, 3)
-        The triangles; those turned over have two corners exchanged.
+        The triangles; reversed ones have two corners exchanged.
     turned : bool (m,)
-        Which those are.
+        Whether a triangle was reversed.
     contradictions : int64 (k, 2)
-        Directed edges that two triangles still share: there are none unless the surface is
-        one-sided or has non-manifold edges.
+        Directed edges that two triangles still share; empty unless the surface is one-sided or has
+        non-manifold edges.
 
     """
     if not len(topology.repeated_half_edges(F)):
         return F, np.zeros(len(F), dtype=bool), np.empty((0, 2), dtype=np.int64)
-    import igl  # here and elsewhere: every measured process would wait for it, and none needs it
+    import igl  # imported here: every measured process would wait for it, and none needs it
 
     found, piece = igl.bfs_orient(F)
     turned = (found != F).any(axis=1)
-    # The search keeps the first triangle it meets; keep the majority instead, piece by piece.
+    # The search keeps the orientation of its first triangle; keep the majority's instead.
     mostly = np.bincount(piece, weights=turned) > np.bincount(piece) / 2
     turned ^= mostly[piece]
     F = np.ascontiguousarray(np.where(turned[:, None], F[:, ::-1], F))
@@ -320,7 +320,7 @@ def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
 
 
 def coincident(V: Points) -> Problem | None:
-    """Return the problem that vertices lie exactly where others do, if any do."""
+    """Return the problem that vertices coincide exactly, or None."""
     finite = np.flatnonzero(np.isfinite(V).all(axis=1))
     same = representatives(V[finite])
     extra = np.flatnonzero(same != np.arange(len(same)))
@@ -336,7 +336,7 @@ def coincident(V: Points) -> Problem | None:
 
 
 def components(F: Indices, n: int) -> Problem | None:
-    """Whether the triangles form more than one connected piece."""
+    """Return the problem that triangles form several connected pieces, or None."""
     _, label = topology.components(F, n)
     vertices = np.bincount(label, weights=_used(F, n)).astype(int)
     pieces = np.flatnonzero(vertices)
@@ -353,13 +353,13 @@ def components(F: Indices, n: int) -> Problem | None:
 
 
 def some(indices: NDArray[np.int64], most: int = 5) -> str:
-    """Write the first few of many, for a message."""
+    """Format the first few of many indices for a message."""
     shown = ", ".join(str(k) for k in indices[:most].tolist())
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
 
 
 def _thinner_than(share: float, V: Points, F: Indices) -> Mask:
-    """Whether each triangle has at most this share of its longest edge squared as its area."""
+    """Whether each triangle's area is at most this share of its longest edge squared."""
     corners = V[F]
     edges = corners[:, [1, 2, 0]] - corners
     double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
@@ -369,6 +369,7 @@ def _thinner_than(share: float, V: Points, F: Indices) -> Mask:
 
 
 def _slivers(V: Points, F: Indices) -> tuple[Notice, ...]:
+    """Return a notice if some triangles are slivers."""
     thin = np.flatnonzero(_thinner_than(SLIVER_AREA, V, F))
     if not len(thin):
         return ()
@@ -380,6 +381,7 @@ def _slivers(V: Points, F: Indices) -> tuple[Notice, ...]:
 
 
 def _turned(turned: Mask) -> tuple[Notice, ...]:
+    """Return a notice if some triangles were reversed."""
     if not turned.any():
         return ()
     told = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
@@ -387,6 +389,7 @@ def _turned(turned: Mask) -> tuple[Notice, ...]:
 
 
 def _used(F: Indices, n: int) -> Mask:
+    """Whether each of n vertices belongs to a triangle."""
     used = np.zeros(n, dtype=bool)
     used[F] = True
     return used
@@ -448,6 +451,7 @@ def _duplicates(F: Indices, number: Indices) -> Problem | None:
 
 
 def _edges(edges: Indices, faces: Indices) -> Problem | None:
+    """Return the problem that edges have more than two triangles, or None."""
     bad = np.flatnonzero(faces > 2)
     if not len(bad):
         return None
@@ -461,6 +465,7 @@ def _edges(edges: Indices, faces: Indices) -> Problem | None:
 
 
 def _one_sided(contradictions: Indices, faces: Indices) -> Problem | None:
+    """Return the problem that a surface with manifold edges is one-sided, or None."""
     if not len(contradictions) or faces.max() > 2:
         return None
     i, j = contradictions[0].tolist()
@@ -484,13 +489,14 @@ def _orientation(bad: Indices, F: Indices) -> Problem | None:
 
 
 def _vertices(F: Indices) -> Problem | None:
+    """Return the problem that triangles at a vertex form several fans, or None."""
     import igl
 
-    # Triangles of one or two vertices are a defect of their own; libigl takes long over many.
+    # Triangles with one or two vertices are another defect; libigl is slow with many of them.
     proper = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
     if not len(proper):
         return None
-    manifold = igl.is_vertex_manifold(proper)  # false also for numbers that no triangle has
+    manifold = igl.is_vertex_manifold(proper)  # also false for vertices in no triangle
     bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
     if not len(bad):
         return None

@@ -1,6 +1,6 @@
-"""Mesh files read as checked surfaces, and surfaces and maps written to files.
+"""Read mesh files as checked surfaces, and write surfaces and maps to files.
 
-Polygons are cut into triangles by fans, with a notice.
+Polygons are cut into triangles, with a notice.
 """
 
 from __future__ import annotations
@@ -41,31 +41,45 @@ def read_mesh(
     arrays: tuple[str, str] | None = None,
     polygons: tuple[int, int] | None = None,
 ) -> M:
-    """Read a file as a checked surface, which is named after the file's stem.
+    """Read a file as a checked surface, named after the file's stem.
 
     Parameters
     ----------
     path : path
-        OBJ, OFF, PLY, STL, MAT, NPZ; with the extra "meshes" also VTK, VTU, GLB, GLTF and GII.
+        OBJ, OFF, PLY, STL, MAT or NPZ; with the extra "formats" also VTK, VTU, GLB, GLTF and GII.
     mesh_type : type
-        What it must be: `DiskMesh`, `HoledMesh`, or `TriangleMesh` for any surface.
+        The required class: `DiskMesh`, `HoledMesh`, or `TriangleMesh` for any surface.
     arrays : tuple of two str, optional
-        For MAT and NPZ files: the names of the vertices and of the triangles; default: found.
+        For MAT and NPZ files: the names of the vertices and of the triangles (default: found
+        automatically).
     polygons : tuple of two int, optional
-        The first and the last polygon that is taken, counted from 0; default: all. The vertices
-        of the others are left out.
+        The first and the last polygon to read, counted from 0 (default: all). Vertices of other
+        polygons are dropped.
+
+    Returns
+    -------
+    DiskMesh, HoledMesh or TriangleMesh
+        The surface, of the class `mesh_type`.
 
     Raises
     ------
     MeshError
-        The file is missing, empty, of unknown format or damaged, or its mesh fails a check.
+        The file is missing, empty, damaged or of unknown format, or its mesh fails a check.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.write_mesh("disk.obj", cembench.surface("flat-disk", 600))
+    >>> mesh = cembench.read_mesh("disk.obj")
+    >>> mesh.name, mesh.m
+    ('disk', 600)
 
     """
     return checked(read_soup(path, arrays=arrays, polygons=polygons), mesh_type, Path(path))
 
 
 def read_repaired(path: Path) -> tuple[Soup, Repaired]:
-    """Read a file and repair it: the largest surface in it, and what was done.
+    """Read a file and repair it; return the largest surface in it and a summary of the repair.
 
     Raises
     ------
@@ -84,7 +98,7 @@ def read_repaired(path: Path) -> tuple[Soup, Repaired]:
 
 
 def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
-    """Check the polygons of a file as a surface of this kind, cut into triangles.
+    """Cut the polygons of a file into triangles and check them as a surface of this class.
 
     Raises
     ------
@@ -106,11 +120,11 @@ def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
 def write_mesh(
     path: str | os.PathLike[str], mesh: TriangleMesh, uv: NDArray[np.complex128] | None = None
 ) -> None:
-    """Write the surface, and the map as its texture coordinates, as it is.
+    """Write a surface, with a map as its texture coordinates if one is given.
 
-    The file appears whole or not at all. OBJ, VTP and NPZ hold every bit of the texture
-    coordinates; PLY and GLB, whose readers want it so, single precision: triangles fold in it where
-    the map shrinks the surface much.
+    The file is written completely or not at all. OBJ, VTP and NPZ hold texture coordinates in full
+    precision; PLY and GLB in single precision, as their readers expect, so that triangles fold
+    where the map shrinks the surface strongly.
 
     Parameters
     ----------
@@ -119,13 +133,19 @@ def write_mesh(
     mesh : TriangleMesh
         The surface.
     uv : complex128 (n,), optional
-        Image of each vertex. :func:`cembench.mesh.unit_square.to_unit_square` moves it to where
-        engines look for textures.
+        Image of each vertex, written unchanged. :func:`cembench.mesh.unit_square.to_unit_square`
+        moves it to the unit square, where engines expect textures.
 
     Raises
     ------
     MeshError
-        Unknown format, one that cannot hold UVs (OFF, STL), or a folder that cannot be written.
+        The format is unknown or cannot hold UVs (OFF, STL), or the folder cannot be written to.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> disk = cembench.surface("flat-disk", 600)
+    >>> cembench.write_mesh("disk_uv.obj", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
 
     """
     UV = None if uv is None else np.stack([uv.real, uv.imag], axis=1)
@@ -140,7 +160,7 @@ def write_textured(path: Path, surface: Textured) -> None:
 
 
 def check_writable_format(path: Path, *, with_uv: bool) -> None:
-    """Raise :class:`MeshError` where :func:`write_mesh` could not write a file of this name."""
+    """Raise :class:`MeshError` if :func:`write_mesh` cannot write a file of this name."""
     suffix = path.suffix.lower()
     allowed = WITH_UV if with_uv else tuple(_WRITERS)
     if suffix not in allowed:
@@ -164,5 +184,5 @@ _WRITERS: dict[str, Callable[[Textured], bytes]] = {
 }
 #: Formats that hold texture coordinates.
 WITH_UV = (".obj", ".ply", ".glb", ".vtp", ".npz")
-#: Those of them that hold them in single precision.
+#: Those that hold texture coordinates in single precision.
 SINGLE = (".ply", ".glb")

@@ -1,4 +1,4 @@
-"""What flipping many edges at once takes, for triangles known by their sides' lengths alone."""
+"""Simultaneous edge flips of triangles that are known by their side lengths alone."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ Indices = NDArray[np.int64]
 
 
 class Independence:
-    """Chooses edges that share no triangle, so that they can be flipped at once.
+    """Select edges that share no triangle, so that all can be flipped at once.
 
     Parameters
     ----------
     m : int
-        How many triangles there are.
+        Number of triangles.
 
     """
 
@@ -23,9 +23,9 @@ class Independence:
         self._first = np.full(m, np.iinfo(np.int64).max)  # the same before and after each call
 
     def __call__(self, left: Indices, right: Indices) -> NDArray[np.bool_]:
-        """Return which edges to take (k,), given the triangles on either side, best edges first.
+        """Return the selected edges (k,), given the triangles on either side, best edges first.
 
-        An edge is taken where no earlier one has either of its triangles.
+        An edge is selected if no earlier edge has either of its triangles.
         """
         order = np.arange(len(left))
         for triangles in (left, right):
@@ -36,9 +36,9 @@ class Independence:
 
 
 def distance_across(base: Real, left: Real, right: Real, left2: Real, right2: Real) -> Real:
-    """Return how far the tips of two flat triangles are apart that share the edge `base`.
+    """Return the distance between the tips of two flat triangles that share the edge `base`.
 
-    `left` and `right` are one triangle's sides at the base's left and right end, `left2` and
+    `left` and `right` are one triangle's sides at the left and right end of the base, `left2` and
     `right2` the other's at the same ends. All arrays have one shape.
     """
     foot, height = _foot_and_height(base, left, right)
@@ -47,9 +47,9 @@ def distance_across(base: Real, left: Real, right: Real, left2: Real, right2: Re
 
 
 def area_of_sides(a: Real, b: Real, c: Real) -> Real:
-    """Return triangles' areas from the lengths of their sides; 0 where they make no triangle.
+    """Return the areas of triangles from their side lengths; 0 if they form no triangle.
 
-    Kahan's order of the operations keeps the digits of thin triangles.
+    Kahan's order of operations preserves the digits of thin triangles.
     """
     z, y, x = np.sort([a, b, c], axis=0)
     product = (x + (y + z)) * (z - (x - y)) * (z + (x - y)) * (x + (y - z))
@@ -58,6 +58,6 @@ def area_of_sides(a: Real, b: Real, c: Real) -> Real:
 
 
 def _foot_and_height(base: Real, left: Real, right: Real) -> tuple[Real, Real]:
-    """Where a triangle's tip lies over its base: from the base's left end, and above it."""
+    """Return the position of a triangle's tip along and above its base, from the left end."""
     foot = (base * base + (left - right) * (left + right)) / (2 * base)
     return foot, 2 * area_of_sides(base, left, right) / base

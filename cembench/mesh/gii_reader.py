@@ -1,4 +1,4 @@
-"""GIFTI surfaces (`.gii`), as brain imaging has them, through nibabel."""
+"""GIFTI surfaces (`.gii`), used in brain imaging, read through nibabel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""glTF files, `.glb` and `.gltf`, through trimesh: all triangles of the scene, moved in place."""
+"""glTF files, `.glb` and `.gltf`, through trimesh: all triangles of the scene, in place."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from cembench.mesh.soup import Soup, damaged
 
 
 def read_gltf(path: Path) -> Soup:
-    """Read every triangle of a scene; vertices that lie in one place are one vertex.
+    """Read all triangles of a scene; vertices at the same position become one vertex.
 
-    glTF has a vertex for each texture coordinate or normal, so a seam cuts its surface open.
+    glTF has a vertex for each texture coordinate or normal, so seams would cut the surface open.
     """
     require(Extra.FORMATS, f"reading {path.suffix} files", "trimesh")
     import trimesh
@@ -27,7 +27,7 @@ def read_gltf(path: Path) -> Soup:
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
     notices: tuple[Notice, ...] = ()
     if len(meshes) < len(pieces):
-        told = f"{len(pieces) - len(meshes)} pieces that are points or lines were left"
+        told = f"{len(pieces) - len(meshes)} pieces that are points or lines were ignored"
         notices = (Notice(NoticeKind.LINES_IGNORED, told),)
     if not meshes:
         return Soup.from_arrays(np.empty((0, 3)), [], [])

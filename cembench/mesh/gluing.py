@@ -1,7 +1,7 @@
-"""Triangles glued along chosen pairs of their sides, everything else left apart.
+"""Triangles glued along chosen pairs of sides, and separate everywhere else.
 
-A triangulation is its triangles and a list of which sides are glued to which. Leaving a pair out of
-the list cuts the surface there; gluing a side to at most one other makes every vertex a single fan.
+A triangulation is a list of triangles and a list of pairs of sides that are glued. Omitting a pair
+cuts the surface there. Since a side is glued to at most one other, every vertex has a single fan.
 So one function splits non-manifold vertices and edges, and cuts a surface open.
 
 Half-edge ``h = 3 t + c`` is the side of triangle ``t`` from corner ``h`` to the next corner of the
@@ -21,7 +21,7 @@ Indices = NDArray[np.int64]
 
 
 def edges_of_half_edges(F: Indices) -> tuple[Indices, Indices, Indices]:
-    """Return the edges (e, 2), the edge of each half-edge (3m,), each edge's faces (e,)."""
+    """Return the edges (e, 2), each half-edge's edge (3m,) and each edge's face count (e,)."""
     ends = np.sort(half_edges(F), axis=1)
     stride = int(F.max(initial=0)) + 1
     keys, edge, faces = np.unique(
@@ -37,7 +37,7 @@ def paired_half_edges(edge: Indices, faces: Indices) -> Indices:
 
 
 def twins_of_half_edges(F: Indices) -> Indices:
-    """Return the half-edge on the other side of each one of an oriented manifold; -1: boundary."""
+    """Return each half-edge's twin on an oriented manifold; -1 on the boundary."""
     ends = np.sort(half_edges(F), axis=1)
     keys = ends[:, 0] * (int(F.max(initial=0)) + 1) + ends[:, 1]
     order = np.argsort(keys, kind="stable")
@@ -55,21 +55,21 @@ def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
     F : int64 (m, 3)
         The triangles in the same order, with new vertices.
     origin : int64 (n',)
-        The vertex of the input that each new vertex is a copy of. Vertex i of the input stays
-        vertex i, with one of its fans; the copies for its other fans are numbered from `n` on.
+        The input vertex that each new vertex is a copy of. Input vertex i stays vertex i, with one
+        of its fans; the copies for its other fans are numbered from `n` on.
 
     """
     corner = np.arange(F.size).reshape(F.shape)
     following = np.roll(corner, -1, axis=1).ravel()
     vertex = F.ravel()
     left, right = pairs.T
-    alike = vertex[left] == vertex[right]  # both sides run the same way: orientations disagree
+    alike = vertex[left] == vertex[right]  # both run the same way: orientations disagree
     start = np.where(alike, right, following[right])
     end = np.where(alike, following[right], right)
     i, j = np.concatenate([left, following[left]]), np.concatenate([start, end])
     graph = sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(F.size, F.size))
     _, fan = csgraph.connected_components(graph, directed=False)
-    first = np.unique(fan, return_index=True)[1]  # a corner of each fan
+    first = np.unique(fan, return_index=True)[1]  # one corner of each fan
     owner = vertex[first]
     order = np.lexsort((first, owner))
     is_copy = np.zeros(len(owner), dtype=bool)

@@ -1,7 +1,7 @@
-"""Triangulations whose edges are flipped without moving a vertex: glued triangles with lengths.
+"""Intrinsic triangulations: triangles glued along half-edges, with lengths, flipped in place.
 
 Half-edge ``h = 3 t + c`` is the side of triangle t from its corner c to the next. Two triangles may
-share several edges, and an edge may be a loop: nothing is known by its end points.
+share several edges, and an edge may be a loop, so end points do not identify an edge.
 """
 
 from __future__ import annotations
@@ -19,28 +19,28 @@ from cembench.mesh.side_lengths import side_lengths
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: An edge is flipped where the cosines opposite to it sum to less than this.
+#: An edge is flipped if the cosines of its opposite angles sum to less than this.
 SURELY = -1e-10
-#: Rounds of flips of edges that share no triangle.
+#: Maximal number of rounds; the edges of a round share no triangle.
 MOST_ROUNDS = 20_000
-#: Small meshes of needles, whose angles have lost their digits, flip for ever: they get fewer.
+#: Small meshes of needles flip for ever, since their angles have no digits: they get fewer.
 LEAST_ROUNDS, ROUNDS_AN_EDGE = 1000, 10
 
 
 @dataclass
 class Triangulation:
-    """Triangles, glued along half-edges, with the logarithm of each one's length.
+    """Triangles glued along half-edges, with the logarithm of each half-edge's length.
 
     Parameters
     ----------
     F : int64 (m, 3)
-        The corners' vertices.
+        Vertices of the corners.
     twin : int64 (3 m,)
-        The half-edge on the other side of each; there is no boundary.
+        The twin of each half-edge; there is no boundary.
     log_length : float (3 m,)
-        Alike for twins.
+        Equal for twins.
     flips : int
-        How many there were.
+        Number of flips so far.
 
     """
 
@@ -51,9 +51,9 @@ class Triangulation:
 
     @classmethod
     def doubled(cls, F: Indices, V: Real, mirror: Indices) -> Triangulation:
-        """Both copies of a surface with boundary: its own triangles, then the mirrored ones.
+        """Return a surface with boundary glued to its mirror copy; its own triangles come first.
 
-        `mirror` (n,) gives each vertex's copy, a boundary vertex being its own.
+        `mirror` (n,) gives the copy of each vertex; a boundary vertex is its own copy.
         """
         m = len(F)
         twin = twins_of_half_edges(F)
@@ -70,21 +70,21 @@ class Triangulation:
         return cls(np.concatenate([F, mirror[F][:, ::-1]]), both, log_length)
 
     def scaled(self, u: Real) -> Real:
-        """Logarithms of the lengths with vertices scaled by exp(u); of each half-edge (3 m,)."""
+        """Return the log lengths (3 m,) after scaling vertices by exp(u)."""
         following = np.roll(self.F, -1, axis=1)
         return np.asarray(self.log_length + (u[self.F] + u[following]).ravel() / 2)
 
     def make_delaunay(self, u: Real, *, flat: bool = False) -> None:
-        """Flip edges until all are Delaunay where vertices are scaled by u (n,).
+        """Flip edges until all are Delaunay, with vertices scaled by u (n,).
 
-        With `flat` the triangles are Euclidean, and a flipped edge has the distance of its ends in
-        them (u is 0); otherwise it has the length that Ptolemy's rule gives, the hyperbolic metric
-        with cusps being kept, for which scaling does not matter.
+        With `flat` the triangles are Euclidean, and a flipped edge gets the distance of its ends in
+        them (u must be 0). Otherwise it gets its length from Ptolemy's rule, which preserves the
+        hyperbolic metric with cusps and does not depend on the scaling.
 
         Raises
         ------
         AlgorithmFailed
-            Flips do not come to an end.
+            The flips do not end.
 
         """
         apart = Independence(len(self.F))
@@ -107,7 +107,7 @@ class Triangulation:
         raise AlgorithmFailed(f"edges are still being flipped after {most} rounds")
 
     def _cosine(self, h: Indices, u: Real) -> Real:
-        """The cosine of the angle opposite to half-edges, as if their triangles were flat."""
+        """Return the cosine of the angle opposite to half-edges in Euclidean triangles."""
         t, c = h // 3, h % 3
         corner = u[self.F[t]]
         own = self.log_length.reshape(-1, 3)[t] + (corner + np.roll(corner, -1, axis=1)) / 2
@@ -117,7 +117,7 @@ class Triangulation:
             return np.asarray((np.exp(a - b) + np.exp(b - a) - np.exp(2 * e - a - b)) / 2)
 
     def _flip(self, h: Indices, *, flat: bool) -> Indices:
-        """Flip edges that share no triangle; the triangles that changed."""
+        """Flip edges that share no triangle; return the triangles that changed."""
         g = self.twin[h]
         t, s = h // 3, g // 3
         n1, n2 = (3 * t + (h + d) % 3 for d in (1, 2))

@@ -1,7 +1,7 @@
-"""MATLAB files of versions 5 to 7.2: v (n, 3) and f (m, 3) counted from 1, or two that fit.
+"""MATLAB files of versions 5 to 7.2: v (n, 3) and f (m, 3) counted from 1, or two arrays that fit.
 
-Own code, because scipy's reader crashes the process on some damaged files, and never ends on some
-of version 4. Here every length is compared with what is there before anything is read.
+Own code, because scipy's reader crashes the process on some damaged files and never ends on some of
+version 4. Here every length is compared with the available bytes before anything is read.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from cembench.mesh.array_pairs import soup_of_arrays
 from cembench.mesh.soup import Soup, damaged
 
 _HEADER_BYTES = 128
-#: The types of elements that hold numbers, and those of an array and of one that is compressed.
+#: Element types that hold numbers, and those of an array and of a compressed array.
 _NUMBERS = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
 }  # fmt: skip
 _ARRAY, _COMPRESSED = 14, 15
-#: The classes of arrays of numbers, and the flag of complex ones.
+#: Array classes that hold numbers, and the flag of complex arrays.
 _NUMERIC_CLASSES, _COMPLEX = range(6, 16), 0x0800
-#: So much of a compressed array holds its name, which says whether the rest is wanted.
+#: Bytes of a compressed array that are enough to read its name, to decide on the rest.
 _BEGINNING = 4096
 
 
 def read_mat(path: Path, arrays: tuple[str, str] | None = None) -> Soup:
-    """Read the vertices and triangles of a MATLAB file: v and f, those named, or two that fit."""
+    """Read the vertices and triangles of a MATLAB file: v and f, the named two, or two that fit."""
     content = path.read_bytes()
     if arrays:
         return soup_of_arrays(_read(content, lambda name, shape: name in arrays), arrays, 1)
@@ -44,9 +44,9 @@ def read_mat(path: Path, arrays: tuple[str, str] | None = None) -> Soup:
 
 
 def _read(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[str, NDArray[Any]]:
-    """Return the wanted arrays by name; the lengths of all others are checked.
+    """Return the wanted arrays by name, and check the lengths of all others.
 
-    `is_wanted` is told an array's name, and its shape where it holds real numbers.
+    `is_wanted` receives an array's name, and its shape if it holds real numbers.
     """
     order = _byte_order(content)
     found: dict[str, NDArray[Any]] = {}
@@ -64,13 +64,13 @@ def _read(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[s
             found[name] = _matrix(whole, order)
         elif begin is not element:
             _check_compressed(element, size + 8)
-        else:  # as there: damage in what is not wanted may not be the only one
+        else:  # check it all the same: damage there suggests more damage elsewhere
             deque(_elements(element, order), maxlen=0)
     return found
 
 
 def _byte_order(content: bytes) -> str:
-    """How numpy calls the byte order of a file of version 5."""
+    """Return numpy's symbol for the byte order of a version 5 file."""
     order = {b"IM": "<", b"MI": ">"}.get(content[126:_HEADER_BYTES], "")
     version = np.frombuffer(content, f"{order}u2", 1, 124)[0] if order else 0
     if version == 0x0100:
@@ -84,12 +84,12 @@ def _byte_order(content: bytes) -> str:
 
 
 def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """The types and contents of the data elements, one after another."""
+    """Yield the type and content of each data element."""
     at = 0
     while at < len(content):
         kind, size = _two_numbers(content, at, order)
         begin = at + 8
-        if kind >> 16:  # so short that it is stored in its own head
+        if kind >> 16:  # a small element is stored within its own head
             kind, size, begin = kind & 0xFFFF, kind >> 16, at + 4
             if size > 4:
                 raise damaged(f"it cannot be read as MAT: a short element of {size} bytes")
@@ -103,6 +103,7 @@ def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 
 
 def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
+    """Return the two 32-bit numbers at a position."""
     if at + 8 > len(content):
         raise damaged("it cannot be read as MAT: it ends within the head of an element")
     first, second = np.frombuffer(content, f"{order}u4", 2, at).tolist()
@@ -110,6 +111,7 @@ def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
 
 
 def _inflated(element: bytes, most: int) -> bytes:
+    """Return at most this many first bytes of a compressed element."""
     try:
         return zlib.decompressobj().decompress(element, most)
     except zlib.error as error:
@@ -117,7 +119,7 @@ def _inflated(element: bytes, most: int) -> bytes:
 
 
 def _check_compressed(element: bytes, size: int) -> None:
-    """Raise where an element that is not wanted is damaged: so is the file, perhaps elsewhere."""
+    """Raise if an unwanted element is damaged, since the file may be damaged elsewhere too."""
     stream, rest, length = zlib.decompressobj(), element, 0
     while rest and length <= size:
         try:
@@ -130,7 +132,7 @@ def _check_compressed(element: bytes, size: int) -> None:
 
 
 def _inflated_whole(element: bytes, size: int) -> bytes:
-    """All bytes of a compressed element, so many by its own word, its checksum compared."""
+    """Return all bytes of a compressed element, whose size and checksum are verified."""
     stream = zlib.decompressobj()
     try:
         found = stream.decompress(element, size + 1)
@@ -145,7 +147,7 @@ def _inflated_whole(element: bytes, size: int) -> bytes:
 
 
 def _numbers(part: tuple[int, bytes], order: str) -> NDArray[Any]:
-    """The numbers of an element."""
+    """Return the numbers of an element."""
     kind, content = part
     if kind not in _NUMBERS or len(content) % int(_NUMBERS[kind][1:]):
         raise damaged(
@@ -155,7 +157,7 @@ def _numbers(part: tuple[int, bytes], order: str) -> NDArray[Any]:
 
 
 def _head(parts: Iterator[tuple[int, bytes]], order: str) -> tuple[str, list[int], int]:
-    """The name of an array, its shape, and the number that holds its class and flags."""
+    """Return the name and shape of an array, and the number that holds its class and flags."""
     flags, shape, name = (_numbers(next(parts, (0, b"")), order) for _ in range(3))
     if not len(flags):
         raise damaged("it cannot be read as MAT: an array has no class")
@@ -168,7 +170,7 @@ def _is_numeric(flags: int) -> bool:
 
 
 def _matrix(content: bytes, order: str) -> NDArray[Any]:
-    """The real numbers (rows, 3), or (rows, 2), of an array."""
+    """Return the real numbers (rows, 3) or (rows, 2) of an array."""
     parts = _elements(content, order)
     name, shape, flags = _head(parts, order)
     numeric = _is_numeric(flags)

@@ -1,8 +1,8 @@
-"""Wavefront OBJ files: the vertices and the faces, nothing else.
+"""Wavefront OBJ files: vertices and faces only.
 
-Own code, because meshio, trimesh and libigl each lose faces of legal files without a word (after a
-tab, in an indented line, in a last line cut short) or refuse them (comments behind a face, texture
-seams, Latin-1 text).
+Own code, because meshio, trimesh and libigl each lose faces of valid files silently (after a tab,
+in an indented line, in a truncated last line) or refuse them (comments after a face, texture seams,
+Latin-1 text).
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown, words_of
 
-#: Statements that hold no polygon and are skipped; any other word is reported.
+#: Statements without polygons, which are skipped; any other word is reported.
 _SKIPPED = frozenset(
     "vt vn vp deg bmat step cstype p l curv curv2 surf parm trim hole scrv sp end con bevel "  # noqa: SIM905
     "c_interp d_interp lod shadow_obj trace_obj ctech stech call csh bsp bzp cdc cdp res".split()
 )
-#: Statements that end in a name: a backslash at their end belongs to it.
+#: Statements that end with a name, which may end with a backslash.
 _NAMED = frozenset(("o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib"))
 
 
@@ -27,7 +27,7 @@ def read_obj(path: Path) -> Soup:
     """Read the vertices and polygons of an OBJ file; texture seams do not cut the surface."""
     coordinates, corners, sizes = array("d"), array("q"), array("q")
     unknown: list[str] = []
-    # Latin-1 decodes any bytes: names and comments may be of any encoding.
+    # Latin-1 decodes any bytes: names and comments may have any encoding.
     with path.open(encoding="latin-1") as file:
         lines = enumerate(file, 1)
         for number, line in lines:
@@ -51,7 +51,7 @@ def read_obj(path: Path) -> Soup:
 
 
 def statement_words(number: int, line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
-    """Return the words of the statement that begins in a line; what continues it is taken too."""
+    """Return the words of the statement that starts in a line, including continuation lines."""
     words = words_of(line)
     if words and words[0] not in _NAMED and ("#" in line or "\\" in line or number == 1):
         return _whole_statement(line, lines)
@@ -59,9 +59,9 @@ def statement_words(number: int, line: str, lines: Iterator[tuple[int, str]]) ->
 
 
 def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
-    """The words of a line without its comment, and of the lines on which a backslash continues it.
+    """Return the words of a line without its comment, and of the lines that continue it.
 
-    They are never none: an empty statement is one empty word.
+    The result is never empty: an empty statement is one empty word.
     """
     words: list[str] = []
     while True:
@@ -74,7 +74,7 @@ def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
 
 
 def _point(words: list[str]) -> list[float]:
-    """The three coordinates; a weight or a colour may follow them."""
+    """Return the three coordinates; a weight or a colour may follow them."""
     numbers = [float(word) for word in words[1:]]
     if len(numbers) < 3:
         raise ValueError(f"a vertex needs 3 numbers, but this one has {len(numbers)}")
@@ -83,7 +83,7 @@ def _point(words: list[str]) -> list[float]:
 
 
 def _face(words: list[str], vertices: int) -> list[int]:
-    """The vertex indices, counted from 1; below 0 they count back from the last vertex so far."""
+    """Return vertex indices, counted from 1; negative ones count back from the latest vertex."""
     face = [int(word.split("/", 1)[0]) for word in words[1:]]
     if len(face) < 3:
         raise ValueError(f"a face needs 3 corners, but this one has {len(face)}")

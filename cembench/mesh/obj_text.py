@@ -1,4 +1,4 @@
-"""The text of OBJ files: a new one, or one that exists with other texture coordinates.
+"""OBJ files as text: compose a new one, or replace the texture coordinates of an existing one.
 
 Numbers are written as the shortest decimals that read back as the same double.
 """
@@ -17,9 +17,9 @@ from cembench.mesh.obj_reader import statement_words
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
-#: A face's corners: vertex from 0, and the normal's index as the file has it.
+#: A face's corners: the vertex, counted from 0, and the normal's index as in the file.
 Face = Sequence[tuple[int, str]]
-#: By the vertices of a triangle: the texture coordinate of each.
+#: Texture coordinate of each vertex of a triangle, by the triangle's vertices.
 Corners = Mapping[frozenset[int], Mapping[int, int]]
 
 
@@ -29,7 +29,7 @@ def obj_text(
     uv: NDArray[np.complex128] | None = None,
     uv_index: Indices | None = None,
 ) -> str:
-    """Compose an OBJ file of triangles.
+    """Return an OBJ file of triangles as text.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def obj_text(
     uv : complex128 (k,), optional
         Texture coordinates.
     uv_index : int64 (m, 3), optional
-        Which of them each corner has; default: those of its vertex.
+        The texture coordinate of each corner (default: that of its vertex).
 
     """
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in V.tolist()]
@@ -57,21 +57,21 @@ def with_uv(
     F: Indices | None = None,
     uv_index: Indices | None = None,
 ) -> str:
-    """Put texture coordinates into an OBJ file; all else stays as it is, line by line.
+    """Replace the texture coordinates of an OBJ file; keep everything else line by line.
 
-    Groups, materials, normals, colours, comments and polygons stay. Texture coordinates that the
-    file had go.
+    Groups, materials, normals, colours, comments and polygons are kept; old texture coordinates are
+    removed.
 
     Parameters
     ----------
     text : str
-        The file, decoded so that every byte is a character (Latin-1): names are of any encoding.
+        The file, decoded as Latin-1 so that every byte is a character; names may have any encoding.
     uv : complex128 (k,)
-        Texture coordinates: number i belongs to vertex i, those behind the last vertex to corners.
+        Texture coordinates: number i belongs to vertex i, those after the last vertex to corners.
     F, uv_index : int64 (m, 3), optional
-        The triangles of the surface, and which texture coordinate each of their corners has, where
-        it is not that of its vertex. A face of the file is found by its vertices. A polygon with a
-        seam across it becomes its triangles.
+        The triangles of the surface and the texture coordinate of each corner, if corners differ
+        from their vertices. A face of the file is found by its vertices. A polygon with a seam
+        across it is replaced by its triangles.
 
     """
     corners: Corners = {}
@@ -101,9 +101,9 @@ def with_uv(
 
 
 def _statements(text: str) -> Iterator[tuple[str, list[str]]]:
-    """Yield the lines of each statement, as they are, and its words, as the reader has them.
+    """Yield the unchanged lines of each statement, and its words as the reader splits them.
 
-    In comments and names nothing continues a line.
+    Comments and names have no continuation lines.
     """
     lines = enumerate(io.StringIO(text), 1)
     for number, line in lines:
@@ -113,6 +113,7 @@ def _statements(text: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _noted(lines: Iterator[tuple[int, str]], whole: list[str]) -> Iterator[tuple[int, str]]:
+    """Yield numbered lines, and append each to `whole` on the way."""
     for number, line in lines:
         whole.append(line)
         yield number, line
@@ -123,14 +124,14 @@ def _uv_lines(uv: NDArray[np.complex128]) -> Iterable[str]:
 
 
 def _reference(word: str, vertices: int) -> tuple[int, str]:
-    """Return the vertex of a face's corner, from 0, and what stands behind its second slash."""
+    """Return the vertex of a face's corner, from 0, and the text after its second slash."""
     parts = word.split("/")
     index = int(parts[0])
     return (index - 1 if index > 0 else vertices + index), parts[2] if len(parts) > 2 else ""
 
 
 def _face_lines(face: Face, corners: Corners) -> list[str]:
-    """Write a face with the texture coordinates of its corners; its triangles across a seam."""
+    """Return the lines of a face with its texture coordinates; triangles across a seam."""
     triangles = [
         (three, corners[key])
         for three in (combinations(face, 3) if corners else ())
@@ -146,6 +147,7 @@ def _face_lines(face: Face, corners: Corners) -> list[str]:
 
 
 def _face_line(face: Face, uv: Mapping[int, int]) -> str:
+    """Return the line of a face whose corners have these texture coordinates."""
     corners = [
         f"{v + 1}/{uv.get(v, v) + 1}" + (f"/{normal}" if normal else "") for v, normal in face
     ]
@@ -153,7 +155,7 @@ def _face_line(face: Face, uv: Mapping[int, int]) -> str:
 
 
 def _by_vertices(F: Indices, uv_index: Indices, *, only_at_seams: bool) -> Corners:
-    """Return the texture coordinates by vertex of each triangle, or of those that touch a seam."""
+    """Return the texture coordinates of all triangles, or of those at seams, by vertices."""
     at_seam = np.isin(F, F[uv_index != F]).any(axis=1) | (not only_at_seams)
     return {
         frozenset(face): dict(zip(face, uv, strict=True))

@@ -1,4 +1,4 @@
-"""The texture coordinates that an OBJ file has already."""
+"""Read the texture coordinates of an OBJ file."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def read_obj_uv(path: Path, F: NDArray[np.int64]) -> NDArray[np.float64]:
     Parameters
     ----------
     path : Path
-        A file that was read as a surface, so its vertices and faces are in order.
+        A file that was read as a surface, so its statements of vertices and faces are valid.
     F : int64 (m, 3)
-        The triangles of that surface: the file's faces in order, cut into fans.
+        The triangles of that surface: the file's faces in order, cut into triangles.
 
     Returns
     -------
     float64 (m, 3, 2)
-        As the file has them; v points up.
+        As in the file; v points up.
 
     Raises
     ------
@@ -46,16 +46,16 @@ def read_obj_uv(path: Path, F: NDArray[np.int64]) -> NDArray[np.float64]:
         count = int(((texture < 0) | (texture >= len(points))).any(axis=1).sum())
         raise MeshError(
             f"{path}: {count} of {len(F)} triangles have no texture coordinates (vt), so there is "
-            "nothing to take a texture from. Name the file that the texture belongs to."
+            "no texture to transfer. Name the file that the texture belongs to."
         )
-    matches = F[:, :, None] == vertex[:, None, :]  # checks may have turned a triangle
+    matches = F[:, :, None] == vertex[:, None, :]  # checks may have reversed a triangle
     if not matches.any(axis=2).all():
         raise MeshError(f"{path}: its faces are not those of the surface; map it without --repair.")
     return points[np.take_along_axis(texture, matches.argmax(axis=2), axis=1)]
 
 
 def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the coordinates (k, 2), and vertex and coordinate of each corner (m, 3, 2) from 0."""
+    """Return the coordinates (k, 2), and each corner's vertex and coordinate (m, 3, 2) from 0."""
     points: list[tuple[float, float]] = []
     triangles = []
     vertices = 0
@@ -76,11 +76,12 @@ def _read(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 
 def _point(path: Path, number: int, words: list[str]) -> tuple[float, float]:
+    """Return the texture coordinate of a line."""
     try:
         u, v = (float(word) for word in [*words[1:], "0"][:2])
     except ValueError:
         raise MeshError(
-            f"{path}: line {number} is no texture coordinate; it needs numbers."
+            f"{path}: line {number} is not a texture coordinate; it needs numbers."
         ) from None
     if not (np.isfinite(u) and np.isfinite(v)):
         raise MeshError(f"{path}: line {number} has a texture coordinate that is not finite.")
@@ -88,9 +89,11 @@ def _point(path: Path, number: int, words: list[str]) -> tuple[float, float]:
 
 
 def _corner(word: str, vertices: int, points: int) -> tuple[int, int]:
+    """Return the indices, from 0, of the vertex and the texture coordinate of a corner."""
     vertex, texture = [*word.split("/"), ""][:2]
     return _from_0(int(vertex), vertices), _from_0(int(texture), points) if texture else -1
 
 
 def _from_0(index: int, count: int) -> int:
+    """Return an OBJ index, which may count back from the end, counted from 0."""
     return index - 1 if index > 0 else count + index

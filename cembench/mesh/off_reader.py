@@ -1,6 +1,6 @@
-"""OFF files of Geomview: vertices, and polygons with or without colours.
+"""Geomview OFF files: vertices, and polygons with or without colours.
 
-Own code, because trimesh loses the faces of a file cut short, and meshio reads only triangles
+Own code, because trimesh loses the faces of a truncated file, and meshio reads only triangles
 without colours.
 """
 
@@ -46,7 +46,7 @@ def read_off(path: Path) -> Soup:
 
 
 def _statements(file: Iterator[str]) -> _Lines:
-    """The numbers and the words of the lines that hold more than a comment."""
+    """Yield the line number and words of each line that is not only a comment."""
     for number, line in enumerate(file, 1):
         words = words_of(line.split("#", 1)[0] if "#" in line else line)
         if words:
@@ -54,6 +54,7 @@ def _statements(file: Iterator[str]) -> _Lines:
 
 
 def _next(lines: _Lines, missing: str) -> tuple[int, list[str]]:
+    """Return the next line; an error with the text `missing` if there is none."""
     found = next(lines, None)
     if found is None:
         raise damaged(missing)
@@ -61,7 +62,7 @@ def _next(lines: _Lines, missing: str) -> tuple[int, list[str]]:
 
 
 def _declared(lines: _Lines) -> tuple[int, int]:
-    """The numbers of vertices and faces; the word OFF before them may be left out."""
+    """Return the declared numbers of vertices and faces; the leading word OFF is optional."""
     missing = "there is no line with the numbers of vertices and faces"
     number, words = _next(lines, missing)
     keyword = re.fullmatch(r"(ST)?C?N?(4?n?)OFF", words[0].removeprefix(BYTE_ORDER_MARK))
@@ -81,7 +82,7 @@ def _declared(lines: _Lines) -> tuple[int, int]:
 
 
 def _numbers(kind: type[M], number: int, words: list[str], count: int) -> list[M]:
-    """The first `count` numbers of a line; what follows, as colours do, must be numbers too."""
+    """Return the first `count` numbers of a line; the rest, e.g. a colour, must be numbers too."""
     try:
         found = [kind(word) for word in words[:count]]
         for word in words[count:]:

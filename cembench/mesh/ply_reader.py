@@ -1,9 +1,9 @@
-"""PLY files, ASCII and binary: the vertices and the polygons out of any elements and properties.
+"""PLY files, ASCII and binary: the vertices and polygons among any elements and properties.
 
-Own code, because meshio hangs on a header cut short and refuses most legal headers, trimesh refuses
-binary polygons of several sizes and reads ASCII files cut short without a word, and plyfile takes
-twice the time for ASCII. The header says what the body must hold, so the sizes are compared before
-anything is read.
+Own code, because meshio hangs on a truncated header and refuses most valid headers, trimesh refuses
+binary polygons of mixed sizes and silently reads truncated ASCII files, and plyfile takes twice the
+time for ASCII. The header declares the size of the body, so sizes are compared before anything is
+read.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from cembench.core.errors import MeshError
 from cembench.mesh.soup import Soup, damaged, shown
 
-#: A header ends within so many bytes, or this is not a PLY file.
+#: A header must end within this many bytes.
 _LONGEST_HEADER = 1 << 20
 _TYPES = {
     "char": "i1", "int8": "i1", "uchar": "u1", "uint8": "u1",
@@ -34,7 +34,7 @@ _TYPES = {
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-#: How the module struct calls the types.
+#: Type codes of the module struct.
 _STRUCT = {
     "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
     "f4": "f", "f8": "d",
@@ -42,7 +42,7 @@ _STRUCT = {
 _CORNERS = ("vertex_indices", "vertex_index")
 _AXES = (("x",), ("y",), ("z",))
 _GEOMETRY: dict[str, tuple[tuple[str, ...], ...]] = {"vertex": _AXES, "face": (_CORNERS,)}
-#: What texture coordinates of vertices are called.
+#: Property names of texture coordinates at vertices.
 _TEXTURE = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 
 Bytes = NDArray[np.uint8]
@@ -50,7 +50,7 @@ Bytes = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class _Property:
-    """A number, or a list where `size` is given: a number of that type says how many follow."""
+    """A number, or a list if `size` is given: a number of that type is the length."""
 
     name: str
     item: np.dtype[Any]
@@ -63,7 +63,7 @@ class _Property:
 
 @dataclass(frozen=True)
 class _Element:
-    """Rows that have the same properties."""
+    """Rows with the same properties."""
 
     name: str
     count: int
@@ -74,7 +74,7 @@ class _Element:
         return self.count * sum(p.least_bytes for p in self.properties)
 
     def index(self, names: tuple[str, ...], *, of_list: bool) -> int:
-        """The index of the property that has one of these names."""
+        """Return the index of the property that has one of these names."""
         for k, p in enumerate(self.properties):
             if p.name in names and (p.size is not None) == of_list:
                 return k
@@ -87,14 +87,14 @@ class _Element:
 
 
 def read_ply(path: Path) -> Soup:
-    """Read the vertices and polygons of a PLY file; all other elements and properties are skipped.
+    """Read the vertices and polygons of a PLY file; other elements and properties are skipped.
 
-    Coordinates have the precision that the header declares, in text too.
+    Coordinates have the precision that the header declares, also in ASCII files.
     """
     elements, found = _columns(path, _GEOMETRY)
     coordinates = _element(elements, "vertex")
     types = [coordinates.properties[k].item for k in _indices(coordinates, _GEOMETRY)]
-    with np.errstate(over="ignore"):  # what a float cannot hold is infinite, and refused as such
+    with np.errstate(over="ignore"):  # values beyond float become infinite, and are refused
         V = [
             column.items.astype(t.newbyteorder("="))
             for t, column in zip(types, found["vertex"], strict=True)
@@ -106,16 +106,24 @@ def read_ply(path: Path) -> Soup:
 def read_ply_texture(
     path: Path,
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64] | None]:
-    """Read the vertices and triangles of a PLY file with their texture coordinates.
+    """Read the vertices, triangles and texture coordinates of a PLY file.
 
-    Returns V (n, 3), F (m, 3), UV (k, 2) and which of these each corner has (m, 3), or None where
-    they belong to the vertices. They stand at the vertices as u and v, s and t or texture_u and
-    texture_v, or at the faces as the list texcoord.
+    Texture coordinates are vertex properties u and v, s and t or texture_u and texture_v, or the
+    list texcoord of the faces.
+
+    Returns
+    -------
+    V, F : float64 (n, 3), int64 (m, 3)
+        The surface.
+    uv : float64 (k, 2)
+        Texture coordinates.
+    index : int64 (m, 3) or None
+        The texture coordinate of each corner; None if they belong to the vertices.
 
     Raises
     ------
     MeshError
-        The file is damaged, has no such property, or has other polygons than triangles.
+        The file is damaged, has no such property, or has polygons other than triangles.
 
     """
     elements = _header(np.fromfile(path, np.uint8, _LONGEST_HEADER).tobytes())[1]
@@ -134,7 +142,7 @@ def read_ply_texture(
     columns = [column.items.astype(np.float64) for column in found["vertex"]]
     corners = found["face"][0]
     if (corners.sizes != 3).any():
-        raise damaged("it has polygons that are no triangles")
+        raise damaged("it has polygons that are not triangles")
     F = _whole(corners.items).reshape(-1, 3)
     V = np.stack(columns[:3], axis=1)
     if len(F) and not 0 <= F.min() <= F.max() < len(V):
@@ -143,7 +151,7 @@ def read_ply_texture(
         return V, F, np.stack(columns[3:], axis=1), None
     texture = found["face"][1]
     if (texture.sizes != 6).any():
-        raise damaged("a triangle's texcoord has not six numbers")
+        raise damaged("a triangle's texcoord does not have six numbers")
     UV = texture.items.astype(np.float64).reshape(-1, 2)
     return V, F, UV, np.arange(len(UV), dtype=np.int64).reshape(-1, 3)
 
@@ -151,7 +159,7 @@ def read_ply_texture(
 def _columns(
     path: Path, wanted: Mapping[str, Sequence[tuple[str, ...]]]
 ) -> tuple[list[_Element], dict[str, list[_Column]]]:
-    """Return the elements of a file, and of each the wanted properties, by their names."""
+    """Return the elements of a file, and the wanted properties of each, by name."""
     content = np.fromfile(path, dtype=np.uint8)
     form, elements, begin, lines = _header(content[:_LONGEST_HEADER].tobytes())
     body = content[begin:]
@@ -171,13 +179,13 @@ def _columns(
 
 
 def _indices(element: _Element, wanted: Mapping[str, Sequence[tuple[str, ...]]]) -> list[int]:
-    """Return where the wanted properties of an element stand in it."""
+    """Return the positions of the wanted properties of an element."""
     of_list = element.name == "face"
     return [element.index(names, of_list=of_list) for names in wanted[element.name]]
 
 
 def _header(text: bytes) -> tuple[str, list[_Element], int, int]:
-    """The format, the elements, and after how many bytes and lines the body begins."""
+    """Return the format, the elements, and the bytes and lines before the body."""
     first = re.match(rb"ply[ \t]*(\r\n|\r|\n)", text)
     if not first:
         raise damaged("it cannot be read as PLY: the first line is not 'ply'")
@@ -213,6 +221,7 @@ def _header(text: bytes) -> tuple[str, list[_Element], int, int]:
 
 
 def _element(elements: list[_Element], name: str) -> _Element:
+    """Return the element of this name."""
     for element in elements:
         if element.name == name:
             return element
@@ -221,7 +230,7 @@ def _element(elements: list[_Element], name: str) -> _Element:
 
 
 def _check_elements(elements: list[_Element]) -> None:
-    """Raise where polygons would be passed over: in triangle strips, or in what has one name."""
+    """Raise if polygons would be missed: triangle strips, or duplicate names."""
     names = [element.name for element in elements]
     if "tristrips" in names:
         raise MeshError("triangle strips are not supported. Export it with an element 'face'.")
@@ -234,17 +243,18 @@ def _check_elements(elements: list[_Element]) -> None:
 
 
 def _repeated(names: list[str]) -> list[str]:
+    """Return the names that appear more than once."""
     return [name for name, count in Counter(names).items() if count > 1]
 
 
 def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
-    """The numbers of a text, one after another."""
+    """Return the numbers of a text in order."""
     text = body.tobytes().strip()
     if not text:
         return np.empty(0)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # numpy warned where it raises today
+            warnings.simplefilter("error")  # older versions of numpy warn instead of raising
             return np.fromstring(text, sep=" ")
     except (ValueError, DeprecationWarning):
         pass
@@ -256,6 +266,7 @@ def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
 
 
 def _is_number(word: str) -> bool:
+    """Whether a word is a number in ASCII files."""
     try:
         float(word)
     except ValueError:
@@ -264,7 +275,7 @@ def _is_number(word: str) -> bool:
 
 
 def _as_doubles(element: _Element) -> _Element:
-    """The element as its text is stored: every number, also a list's size, as a double."""
+    """Return the element with all numbers as doubles, list lengths included, as text is stored."""
     double = np.dtype("f8")
     properties = [
         _Property(p.name, double, None if p.size is None else double) for p in element.properties
@@ -273,7 +284,7 @@ def _as_doubles(element: _Element) -> _Element:
 
 
 def _check_size(elements: list[_Element], body: Bytes, form: str) -> None:
-    """Raise where the file is too short for what its header declares."""
+    """Raise if the file is shorter than its header declares."""
     unit, what = (8, "numbers") if form == "ascii" else (1, "bytes")
     needed = sum(element.least_bytes for element in elements)
     if needed > len(body):
@@ -284,7 +295,7 @@ def _check_size(elements: list[_Element], body: Bytes, form: str) -> None:
 
 
 def _check_rest(elements: list[_Element], rest: Bytes, form: str) -> None:
-    """Raise where the file goes on behind what its header declares."""
+    """Raise if the file is longer than its header declares."""
     unit, what = (8, "numbers") if form == "ascii" else (1, "bytes")
     if len(rest) if form == "ascii" else rest[:_LONGEST_HEADER].tobytes().strip():
         raise damaged(
@@ -294,12 +305,13 @@ def _check_rest(elements: list[_Element], rest: Bytes, form: str) -> None:
 
 
 def _counts(elements: list[_Element]) -> str:
+    """Return the declared counts of elements for a message."""
     return ", ".join(f"{element.count} of {element.name!r}" for element in elements)
 
 
 @dataclass(frozen=True, eq=False)
 class _Column:
-    """A property in all rows: how many items each has, and the items one after another."""
+    """A property in all rows: the number of items of each row, and the items concatenated."""
 
     sizes: NDArray[np.int64]
     items: NDArray[Any]
@@ -308,7 +320,7 @@ class _Column:
 def _read_rows(
     element: _Element, body: Bytes, at: int, wanted: list[int]
 ) -> tuple[list[_Column], int]:
-    """The wanted properties of an element that begins at a byte, and the byte behind it."""
+    """Return the wanted properties of the element at a byte, and the position after it."""
     if element.least_bytes == 0:
         return [_Column(np.empty(0, np.int64), np.empty(0)) for _ in wanted], at
     row = _row_like_the_first(element, body, at)
@@ -324,7 +336,7 @@ def _read_rows(
 
 
 def _row_like_the_first(element: _Element, body: Bytes, at: int) -> np.dtype[Any]:
-    """The layout of all rows if their lists are as long as those of the first row."""
+    """Return the layout of all rows, if their lists are as long as in the first row."""
     everything = list(range(len(element.properties)))
     first, _ = _walk_rows(replace(element, count=1), body, at, everything)
     fields: list[Any] = []
@@ -338,7 +350,7 @@ def _row_like_the_first(element: _Element, body: Bytes, at: int) -> np.dtype[Any
 def _walk_rows(
     element: _Element, body: Bytes, at: int, wanted: list[int]
 ) -> tuple[list[_Column], int]:
-    """What :func:`_read_rows` returns, row by row, as their lists may have any lengths."""
+    """Return the result of :func:`_read_rows` row by row, for lists of any length."""
     starts = {k: array("q") for k in wanted}
     sizes = {k: array("q") for k in wanted}
     steps = [
@@ -373,6 +385,7 @@ def _walk_rows(
 
 
 def _unpacker(size: np.dtype[Any]) -> Callable[[Any, int], tuple[Any, ...]]:
+    """Return the function that reads a list's length from bytes."""
     order = "=" if size.byteorder == "|" else size.byteorder
     return struct.Struct(order + _STRUCT[size.str[1:]]).unpack_from
 
@@ -380,15 +393,16 @@ def _unpacker(size: np.dtype[Any]) -> Callable[[Any, int], tuple[Any, ...]]:
 def _items(
     body: Bytes, starts: Sequence[int], sizes: Sequence[int], item: np.dtype[Any]
 ) -> NDArray[Any]:
-    """The items of lists that begin at these bytes, one list after another."""
+    """Return the items of the lists at these positions, concatenated."""
     begin, count = np.asarray(starts), np.asarray(sizes)
     within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
-    # An array of the items that begin at each byte, which may overlap: a view, not a copy.
+    # A view of the items that begin at each byte; they may overlap.
     at_each_byte = np.ndarray(max(0, len(body) - item.itemsize + 1), item, body, strides=(1,))
     return at_each_byte[np.repeat(begin, count) + within * item.itemsize]
 
 
 def _ends_within(element: _Element, row: int) -> MeshError:
+    """Return the error for a file that ends within a row."""
     return damaged(
         f"the header declares {element.count} of {element.name!r}, but the file ends within "
         f"{element.name!r} {row} (counted from 0)"
@@ -396,6 +410,7 @@ def _ends_within(element: _Element, row: int) -> MeshError:
 
 
 def _whole(indices: NDArray[Any]) -> NDArray[np.int64]:
+    """Return indices as integers; whole numbers in floating point are accepted."""
     if indices.dtype.kind != "f":
         return indices.astype(np.int64)
     bad = np.flatnonzero(~(np.abs(indices) < 2**53) | (indices != np.rint(indices)))

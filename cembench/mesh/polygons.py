@@ -1,9 +1,9 @@
-"""Polygons cut into triangles, concave ones and ones with straight corners too.
+"""Triangulate polygons, including concave ones and ones with collinear corners.
 
-A fan from the first corner is kept where all its triangles lie in the polygon: always, if that is
-convex. The others are triangulated in the plane that fits their corners best, by a constrained
-Delaunay triangulation (GEOS through shapely), which uses every corner and makes no triangle flat
-that need not be.
+A fan from the first corner is kept if all its triangles lie in the polygon, which always holds for
+convex polygons. The others are triangulated in their best-fitting plane by a constrained Delaunay
+triangulation (GEOS through shapely), which uses every corner and makes no unnecessary flat
+triangles.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 Indices = NDArray[np.int64]
 
-#: A fan's triangle counts as flat when its area is below this share of the whole fan's.
+#: A triangle of a fan is flat if its area is below this share of the fan's area.
 _FLAT = 1e-9
 
 
@@ -33,8 +33,8 @@ def triangulate(V: NDArray[np.float64], polygons: Iterable[Indices]) -> Indices:
     Returns
     -------
     int64 (m, 3)
-        Triangles in the order of the polygons, oriented as they are. A polygon that crosses itself
-        in its plane has no triangulation; it is cut into a fan.
+        Triangles in the order of the polygons and with their orientation. A polygon that crosses
+        itself in its plane has no triangulation and is cut into a fan.
 
     """
     triangles = [np.empty((0, 3), dtype=np.int64)]
@@ -56,7 +56,7 @@ def _fans(block: Indices) -> Indices:
 
 
 def _good(V: NDArray[np.float64], fans: Indices) -> NDArray[np.bool_]:
-    """Whether every triangle of a fan faces the way of the whole polygon and has an area."""
+    """Whether every triangle of a fan has an area and the orientation of its polygon."""
     if fans.shape[1] == 1:
         return np.ones(len(fans), dtype=bool)
     P = V[fans]
@@ -69,7 +69,7 @@ def _good(V: NDArray[np.float64], fans: Indices) -> NDArray[np.bool_]:
 def _delaunay(P: NDArray[np.float64]) -> Indices | None:
     """Return triangles (c - 2, 3) of one polygon's corners (c, 3); None if it crosses itself."""
     P = P - P.mean(axis=0)
-    normal = np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0)  # Newell's: twice the vector area
+    normal = np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0)  # Newell: twice the vector area
     if not normal.any():
         return None
     across = np.linalg.svd(normal[None])[2][1:]

@@ -1,8 +1,8 @@
-"""Mesh files as soups of polygons: OBJ, OFF, PLY (ASCII and binary), STL, MATLAB files and others.
+"""Read mesh files as polygon soups: OBJ, OFF, PLY (ASCII and binary), STL, MATLAB and others.
 
-Every vertex is kept, in the file's order and in float64, and only the geometry. No face is lost in
-silence: what the file declares must be what it holds, and what is no legal statement is an error or
-a notice. Every reader goes through the file once, so none can hang.
+Every vertex is kept, in the file's order and in float64, and nothing but geometry. No face is lost
+silently: the content must match what the file declares, and invalid statements give an error or a
+notice. Every reader goes through the file once, so none can hang.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ READERS: dict[str, Callable[[Path], Soup]] = {
     ".gltf": read_gltf,
     ".gii": read_gii,
 }
-#: Formats of arrays, of which two can be named.
+#: Formats of named arrays.
 _OF_ARRAYS: dict[str, Callable[[Path, tuple[str, str] | None], Soup]] = {
     ".mat": read_mat,
     ".npz": read_npz,
@@ -52,7 +52,7 @@ _SPECIAL_FILES = (
 
 
 def is_named_like_a_mesh(path: Path) -> bool:
-    """Whether a file of this name could be read as a mesh."""
+    """Whether the suffix of a file is a readable mesh format."""
     return path.suffix.lower() in READERS
 
 
@@ -62,16 +62,16 @@ def read_soup(
     arrays: tuple[str, str] | None = None,
     polygons: tuple[int, int] | None = None,
 ) -> Soup:
-    """Read the vertices and polygons of a file, without any check of the surface.
+    """Read the vertices and polygons of a file without checking the surface.
 
     `arrays` names the vertices and the triangles of a MAT or NPZ file; `polygons` is the first and
-    the last polygon that is taken, counted from 0.
+    last polygon to read, counted from 0.
 
     Raises
     ------
     MeshError
-        The file is missing, empty, of unknown format or damaged, is not a regular file, or holds no
-        face.
+        The file is missing, empty, damaged, of unknown format or not a regular file, or it has no
+        faces.
 
     """
     path = Path(path)
@@ -96,10 +96,10 @@ def read_soup(
 
 
 def _check_file(path: Path) -> None:
-    """Raise for what is not a regular file with content, before anything waits for a pipe."""
+    """Raise for a path that is not a non-empty regular file, before anything blocks on a pipe."""
     if str(path) == "-":
         raise MeshError(
-            "standard input cannot be read as a mesh. Save it to a file, and name that."
+            "standard input cannot be read as a mesh. Save it to a file and name the file."
         )
     try:
         found = path.stat()

@@ -1,27 +1,28 @@
-"""Mend a triangle soup until it is an oriented manifold, and tell every step.
+"""Repair a triangle soup until it is an oriented manifold, and report every step.
 
-The order of the steps, each of which may need the ones before it and undoes none of them:
+The order of the steps; each may rely on the previous ones and undoes none of them:
 
-1. *Faces with a missing or non-finite vertex* go first: nothing can be computed with them.
-2. *Polygons* are cut into triangles, which needs finite coordinates alone.
-3. *Coincident vertices* are welded; that is what closes seams, and it makes some triangles
-   degenerate and others equal.
-4. *Degenerate triangles* are collapsed (two corners that all but coincide), flipped with their
-   neighbour over the longest edge (three corners on a line: dropping one would leave a crack), or
-   dropped where they have no neighbour there.
-5. *Duplicate triangles*: of those with the same three vertices, the first stays.
-6. *Non-manifold edges and vertices* are split. At an edge with more than two triangles, those two
-   stay together that continue each other most smoothly, so a fin comes off and the sheet it stood
-   on stays whole.
-7. *Orientation*: all triangles of a piece as most of them are, closed pieces outwards; a one-sided
-   surface is cut where its triangles contradict each other. It follows the splitting, since what
-   holds pieces together is known only then.
-8. *Components*: the one with most triangles, or all of them as surfaces of their own. Fins and
-   crumbs that came off before are dropped here.
-9. *Ears*: triangles with two sides on the boundary, whose tip has no way inside; again until there
-   are none.
-10. *Holes* of at most so many edges are filled, if that is wanted; the longest loop stays open.
-11. *Isolated vertices* go last, whatever isolated them.
+1. *Faces with a missing or non-finite vertex* are dropped: nothing can be computed with them.
+2. *Polygons* are cut into triangles, which needs finite coordinates.
+3. *Coincident vertices* are welded. That closes seams, and makes some triangles degenerate and
+   others equal.
+4. *Degenerate triangles* are collapsed (two corners nearly coincide), flipped with their neighbour
+   over the longest edge (three corners on a line: dropping such a triangle would leave a crack), or
+   dropped if they have no neighbour there.
+5. *Duplicate triangles*: of those with the same three vertices, the first is kept.
+6. *Non-manifold edges and vertices* are split. At an edge with more than two triangles, the two
+   that continue each other most smoothly stay connected, so a fin is separated and the sheet under
+   it stays whole.
+7. *Orientation*: all triangles of a piece as most of them are, and closed pieces outwards. A
+   one-sided surface is cut where its triangles contradict each other. This follows the splitting,
+   which decides what the pieces are.
+8. *Components*: the one with most triangles is kept, or all of them as separate surfaces. Fins and
+   fragments that were separated before are dropped here.
+9. *Ears*, triangles with two sides on the boundary, whose tip has no interior neighbour, are
+   dropped until there are none.
+10. *Holes* with at most a given number of edges are filled, if requested; the longest loop stays
+    open.
+11. *Isolated vertices* are removed last, whatever isolated them.
 """
 
 from __future__ import annotations
@@ -53,14 +54,14 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Components = Literal["largest", "all"]
 
-#: A degenerate triangle with an edge below this share of its longest is collapsed, not flipped.
+#: A degenerate triangle with an edge below this share of its longest one is collapsed.
 _NEEDLE = 1e-6
-#: Flipping a degenerate triangle can make its neighbour one; so often it is tried again.
+#: Rounds of flips: flipping a degenerate triangle can make its neighbour degenerate.
 _FLIP_ROUNDS = 10
 
 
 class Step(StrEnum):
-    """What a repair does, in its order; the value is the name in JSON."""
+    """The steps of a repair in order; the value is the name in JSON."""
 
     invalid_faces = "invalid_faces_dropped"
     polygons = "polygons_triangulated"
@@ -81,7 +82,7 @@ class Step(StrEnum):
     isolated = "isolated_vertices_removed"
 
 
-#: What a reader is told of each step, one and many.
+#: Description of each step for messages.
 TITLES: dict[Step, str] = {
     Step.invalid_faces: "faces with a missing or non-finite vertex dropped",
     Step.polygons: "polygons cut into triangles",
@@ -105,21 +106,21 @@ TITLES: dict[Step, str] = {
 
 @dataclass(frozen=True)
 class Repaired:
-    """Surfaces that are oriented manifolds, and what was done to make them so."""
+    """Surfaces that are oriented manifolds, and the repairs that were made."""
 
-    #: Vertices (n, 3) and triangles (m, 3) of each surface, the one with most triangles first.
+    #: Vertices (n, 3) and triangles (m, 3) of each surface, most triangles first.
     surfaces: tuple[tuple[Points, Indices], ...]
-    #: How often each step was taken; every step is there.
+    #: The count of each step, zeros included.
     steps: dict[Step, int]
 
     @property
     def counts(self) -> dict[str, int]:
-        """How often each step was taken, by its name in JSON."""
+        """The count of each step, by its name in JSON."""
         return {step.value: n for step, n in self.steps.items()}
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """What was changed, a sentence for each step that was needed."""
+        """One notice for each step that changed something."""
         return tuple(
             Notice(NoticeKind.REPAIRED, f"repaired: {n:,} {TITLES[step]}")
             for step, n in self.steps.items()
@@ -139,38 +140,46 @@ def repair(
 
     Parameters
     ----------
-    V : (n, 3)
+    V : float (n, 3)
         Vertices; NaN and infinity are allowed.
-    faces : (m, 3) integers, or blocks (k, c) of k polygons with c corners each
+    faces : integers (m, 3), or blocks (k, c) of k polygons with c corners each
         Vertex indices, counted from 0.
     weld : float
-        Vertices at most so far apart, in the units of `V`, become one; 0 welds those that coincide
-        exactly.
+        Vertices at most this far apart, in the units of `V`, become one; 0 welds vertices that
+        coincide exactly.
     fill_holes : int
-        Boundary loops of at most so many edges are filled, except the longest of a component.
-    components : "largest" or "all"
-        Which connected components are kept; each is a surface of its own.
+        Boundary loops with at most this many edges are filled, except the longest of a component.
+    components : {"largest", "all"}
+        Which connected components are kept; each is a separate surface.
 
     Returns
     -------
     Repaired
-        The surfaces, and a count for each step.
+        The surfaces, and the count of each step.
 
     Raises
     ------
     ParameterError
-        A tolerance or a number of edges below 0, or `components` is neither word.
+        A tolerance or a number of edges is below 0, or `components` is unknown.
     UnusableMeshError
         The coordinates are too large or too small to compute with.
     MeshError
         Nothing is left: all faces were degenerate or had a missing vertex.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> V = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]])
+    >>> found = repair(V, np.array([[0, 1, 2], [2, 0, 3], [0, 1, 2]]))
+    >>> len(found.surfaces), found.counts["duplicate_triangles_dropped"]
+    (1, 1)
 
     """
     _check_options(weld, fill_holes, components)
     steps = dict.fromkeys(Step, 0)
     points = np.array(V, dtype=np.float64).reshape(-1, 3)
     F = _triangles(points, faces, steps)
-    steps[Step.isolated] = len(points) - len(np.unique(F))  # removed with all that is unused
+    steps[Step.isolated] = len(points) - len(np.unique(F))  # removed with all unused vertices
     F = _weld(points, F, weld, steps)
     wrong_scale = out_of_scale(points, F)
     if wrong_scale is not None:
@@ -198,6 +207,7 @@ def repair(
 
 
 def _check_options(weld: float, fill_holes: int, components: str) -> None:
+    """Raise :class:`ParameterError` for options out of range."""
     if not (np.isfinite(weld) and weld >= 0):
         raise ParameterError(f"weld={weld!r} is not allowed; a tolerance is 0 or a finite length.")
     if fill_holes < 0:
@@ -222,7 +232,7 @@ def _triangles(V: Points, faces: Indices | Iterable[Indices], steps: dict[Step, 
 
 
 def _weld(V: Points, F: Indices, tolerance: float, steps: dict[Step, int]) -> Indices:
-    """Let the triangles use one vertex of those that coincide; the others become isolated."""
+    """Replace coincident vertices in the triangles by one of them; the others become isolated."""
     used = np.unique(F)
     first = used[representatives(V[used], tolerance)]
     steps[Step.weld] = int((first != used).sum())
@@ -232,7 +242,7 @@ def _weld(V: Points, F: Indices, tolerance: float, steps: dict[Step, int]) -> In
 
 
 def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
-    """Collapse needles, flip triangles whose corners lie on a line, drop what is left."""
+    """Collapse needles, flip triangles with collinear corners, drop the rest."""
     for _ in range(_FLIP_ROUNDS):
         F, dropped = _without(F, _repeats_a_vertex(F))
         steps[Step.degenerate] += dropped
@@ -241,7 +251,7 @@ def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
             return F
         F, collapsed = _collapse_needles(V, F, bad)
         steps[Step.collapse] += collapsed
-        steps[Step.degenerate] -= collapsed  # what a collapse makes of it, the next round drops
+        steps[Step.degenerate] -= collapsed  # the next round drops what a collapse leaves
         if not collapsed:
             F, flipped = _flip(V, F, bad)
             steps[Step.flip] += flipped
@@ -253,10 +263,12 @@ def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
 
 
 def _without(F: Indices, bad: NDArray[np.bool_]) -> tuple[Indices, int]:
+    """Return the triangles that are not bad, and the number of bad ones."""
     return F[~bad], int(bad.sum())
 
 
 def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
+    """Whether each triangle has a vertex twice."""
     twice: NDArray[np.bool_] = (np.roll(F, 1, axis=1) == F).any(axis=1)
     return twice
 
@@ -267,7 +279,7 @@ def _half_edge_lengths(V: Points, F: Indices) -> Points:
 
 
 def _collapse_needles(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
-    """Merge the ends of the shortest side of degenerate triangles where it is next to nothing."""
+    """Merge the ends of the shortest side of degenerate triangles if it is negligible."""
     lengths = _half_edge_lengths(V, F[bad])
     needles = lengths.min(axis=1) <= _NEEDLE * lengths.max(axis=1)
     if not needles.any():
@@ -284,9 +296,9 @@ def _collapse_needles(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int
 
 
 def _flip(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
-    """Exchange the longest side of flat triangles for the other diagonal of the quadrilateral.
+    """Replace the longest side of flat triangles by the other diagonal of the quadrilateral.
 
-    No edge may come twice, and no triangle takes part in two flips of a round.
+    No edge may appear twice, and no triangle takes part in two flips of a round.
     """
     F = F.copy()
     edges, edge, faces = edges_of_half_edges(F)
@@ -308,7 +320,7 @@ def _flip(V: Points, F: Indices, bad: Indices) -> tuple[Indices, int]:
         diagonal = min(tip, far) * stride + max(tip, far)
         if tip == far or diagonal in present:
             continue
-        F[t], F[s] = (tip, start, far), (tip, far, end)  # oriented as the neighbour was
+        F[t], F[s] = (tip, start, far), (tip, far, end)  # with the orientation of the neighbour
         present.add(diagonal)
         touched |= {s, t}
         flips += 1
@@ -323,7 +335,7 @@ def _split(V: Points, F: Indices, steps: dict[Step, int]) -> tuple[Indices, Indi
     while True:
         glued, origin = glue(F, pairs, len(V))
         _, edge, faces = edges_of_half_edges(glued)
-        # Two sheets that were taken apart can still share both ends of an edge.
+        # Two separated sheets can still share both ends of an edge.
         good = faces[edge[pairs[:, 0]]] == 2
         if good.all():
             break
@@ -333,10 +345,10 @@ def _split(V: Points, F: Indices, steps: dict[Step, int]) -> tuple[Indices, Indi
 
 
 def _smoothest_pairs(V: Points, F: Indices, edge: Indices, faces: Indices) -> Indices:
-    """Choose which triangles stay together at each edge with more than two, (k, 2) half-edges.
+    """Return the pairs of half-edges (k, 2) that stay connected at edges with over two triangles.
 
-    Smoothest first: the angle between two triangles is nearest to straight. Where the input's
-    orientations agree elsewhere, they must agree here too.
+    The smoothest pairs first: the angle between the two triangles is closest to straight. If the
+    input's orientations agree elsewhere, they must agree here too.
     """
     crowded = np.flatnonzero(faces[edge] > 2)
     chosen: list[tuple[int, int]] = []
@@ -369,7 +381,7 @@ def _smoothest_pairs(V: Points, F: Indices, edge: Indices, faces: Indices) -> In
 
 
 def _orient(F: Indices, n: int, steps: dict[Step, int]) -> tuple[Indices, Indices]:
-    """Orient pieces alike, cutting one-sided ones where their triangles contradict each other."""
+    """Orient each piece consistently, and cut one-sided ones where triangles contradict."""
     F, turned, contradictions = oriented(F)
     steps[Step.orient] = int(turned.sum())
     steps[Step.one_sided] = len(contradictions)
@@ -382,7 +394,7 @@ def _orient(F: Indices, n: int, steps: dict[Step, int]) -> tuple[Indices, Indice
 
 
 def _outwards(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
-    """Turn closed components whose enclosed volume is negative; open ones have no outside."""
+    """Reverse closed components with negative enclosed volume; open ones have no outside."""
     count, label = topology.components(F, len(V))
     piece = label[F[:, 0]]
     _, edge, faces = edges_of_half_edges(F)
@@ -412,7 +424,7 @@ def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) 
 def _drop_ears(F: Indices, n: int, steps: dict[Step, int]) -> Indices:
     """Drop triangles with two sides on the boundary until there are none.
 
-    A surface that would vanish, such as a strip that is one triangle wide, stays as it is.
+    A surface that would vanish, such as a strip of triangles, is kept as it is.
     """
     kept = F
     while len(kept):
@@ -426,10 +438,10 @@ def _drop_ears(F: Indices, n: int, steps: dict[Step, int]) -> Indices:
 
 
 def _fill_holes(V: Points, F: Indices, most: int, steps: dict[Step, int]) -> tuple[Points, Indices]:
-    """Fill loops of at most so many edges, all but the longest.
+    """Fill loops with at most `most` edges, except the longest.
 
-    A triangle fills three edges, a fan around a new vertex in the middle more: no new edge can then
-    be one that the surface has elsewhere.
+    A triangle fills three edges; a fan around a new central vertex fills more, so that no new edge
+    can already exist elsewhere.
     """
     loops = topology.boundary_loops(F, len(V)) if most else []
     if len(loops) < 2:
@@ -455,6 +467,6 @@ def _fill_holes(V: Points, F: Indices, most: int, steps: dict[Step, int]) -> tup
 
 
 def _compact(V: Points, F: Indices) -> tuple[Points, Indices]:
-    """Keep the vertices that triangles use, in their order."""
+    """Keep the vertices that triangles use, in order."""
     used, F = np.unique(F, return_inverse=True)
     return V[used], F.reshape(-1, 3).astype(np.int64)

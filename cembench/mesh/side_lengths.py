@@ -1,4 +1,4 @@
-"""Lengths of the sides of triangles."""
+"""Side lengths of triangles."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def side_lengths(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.flo
     Returns
     -------
     float (m, 3)
-        In the unit of V. Side c runs from corner c + 1 to corner c + 2, counted round the triangle.
+        In the unit of V. Side c runs from corner c + 1 to corner c + 2 (modulo 3).
 
     """
     found: NDArray[np.float64] = np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)

@@ -1,8 +1,8 @@
-"""Polygons as a file holds them, before any check of the surface.
+"""Polygons as in a file, before any check of the surface.
 
-A :class:`Soup` may have isolated vertices, NaN coordinates, and edges of any number of polygons.
-:func:`~cembench.mesh.files.read_mesh` checks it; repairs start from it. Files that say one
-thing and hold another never become one: their readers raise :func:`damaged`.
+A :class:`Soup` may have isolated vertices, NaN coordinates, and edges with any number of polygons.
+:func:`~cembench.mesh.files.read_mesh` checks it; repairs start from it. A file whose content does
+not match its declarations never becomes a soup: its reader raises :func:`damaged`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
 
-#: What `str.split` takes for space though no mesh format does.
+#: Characters that `str.split` treats as space but no mesh format does.
 _NOT_SPACES = dict.fromkeys(map(ord, "\x1c\x1d\x1e\x1f\x85\xa0"), "\0")
 
-#: How UTF-8 text may begin, read as Latin-1.
+#: The byte order mark of UTF-8, decoded as Latin-1.
 BYTE_ORDER_MARK = b"\xef\xbb\xbf".decode("latin-1")
 
 
@@ -30,15 +30,15 @@ class Soup:
     Parameters
     ----------
     V : float64 (n, 3)
-        Vertices, all of them, in the file's order.
+        All vertices, in the file's order.
     corners : int64 (sum of sizes,)
-        Vertex indices, 0 to n - 1, of all polygons, one after another in the file's order.
+        Vertex indices, 0 to n - 1, of all polygons in the file's order, concatenated.
     sizes : int64 (k,)
         Number of corners of each polygon, at least 3.
     name : str
-        What reports call it: the file's stem.
+        Name in reports: the file's stem.
     notices : tuple of Notice
-        What was changed or ignored while the file was read.
+        What was changed or ignored while reading the file.
 
     """
 
@@ -58,14 +58,15 @@ class Soup:
         counted_from: int = 0,
         notices: tuple[Notice, ...] = (),
     ) -> Self:
-        """Check that there are polygons, and that their corners are vertices that exist.
+        """Return a soup after checking that it has polygons and that their vertices exist.
 
         The file counts vertices from `counted_from`, and so do the messages.
 
         Raises
         ------
         MeshError
-            There is no polygon, one with fewer than three corners, or an index out of range.
+            There is no polygon, a polygon has fewer than three corners, or an index is out of
+            range.
 
         """
         V = np.asarray(V, dtype=np.float64).reshape(-1, 3)
@@ -94,11 +95,11 @@ class Soup:
         return cls(V, corners, sizes, notices=notices)
 
     def named(self, name: str) -> Self:
-        """The same under another name."""
+        """Return the same soup under another name."""
         return replace(self, name=name)
 
     def subset(self, first: int, last: int) -> Self:
-        """Return the polygons from `first` to `last`, counted from 0, and their vertices only.
+        """Return the polygons from `first` to `last`, counted from 0, with their vertices only.
 
         Raises
         ------
@@ -118,7 +119,7 @@ class Soup:
 
     @property
     def polygons(self) -> list[NDArray[np.int64]]:
-        """The polygons in order, as blocks (k, c) of k successive ones with c corners each."""
+        """Yield the polygons in order, as blocks (k, c) of k consecutive ones with c corners."""
         ends = np.cumsum(self.sizes)
         last = np.flatnonzero(np.diff(self.sizes, append=0))
         blocks = np.split(self.corners, ends[last[:-1]])
@@ -128,7 +129,7 @@ class Soup:
 
     @property
     def triangles(self) -> NDArray[np.int64]:
-        """The polygons cut into triangles by fans from their first corners, (m, 3), in order."""
+        """Return the polygons cut into triangles, (m, 3), in order."""
         if (self.sizes == 3).all():
             return self.corners.reshape(-1, 3)
         counts = self.sizes - 2
@@ -138,24 +139,24 @@ class Soup:
 
 
 def words_of(line: str) -> list[str]:
-    """Split a line at ASCII spaces; `str.split` also splits at separators of other alphabets."""
+    """Split a line at ASCII spaces; `str.split` would also split at Unicode separators."""
     return line.translate(_NOT_SPACES).split()
 
 
 def shown(text: str, most: int = 60) -> str:
-    """A line of a file for a message: quoted, on one line and not too long."""
+    """Return a line of a file for a message: quoted, on one line and not too long."""
     text = text.strip()
     return repr(text if len(text) <= most else text[:most] + "...")
 
 
 def refuse_underscores(words: list[str]) -> None:
-    """Raise :class:`ValueError` for what only Python reads as a number, such as 1_000."""
+    """Raise :class:`ValueError` for numbers that only Python accepts, such as 1_000."""
     if "_" in "".join(words):
         raise ValueError("an underscore is not part of a number")
 
 
 def damaged(what: str) -> MeshError:
-    """An error that says what is wrong in a file, and what to do about it."""
+    """Return an error that says what is wrong in a file, and what to do about it."""
     return MeshError(
         f"{what}. The file is damaged, cut short, or of another format than its name says; export "
         "or download it again."

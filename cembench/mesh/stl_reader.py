@@ -1,6 +1,6 @@
-"""STL files, binary and ASCII: triangles whose corners are merged where they coincide exactly.
+"""STL files, binary and ASCII: triangles whose corners are merged if they coincide exactly.
 
-Own code, because meshio and trimesh read a file cut short as an empty one, and meshio refuses
+Own code, because meshio and trimesh read a truncated file as an empty one, and meshio refuses
 upper-case ASCII.
 """
 
@@ -17,12 +17,12 @@ from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscore
 
 _HEADER_BYTES = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-#: Which words follow each other at the beginnings of an ASCII file's lines.
+#: The keywords that start the lines of an ASCII file, and their successors.
 _FACET = ("facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet")
 
 
 def read_stl(path: Path) -> Soup:
-    """Read the triangles of an STL file, and the vertices in the order of their first corners."""
+    """Read the triangles of an STL file; vertices are in the order of their first use."""
     size = path.stat().st_size
     with path.open("rb") as file:
         head = file.read(_HEADER_BYTES)
@@ -31,7 +31,7 @@ def read_stl(path: Path) -> Soup:
         triangles = np.fromfile(path, _TRIANGLE, declared, offset=_HEADER_BYTES)
         return _merged(triangles["corners"])
     begin = head.decode("latin-1").removeprefix(BYTE_ORDER_MARK).lstrip()
-    # Binary files may begin so too, but hold zeros, if only as a leading digit of their count.
+    # Binary files may begin like this too, but contain zero bytes, e.g. in their count.
     if begin[:5].lower() == "solid" and "\0" not in begin:
         return _read_ascii(path)
     if len(head) < _HEADER_BYTES:
@@ -44,7 +44,7 @@ def read_stl(path: Path) -> Soup:
 
 
 def _read_ascii(path: Path) -> Soup:
-    """Read facets, of which each must be whole, out of solids, of which each must end."""
+    """Read complete facets of complete solids."""
     coordinates = array("d")
     in_solid, step = False, 0
     with path.open(encoding="latin-1") as file:
@@ -72,6 +72,7 @@ def _read_ascii(path: Path) -> Soup:
 
 
 def _point(number: int, line: str, words: list[str]) -> list[float]:
+    """Return the three coordinates of a vertex line."""
     try:
         refuse_underscores(words)
         x, y, z = map(float, words)
@@ -81,8 +82,9 @@ def _point(number: int, line: str, words: list[str]) -> list[float]:
 
 
 def _merged(corners: NDArray[Any]) -> Soup:
+    """Return the soup of triangle corners, with coinciding corners merged."""
     points = corners.reshape(-1, 3)
-    order = np.lexsort(points.T)  # stable, so a point's first corner comes first
+    order = np.lexsort(points.T)  # stable sort, so a point's first corner comes first
     ordered = points[order]
     is_new = np.append(True, (ordered[1:] != ordered[:-1]).any(axis=1))[: len(points)]
     first = order[is_new]

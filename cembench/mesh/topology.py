@@ -1,4 +1,4 @@
-"""Combinatorics of an oriented triangulation, vectorised; coordinates play no role here.
+"""Combinatorics of an oriented triangulation, vectorised; coordinates play no role.
 
 F is an int64 (m, 3) array of vertex indices. Half-edge ``c`` of face ``t`` runs from ``F[t, c]`` to
 ``F[t, (c + 1) % 3]`` and has its face on the left. `boundary_loops` requires what
@@ -16,12 +16,12 @@ Faces = NDArray[np.int64]
 
 
 def half_edges(F: Faces) -> Faces:
-    """Which directed edges bound the faces? Shape (3m, 2); rows 3t, 3t+1, 3t+2 belong to face t."""
+    """Return the directed edges (3m, 2) of the faces; rows 3t, 3t+1, 3t+2 belong to face t."""
     return F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
 def undirected_edges(F: Faces) -> tuple[Faces, NDArray[np.int64]]:
-    """Which edges are there (e, 2), smaller index first, and how many faces has each (e,)?"""
+    """Return the edges (e, 2), smaller index first, and the face count of each (e,)."""
     ends = np.sort(half_edges(F), axis=1)
     stride = int(F.max()) + 1
     keys, faces = np.unique(ends[:, 0] * stride + ends[:, 1], return_counts=True)
@@ -29,7 +29,7 @@ def undirected_edges(F: Faces) -> tuple[Faces, NDArray[np.int64]]:
 
 
 def repeated_half_edges(F: Faces) -> Faces:
-    """Which directed edges belong to more than one face? None do where orientation agrees."""
+    """Return the directed edges of more than one face; none if orientations agree."""
     directed = half_edges(F)
     stride = int(F.max()) + 1
     keys, uses = np.unique(directed[:, 0] * stride + directed[:, 1], return_counts=True)
@@ -38,14 +38,14 @@ def repeated_half_edges(F: Faces) -> Faces:
 
 
 def vertex_graph(F: Faces, n: int) -> sparse.csr_array:
-    """Which vertices share an edge? A symmetric pattern (n, n) whose values mean nothing."""
+    """Return the adjacency matrix (n, n) of the vertices; its values are meaningless."""
     i, j = half_edges(F).T
     ones = np.ones(len(i))
     return sparse.coo_array((np.r_[ones, ones], (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsr()
 
 
 def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
-    """How many connected pieces has the graph of the mesh, and in which lies each vertex?"""
+    """Return the number of connected components, and the component of each vertex."""
     i, j = half_edges(F).T
     graph = sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
     count, labels = csgraph.connected_components(graph, directed=False)
@@ -53,17 +53,17 @@ def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
 
 
 def euler_characteristic(F: Faces, n: int) -> int:
-    """V - E + F: 1 for a disk, 2 for a sphere, 2 - 2 g - b for genus g with b boundary loops."""
+    """Return V - E + F: 1 for a disk, 2 for a sphere, 2 - 2 g - b in general."""
     return n - len(undirected_edges(F)[0]) + len(F)
 
 
 def genus(F: Faces, n: int, loops: int) -> int:
-    """Return the number of handles of a connected oriented surface with so many boundary loops."""
+    """Return the genus of a connected oriented surface with `loops` boundary loops."""
     return (2 - loops - euler_characteristic(F, n)) // 2
 
 
 def boundary_half_edges(F: Faces, n: int) -> Faces:
-    """Which half-edges have no twin? Shape (k, 2).
+    """Return the half-edges (k, 2) without a twin.
 
     Around an interior vertex every neighbour is once the next corner of a face and once the
     previous one, so the sum of (next - previous) vanishes; on the boundary it is the difference of
@@ -84,10 +84,10 @@ def boundary_half_edges(F: Faces, n: int) -> Faces:
 
 
 def boundary_loops(F: Faces, n: int) -> list[NDArray[np.int64]]:
-    """What closed curves bound the surface?
+    """Return the closed curves that bound the surface.
 
-    Each is an array of vertices in order, the surface on its left, starting at its smallest
-    vertex; the loops are sorted by that vertex. An empty list means a closed surface.
+    Each is an array of vertices in order, with the surface on its left, starting at its smallest
+    vertex; the loops are sorted by that vertex. A closed surface has none.
     """
     directed = boundary_half_edges(F, n)
     if not len(directed):

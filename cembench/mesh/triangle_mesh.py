@@ -1,7 +1,8 @@
-"""Meshes that have passed every check, so that no algorithm has to check again.
+"""Meshes that have passed every check, so that algorithms need no checks of their own.
 
 :class:`TriangleMesh` is an oriented 2-manifold without isolated vertices or degenerate triangles;
-:class:`DiskMesh` and :class:`HoledMesh` add the topology. All are frozen, arrays included.
+:class:`DiskMesh` and :class:`HoledMesh` add conditions on the topology. All are immutable, arrays
+included.
 """
 
 from __future__ import annotations
@@ -45,9 +46,24 @@ class TriangleMesh:
     F : int64 (m, 3)
         Triangles, counter-clockwise seen from outside; read-only.
     name : str
-        What reports call it.
+        Name in reports.
     notices : tuple of Notice
-        What was changed on the way in, and which premises of the paper the mesh breaks.
+        What was changed when the mesh was read, and which premises of the paper it breaks.
+
+    Raises
+    ------
+    UnusableMeshError
+        The arrays are not such a surface; the error lists all problems.
+    MeshError
+        The arrays have the wrong shape or type.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    >>> tetrahedron = cembench.TriangleMesh(V, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
+    >>> tetrahedron.n, tetrahedron.m, len(tetrahedron.loops)
+    (4, 4, 0)
 
     """
 
@@ -59,16 +75,16 @@ class TriangleMesh:
     def __init__(
         self, V: ArrayLike, F: ArrayLike, name: str = "mesh", notices: tuple[Notice, ...] = ()
     ) -> None:
-        """Check everything, orient where needed, freeze.
+        """Check everything, orient the triangles if needed, and make the arrays read-only.
 
         Raises
         ------
         UnusableMeshError
             NaN or infinite coordinates, an index out of range, isolated vertices, degenerate
             triangles, non-manifold edges or vertices, a one-sided surface; for the subclasses also
-            the wrong topology. The error holds all of these problems.
+            the wrong topology. The error lists all of these problems.
         MeshError
-            Arrays of the wrong shape or type.
+            The arrays have the wrong shape or type.
 
         """
         kind = type(self)
@@ -108,7 +124,7 @@ class TriangleMesh:
         name: str = "mesh",
         notices: tuple[Notice, ...] = (),
     ) -> Self:
-        """Return a mesh of arrays that were checked before, and check nothing."""
+        """Return a mesh of arrays that were checked before, without checking them."""
         mesh = cls.__new__(cls)
         mesh._set(V, F, name, notices)
         return mesh
@@ -118,16 +134,16 @@ class TriangleMesh:
         return self.trusted(self.V, self.F, printable(name), self.notices)
 
     def moved(self, V: NDArray[np.float64]) -> Self:
-        """Return the same triangles with vertices at other places (n, 3)."""
+        """Return the same triangles with other vertex positions (n, 3)."""
         return self.trusted(V, self.F, self.name, self.notices)
 
     @classmethod
     def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
-        """Raise where the surface is not of this class; return what the user should know."""
+        """Raise if the surface is not of this class; return notices for the user."""
         return ()
 
     def fresh(self) -> Self:
-        """The same mesh, nothing derived from it yet: what a timed call starts from."""
+        """Return the mesh without anything derived from it, as a timed call receives it."""
         return self.trusted(self.V, self.F, self.name, self.notices)
 
     @property
@@ -156,7 +172,7 @@ class TriangleMesh:
 
     @cached_property
     def hash(self) -> str:
-        """SHA-256 of the coordinates and the triangles: the same mesh has the same hash."""
+        """SHA-256 of the coordinates and the triangles; equal meshes have equal hashes."""
         digest = hashlib.sha256()
         digest.update(np.ascontiguousarray(self.V, dtype="<f8").tobytes())
         digest.update(np.ascontiguousarray(self.F, dtype="<i8").tobytes())
@@ -165,11 +181,39 @@ class TriangleMesh:
 
 @dataclass(frozen=True, eq=False, init=False)
 class DiskMesh(TriangleMesh):
-    """A simply-connected open surface: connected, one boundary loop, Euler characteristic 1."""
+    """A simply connected surface with boundary: one boundary loop, Euler characteristic 1.
+
+    Parameters
+    ----------
+    V : float64 (n, 3)
+        Vertices; read-only.
+    F : int64 (m, 3)
+        Triangles, counter-clockwise seen from outside; read-only.
+    name : str
+        Name in reports.
+    notices : tuple of Notice
+        What was changed when the mesh was read, and which premises of the paper it breaks.
+
+    Raises
+    ------
+    UnusableMeshError
+        The surface is not a disk, or not a manifold; the error lists all problems.
+    MeshError
+        The arrays have the wrong shape or type.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> square = cembench.DiskMesh(V, [[0, 1, 2], [0, 2, 3]])
+    >>> square.boundary
+    array([0, 1, 2, 3])
+
+    """
 
     @property
     def boundary(self) -> NDArray[np.int64]:
-        """Indices b of the boundary vertices in order, counter-clockwise (surface on the left)."""
+        """Indices of the boundary vertices in order, counter-clockwise (surface on the left)."""
         return self.loops[0]
 
     @classmethod
@@ -185,22 +229,63 @@ class DiskMesh(TriangleMesh):
 
 @dataclass(frozen=True, eq=False, init=False)
 class HoledMesh(TriangleMesh):
-    """A multiply-connected surface of genus zero: an outer boundary and at least one hole."""
+    """A multiply connected surface of genus zero: an outer boundary and at least one hole.
+
+    Parameters
+    ----------
+    V : float64 (n, 3)
+        Vertices; read-only.
+    F : int64 (m, 3)
+        Triangles, counter-clockwise seen from outside; read-only.
+    name : str
+        Name in reports.
+    notices : tuple of Notice
+        What was changed when the mesh was read, and which premises of the paper it breaks.
+
+    Raises
+    ------
+    UnusableMeshError
+        The surface has fewer than two boundary loops or a handle, or is not a manifold; the error
+        lists all problems.
+    MeshError
+        The arrays have the wrong shape or type.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> ring = cembench.surface("catenoid-ring", 400)
+    >>> outer, holes = ring.outer_and_holes()
+    >>> len(holes)
+    1
+
+    """
 
     def outer_and_holes(
         self, outer: int | None = None
     ) -> tuple[NDArray[np.int64], tuple[NDArray[np.int64], ...]]:
         """Return the outer boundary loop, and the holes.
 
-        The outer one is that of the vertex `outer`, or the widest, by the mean square distance of
-        its points from their centroid: a hole with many fingers can be longer than the boundary
-        round it. The holes come longest first.
-        Each has the surface on its left, so the outer one runs counter-clockwise in a map.
+        The outer loop is that of the vertex `outer`, or the widest by the mean square distance of
+        its points from their centroid, since a hole with many fingers can be longer than the
+        boundary around it. The holes are sorted by length, longest first. Each loop has the surface
+        on its left, so the outer one runs counter-clockwise in a map.
+
+        Parameters
+        ----------
+        outer : int, optional
+            Any vertex of the outer boundary, counted from 0 (default: that of the widest loop).
+
+        Returns
+        -------
+        outer : int64 (k,)
+            The vertices of the outer boundary in order.
+        holes : tuple of int64 arrays
+            The vertices of each hole in order.
 
         Raises
         ------
         ParameterError
-            There is no such vertex, or it lies on no boundary loop.
+            There is no such vertex, or it is not on a boundary loop.
 
         """
         lengths = [
@@ -213,7 +298,7 @@ class HoledMesh(TriangleMesh):
             return loops.pop(widest), tuple(loops)
         chosen = [k for k, loop in enumerate(loops) if (loop == outer).any()]
         if not chosen:
-            where = "is no vertex" if not 0 <= outer < self.n else "lies on no boundary loop"
+            where = "is not a vertex" if not 0 <= outer < self.n else "lies on no boundary loop"
             shown = ", ".join(f"{loop[0]} ({len(loop)} vertices)" for loop in loops[:5])
             raise ParameterError(
                 f"outer={outer}: vertex {outer} (counted from 0) {where} of {self.name}, so it "
@@ -251,20 +336,20 @@ def _problems_when_repaired(
     F: NDArray[np.int64],
     known: tuple[Problem, ...],
 ) -> tuple[Problem, ...]:
-    """Return what would still keep the surface from being of this kind after a repair."""
+    """Return the problems that would keep the surface from its class after a repair."""
     if any(problem.remedy is Remedy.rescale for problem in known):
         return ()
     try:
         kind._check_topology(*repair(V, F).surfaces[0])
     except UnusableMeshError as error:
         return error.problems
-    except MeshError:  # nothing would be left of it, so its own defects are all there is to say
+    except MeshError:  # nothing would be left of it, so only its own defects are reported
         return ()
     return ()
 
 
 def _checked_loops(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return the loops that bound a surface; :class:`UnusableMeshError` if there are none."""
+    """Return the boundary loops of a surface; :class:`UnusableMeshError` if there are none."""
     loops = topology.boundary_loops(F, len(V))
     if not loops:
         text = "the surface is closed: it has no boundary loop, and a map to the disk needs one"
@@ -274,6 +359,7 @@ def _checked_loops(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[NDArray
 
 
 def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
+    """Return the problem that a surface has several boundary loops."""
     sizes = sorted(map(len, loops), reverse=True)
     lengths = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
     longest = int(np.argmax(lengths))
@@ -288,6 +374,7 @@ def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
 
 
 def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
+    """Return the problem that a surface has handles, if it has."""
     euler = topology.euler_characteristic(F, n)
     genus = topology.genus(F, n, loops)
     if not genus:
@@ -302,7 +389,7 @@ def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
 def definition_1_notices(
     F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
 ) -> tuple[Notice, ...]:
-    """Return where the mesh breaks the paper's Definition 1 (a well-conditioned mesh)."""
+    """Return notices on where the mesh breaks the paper's Definition 1 (well-conditioned)."""
     broken = _breaks_of_definition_1(F, n, loops)
     return tuple(Notice(NoticeKind.DEFINITION_1, f"Definition 1 {where}") for where in broken)
 
@@ -310,6 +397,7 @@ def definition_1_notices(
 def _breaks_of_definition_1(
     F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
 ) -> Iterator[str]:
+    """Yield a text for each condition of Definition 1 that the mesh breaks."""
     inside = np.ones(n, dtype=bool)
     inside[np.concatenate(loops)] = False
     graph = topology.vertex_graph(F, n)

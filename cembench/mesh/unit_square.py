@@ -1,4 +1,4 @@
-"""Maps moved to where engines look for textures: the unit square, in which they do not repeat."""
+"""Move maps into the unit square, where engines expect textures."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 
 Complex = NDArray[np.complex128]
 
-#: How far outside the unit disk a map onto it may lie: its boundary is on the circle but for that.
+#: Allowed distance from the unit circle of the boundary of a map onto the disk.
 _ROUNDING = 1e-9
-#: Share of an atlas's side that stays free between shells, so that their texels do not mix.
+#: Gap between shells as a share of the atlas's side, so that their texels do not mix.
 _GAP = 1 / 128
-#: The smallest shell's side, as a share of the largest's.
+#: Smallest side of a shell, as a share of the largest.
 _SMALLEST = 1 / 16
 
 
 def to_unit_square(z: Complex) -> Complex:
-    """Move a map into the unit square by a scaling and a shift; angles stay.
+    """Move a map into the unit square by scaling and translation; angles are preserved.
 
     Parameters
     ----------
@@ -28,8 +28,8 @@ def to_unit_square(z: Complex) -> Complex:
     Returns
     -------
     complex128 (n,)
-        ``(z + 1 + 1j) / 2`` where the map lies in the unit disk and reaches its circle. Any other
-        map is scaled until it fills the square's width or height, and put in the middle.
+        ``(z + 1 + 1j) / 2`` if the map lies in the unit disk and reaches its circle. Any other map
+        is centred and scaled until it fills the square's width or height.
 
     Examples
     --------
@@ -49,11 +49,11 @@ def to_unit_square(z: Complex) -> Complex:
 
 
 def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
-    """Put several maps side by side into the unit square, one shell each.
+    """Pack several maps into the unit square, one shell each.
 
-    Shells lie in rows, the largest first, each in a square of its own and in its shape. A square's
-    side goes with the root of its surface's area, but is at least a sixteenth of the largest: files
-    come in different units.
+    Shells are placed in rows, the largest first, each in its own square and undistorted. The side
+    of a square is proportional to the root of its surface's area, but at least a sixteenth of the
+    largest, because files come in different units.
 
     Parameters
     ----------
@@ -65,14 +65,14 @@ def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
     Returns
     -------
     list of complex128 (n,)
-        The maps, in the order given, without overlap.
+        The maps in the given order, without overlap.
 
     """
     if len(maps) == 1:
         return [to_unit_square(maps[0])]
     sides = np.sqrt(np.asarray(areas) / np.max(areas)).clip(min=_SMALLEST)
     order = np.argsort(-sides, kind="stable")
-    low, high = 0.0, 1.0  # the largest scale at which the rows fit
+    low, high = 0.0, 1.0  # find the largest scale at which the rows fit
     for _ in range(50):
         scale = (low + high) / 2
         fits = _rows(sides[order] * scale) is not None
@@ -85,7 +85,7 @@ def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
 
 
 def _rows(sides: NDArray[np.float64]) -> list[complex] | None:
-    """Return the lower left corners of squares in rows; None where they do not fit."""
+    """Return the lower left corners of squares in rows; None if they do not fit."""
     places = []
     x = y = height = 0.0
     for side in sides.tolist():

@@ -1,7 +1,7 @@
-"""UVs as programs leave them: OBJ, OFF, PLY, MAT, NPZ and text, for vertices or for corners.
+"""Read UVs that programs write: OBJ, OFF, PLY, MAT, NPZ and text, at vertices or at corners.
 
-Beside the UVs the file may hold the surface that they belong to. Whether that is the one that the
-program was given is for the caller to see: :func:`uv_of_corners`.
+The file may also hold the surface that the UVs belong to. :func:`uv_of_corners` checks that it is
+the surface that the program was given.
 """
 
 from __future__ import annotations
@@ -26,34 +26,34 @@ Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 
-#: How far a vertex may be from where it was, relative to the surface's extent: single precision and
-#: six decimals are allowed.
+#: Allowed distance of a vertex from its original position, relative to the surface's extent: single
+#: precision and six decimals are accepted.
 SAME_PLACE = 1e-5
-#: What arrays of UVs, and of their numbers at corners, may be called.
+#: Accepted names of arrays of UVs, and of their indices at corners.
 _UV_NAMES = ("uv", "UV")
 _INDEX_NAMES = ("fuv", "FUV", "ftc", "FTC")
-#: How OFF begins that ends each vertex in two texture coordinates.
+#: Keywords of OFF files whose vertices end with two texture coordinates.
 _STOFF = re.compile("STC?N?OFF")
-#: Stands for a corner that names no UV.
+#: Marks a corner without a UV.
 NO_UV = -(2**62)
 
 
 class OtherSurfaceError(MeshError):
-    """A file holds UVs of another surface than it should."""
+    """A file holds UVs of a different surface than expected."""
 
 
 @dataclass(frozen=True, eq=False)
 class UVFile:
-    """What a file holds.
+    """The content of a file with UVs.
 
     Parameters
     ----------
     uv : complex128 (k,)
         Texture coordinates.
     V, F : float64 (n', 3) and int64 (m', 3), or None
-        The surface in the file, if there is one; triangles alone have its vertices' numbers.
+        The surface in the file, if there is one; without V, F refers to the original vertices.
     index : int64 (m', 3) or None
-        Which texture coordinate each corner has; None: the one of its vertex.
+        The texture coordinate of each corner; None: that of its vertex.
 
     """
 
@@ -64,7 +64,7 @@ class UVFile:
 
 
 def read_uv(path: Path) -> UVFile:
-    """Read the UVs of a file, in the format that its suffix says.
+    """Read the UVs of a file, in the format that its suffix names.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def read_uv(path: Path) -> UVFile:
 
 
 def read_flat(path: Path) -> UVFile:
-    """Read a mesh file that holds a flattened surface, as UVs: x and y of its vertices.
+    """Read a flattened surface from a mesh file; its UVs are x and y of the vertices.
 
     Raises
     ------
@@ -97,17 +97,17 @@ def read_flat(path: Path) -> UVFile:
 
 
 def uv_of_corners(file: UVFile, V: Points, F: Indices) -> Complex:
-    """Return the UV of each corner (m, 3) of a surface, out of a file that should hold it.
+    """Return the UV of each corner (m, 3) of a surface from a file that should hold that surface.
 
-    Vertices may come in another order or several times, and triangles in another order, as programs
-    that cut a surface write them; they are found by their places.
+    Programs that cut a surface may write vertices in another order or several times, and triangles
+    in another order; they are matched by position.
 
     Raises
     ------
     OtherSurfaceError
-        It holds other vertices or triangles.
+        The file holds other vertices or triangles.
     MeshError
-        There is not a UV for each vertex or corner.
+        There is not one UV for each vertex or corner.
 
     """
     corners = file.F if file.index is None else file.index
@@ -134,7 +134,7 @@ def uv_of_corners(file: UVFile, V: Points, F: Indices) -> Complex:
 
 
 def _vertex_numbers(found: Points, V: Points) -> Indices:
-    """Return which vertex of V each vertex of a file is."""
+    """Return the vertex of V that each vertex of a file is."""
     from scipy.spatial import cKDTree
 
     extent = float(np.ptp(V, axis=0).max())
@@ -153,7 +153,7 @@ def _vertex_numbers(found: Points, V: Points) -> Indices:
 
 
 def _places(G: Indices, F: Indices) -> tuple[Indices, Indices]:
-    """Return for each triangle of F its place in G, and which of its corners comes first there."""
+    """Return for each triangle of F its index in G, and which corner comes first there."""
     (g, turn_g), (f, turn_f) = _turned(G), _turned(F)
     order_g, order_f = (np.lexsort(A.T[::-1]) for A in (g, f))
     if not (g[order_g] == f[order_f]).all():
@@ -168,13 +168,14 @@ def _places(G: Indices, F: Indices) -> tuple[Indices, Indices]:
 
 
 def _turned(F: Indices) -> tuple[Indices, Indices]:
-    """Return the triangles with their smallest vertex first, and at which corner that was."""
+    """Rotate triangles so that their smallest vertex comes first; also return that corner."""
     first = F.argmin(axis=1)
     turned = np.take_along_axis(F, (np.arange(3) + first[:, None]) % 3, axis=1)
     return turned, first.astype(np.int64)
 
 
 def _read_obj(path: Path) -> UVFile:
+    """Read the UVs of an OBJ file, with the surface that it holds."""
     V: list[list[float]] = []
     uv: list[complex] = []
     faces: list[list[tuple[int, int]]] = []
@@ -211,7 +212,7 @@ def _read_obj(path: Path) -> UVFile:
 
 
 def _reference(word: str, vertices: int, uvs: int) -> tuple[int, int]:
-    """Return the numbers, from 0, of the vertex and the UV that a corner names."""
+    """Return the indices, from 0, of the vertex and the UV that a corner names."""
     parts = word.split("/")
     at = int(parts[0])
     v = at - 1 if at > 0 else vertices + at
@@ -222,7 +223,7 @@ def _reference(word: str, vertices: int, uvs: int) -> tuple[int, int]:
 
 
 def _read_off(path: Path) -> UVFile:
-    """Read OFF whose vertices end in two texture coordinates, as STOFF declares."""
+    """Read OFF with two texture coordinates at the end of each vertex, as STOFF declares."""
     text = "\n".join(line.split("#", 1)[0] for line in path.read_text("latin-1").splitlines())
     lines = [line.split() for line in text.splitlines() if line.strip()]
     if not lines or not _STOFF.fullmatch(lines[0][0]):
@@ -246,23 +247,26 @@ def _read_off(path: Path) -> UVFile:
 
 
 def _read_ply(path: Path) -> UVFile:
+    """Read the UVs of a PLY file, with the surface that it holds."""
     V, F, uv, index = read_ply_texture(path)
     return UVFile(uv[:, 0] + 1j * uv[:, 1], V, F, index)
 
 
 def _read_mat(path: Path) -> UVFile:
+    """Read the UVs of a MATLAB file of versions up to 7.2."""
     from scipy.io import loadmat
 
     try:
         found = loadmat(path, verify_compressed_data_integrity=True)
     except NotImplementedError:
         raise damaged("files of MATLAB 7.3 are not read; save it with save(..., '-v7')") from None
-    except Exception as error:  # a damaged file makes scipy raise anything
+    except Exception as error:  # scipy may raise anything on a damaged file
         raise damaged(f"it cannot be read as MAT: {said_by(error)}") from None
     return _named_arrays({k: v for k, v in found.items() if not k.startswith("__")}, first=1)
 
 
 def _read_npz(path: Path) -> UVFile:
+    """Read the UVs of a NumPy archive."""
     import zipfile
 
     try:
@@ -275,7 +279,7 @@ def _read_npz(path: Path) -> UVFile:
 
 
 def _named_arrays(found: dict[str, Any], first: int) -> UVFile:
-    """Make UVs of arrays: ``uv`` (k, 2) or complex (k,), and ``fuv`` (m, 3), counted from first."""
+    """Return UVs from arrays: ``uv`` (k, 2) or complex (k,), and ``fuv`` (m, 3)."""
     uv = next((found[name] for name in _UV_NAMES if name in found), None)
     index = next((found[name] for name in _INDEX_NAMES if name in found), None)
     if uv is None:
@@ -286,17 +290,18 @@ def _named_arrays(found: dict[str, Any], first: int) -> UVFile:
 
 
 def _read_text(path: Path) -> UVFile:
-    """Read two numbers a line, for each vertex or for each corner."""
+    """Read two numbers per line, for each vertex or for each corner."""
     rows = [line.replace(",", " ").split() for line in path.read_text("latin-1").splitlines()]
     rows = [row for row in rows if row and not row[0].startswith("#")]
     bad = next((row for row in rows if len(row) != 2), None)
     if bad is not None or not rows:
         told = shown(" ".join(bad)) if bad else "nothing"
-        raise damaged(f"required are two numbers a line; it holds {told}")
+        raise damaged(f"two numbers per line are required; it holds {told}")
     return UVFile(_complex(np.array(rows, dtype=np.float64)))
 
 
 def _complex(uv: ArrayLike) -> Complex:
+    """Return UVs (k, 2) or complex (k,) as complex numbers."""
     a = np.asarray(uv)
     if a.dtype.kind == "c":
         return np.ascontiguousarray(a.ravel(), dtype=np.complex128)

@@ -1,4 +1,4 @@
-"""VTK files, legacy `.vtk` and `.vtu`, through meshio: their triangles, quads and polygons."""
+"""VTK files, legacy `.vtk` and `.vtu`, through meshio: triangles, quads and polygons."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from cembench.core.extras import Extra, require
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, damaged
 
-#: meshio's names of flat cells whose corners go round.
+#: meshio's names of planar cells with corners in cyclic order.
 _POLYGONS = ("triangle", "quad", "polygon")
 
 
 def read_vtk(path: Path) -> Soup:
-    """Read the flat cells of a file; others, such as lines and tetrahedra, with a notice."""
+    """Read the planar cells of a file; others, such as lines and tetrahedra, give a notice."""
     require(Extra.FORMATS, f"reading {path.suffix} files", "meshio")
     import meshio
 
     try:
         mesh = meshio.read(path)
-    except (SystemExit, Exception) as error:  # it ends the process on some damaged files
+    except (SystemExit, Exception) as error:  # meshio calls sys.exit on some damaged files
         raise damaged(
             f"it cannot be read as {path.suffix[1:].upper()}: {type(error).__name__}: {error}"
         ) from None
@@ -37,7 +37,8 @@ def read_vtk(path: Path) -> Soup:
     notices: tuple[Notice, ...] = ()
     if others:
         told = ", ".join(f"{count} of type {kind}" for kind, count in others.items())
-        notices = (Notice(NoticeKind.LINES_IGNORED, f"cells that are no faces were left: {told}"),)
+        text = f"cells that are not faces were ignored: {told}"
+        notices = (Notice(NoticeKind.LINES_IGNORED, text),)
     V = np.asarray(mesh.points, dtype=np.float64)
     if V.ndim != 2 or V.shape[1] not in (2, 3):
         raise damaged(f"its points have shape {V.shape}")

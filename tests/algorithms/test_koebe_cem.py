@@ -143,7 +143,7 @@ def test_a_named_outer_boundary_comes_to_lie_outside():
 def test_an_outer_boundary_that_is_none_is_named():
     mesh = gallery.three_holes()
     for solver in (koebe_cem, harmonic_filled):
-        with pytest.raises(ParameterError, match=r"outer=100000: .* is no vertex"):
+        with pytest.raises(ParameterError, match=r"outer=100000: .* is not a vertex"):
             solver(mesh, outer=100_000)
 
 

@@ -222,7 +222,7 @@ def test_files_that_were_not_named_are_not_written_over(torus_file, tmp_path, cl
     for name, call in calls.items():
         (cli.folder / name).write_text("mine")
         code, _, err = cli(*call)
-        assert (code, f"{name} is there already" in err) == (2, True)
+        assert (code, f"{name} already exists" in err) == (2, True)
         assert (cli.folder / name).read_text() == "mine"
         assert cli(*call, "--force")[0] == 0
         assert (cli.folder / name).read_text() != "mine"

@@ -12,7 +12,7 @@ from tests.file_modes import bound_by_modes
 
 
 def bomb(path, shape="(1000000000000,)", content=b"\0" * 1000):
-    """An archive whose header announces terabytes."""
+    """An archive whose header declares terabytes."""
     header = f"{{'descr': '<c16', 'fortran_order': False, 'shape': {shape}, }}".encode()
     header = header.ljust(117, b" ") + b"\n"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -35,8 +35,8 @@ def test_arrays_are_read_as_they_were_written(tmp_path):
         (lambda p: np.savez(p, other=[1]), "uv.npy"),
         (lambda p: np.savez(p, uv=np.array([{"a": 1}], dtype=object)), "pickled"),
         (lambda p: p.write_bytes(pickle.dumps(print)), "not a zip file"),
-        (bomb, "announces 16,000,000,000,000 bytes"),
-        (lambda p: bomb(p, "(-5,)"), "announces"),
+        (bomb, "declares 16,000,000,000,000 bytes"),
+        (lambda p: bomb(p, "(-5,)"), "declares"),
         (lambda p: p.mkdir(), "not a regular file"),
         (os.mkfifo, "not a regular file"),
         (lambda p: None, "No such file"),

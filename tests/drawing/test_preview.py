@@ -156,7 +156,7 @@ def test_error_when_the_file_cannot_be_written(tmp_path, place):
     (tmp_path / "a-folder").mkdir()
     before = sorted(tmp_path.rglob("*"))
     mesh = flat_disk()
-    with pytest.raises(RenderError, match=r"cannot be written: .*Choose another place"):
+    with pytest.raises(RenderError, match=r"cannot be written: .*Choose another path"):
         write_preview(mesh, seen_from_above(mesh), tmp_path / place, size=SMALL)
     assert sorted(tmp_path.rglob("*")) == before
 

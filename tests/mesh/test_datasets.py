@@ -146,7 +146,7 @@ def test_a_full_disk_leaves_what_was_there_and_ends_with_2(cli, server, tiny, kn
     with files_of_at_most(1000):
         code, out, err = cli("fetch", "tiny")
     assert (code, out) == (2, "")
-    assert "cannot be written: File too large. Make room there" in err
+    assert "cannot be written: File too large. Free some space" in err
     assert tree(tiny.path.parent) == {Path("tiny.mat"): b"older"}
     assert fetch(tiny).read_bytes() == server.content
 

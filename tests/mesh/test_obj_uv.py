@@ -28,7 +28,7 @@ def test_polygons_relative_indices_and_seams(tmp_path):
         (POINTS + TEXTURE + "f 1/9 2/1 3/1\n", r"1 of 1 triangles have no texture coordinates"),
         (POINTS + TEXTURE + "f 1/1 2/2 3/3 4/4\n", "its faces are not those of the surface"),
         (POINTS + TEXTURE + "f 1/1 2/2 4/4\n", "its faces are not those of the surface"),
-        (POINTS + "vt a b\nf 1/1 2/1 3/1\n", "line 5 is no texture coordinate"),
+        (POINTS + "vt a b\nf 1/1 2/1 3/1\n", "line 5 is not a texture coordinate"),
         (POINTS + "vt nan 0\nf 1/1 2/1 3/1\n", "line 5 has a texture coordinate that is not fini"),
     ],
 )

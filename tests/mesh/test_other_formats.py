@@ -99,7 +99,7 @@ def test_vtk_files_keep_every_triangle_and_tell_of_lines(disk, tmp_path, name):
     mesh = read_mesh(tmp_path / name, TriangleMesh)
     assert mesh.hash == disk.hash
     assert [n.text for n in mesh.notices if n.kind is NoticeKind.LINES_IGNORED] == [
-        "cells that are no faces were left: 1 of type line"
+        "cells that are not faces were ignored: 1 of type line"
     ]
 
 

@@ -141,7 +141,8 @@ def test_a_hole_with_fingers_is_not_the_outer_one_though_it_is_the_longest():
 
 
 @pytest.mark.parametrize(
-    ("vertex", "message"), [(10_000, "is no vertex"), (-1, "is no vertex"), (320, "lies on no")]
+    ("vertex", "message"),
+    [(10_000, "is not a vertex"), (-1, "is not a vertex"), (320, "lies on no")],
 )
 def test_an_outer_boundary_that_is_not_there(vertex, message):
     mesh = gallery.three_holes(600)

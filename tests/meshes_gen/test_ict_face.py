@@ -108,8 +108,8 @@ def test_expressions_add_up_and_the_neutral_face_is_as_published(model):
 @pytest.mark.parametrize(
     ("expression", "message"),
     [
-        ("frown", r"expression 'frown' is unknown; there are: neutral, random, jawOpen"),
-        ("eyeBlink", r"'eyeBlink' is not among the files that are there"),
+        ("frown", r"expression 'frown' is unknown; available are: neutral, random, jawOpen"),
+        ("eyeBlink", r"'eyeBlink' is not among the available files"),
         ("jawOpen:2", r"the weight '2' is not a number from 0 to 1"),
         ("jawOpen:wide", r"the weight 'wide' is not a number"),
     ],
@@ -132,7 +132,7 @@ def test_landmarks_are_found_on_every_part_and_size():
 
 
 def test_landmarks_of_another_surface_are_refused():
-    with pytest.raises(ParameterError, match="flat-disk is no sample of the ICT face model"):
+    with pytest.raises(ParameterError, match="flat-disk has no landmarks: it is not"):
         landmarks(cembench.surface("flat-disk", 200))
 
 

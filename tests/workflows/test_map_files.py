@@ -60,7 +60,7 @@ def test_a_checkerboard_is_found_from_obj_and_from_ply(result, tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mtl", "a.obj", "a_texture.png"]
     picture = trimesh.load_mesh(tmp_path / "a.obj").visual.material.image
     assert picture.size == (1024, 1024)
-    with pytest.raises(cembench.ParameterError, match=r"a_texture\.png is there already"):
+    with pytest.raises(cembench.ParameterError, match=r"a_texture\.png already exists"):
         result.save(tmp_path / "a.ply", checker=True)
     result.save(tmp_path / "b.ply", checker=True)
     assert b"TextureFile b_texture.png" in (tmp_path / "b.ply").read_bytes()
@@ -164,7 +164,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
     [
         (("-o", "a.fbx"), "allowed here: .obj, .ply, .glb, .vtp, .npz"),
         (("-o", "a.obj", "--bake", "nothing.png"), "nothing.png cannot be read: No such file"),
-        (("-o", "a.obj", "--bake", "flat.obj"), "it is no picture"),
+        (("-o", "a.obj", "--bake", "flat.obj"), "it is not a picture"),
         (("-o", "a.obj", "--bake", "paint.png", "--checker"), "two textures; choose one"),
         (("-o", "a.vtp", "--checker"), "names no texture"),
         (("--checker",), "need a file that uses the texture"),

@@ -1,1 +1,1 @@
-"""One mesh format a file: a surface, with texture coordinates where it has them, to bytes."""
+"""Writers, one mesh format per file: from a surface with texture coordinates to bytes."""

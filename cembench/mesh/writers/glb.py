@@ -1,7 +1,7 @@
 """Binary glTF 2.0 (`.glb`): surface, texture coordinates and texture in one file.
 
-glTF knows single precision only. So the vertices are written about the middle of the surface, and
-a node moves them back.
+glTF has single precision only. Vertices are therefore written relative to the centre of the
+surface, and a node moves them back.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ _FLOAT, _UINT32, _VERTICES, _INDICES, _REPEAT, _LINEAR, _MIPMAPS = (
 
 
 def glb_bytes(*surfaces: Textured) -> bytes:
-    """Compose a file with a mesh for each surface; one with a texture shows it, from both sides.
+    """Return a file with one mesh per surface; textures are shown on both sides.
 
-    Seams are cut open: a vertex of glTF has one texture coordinate. Its v points down.
+    Seams are cut open, since a glTF vertex has one texture coordinate. Its v points down.
     """
     file = _File()
     for surface in surfaces:
@@ -32,14 +32,14 @@ def glb_bytes(*surfaces: Textured) -> bytes:
 
 
 class _File:
-    """The parts of a file, as they grow."""
+    """The parts of a file while it is composed."""
 
     def __init__(self) -> None:
         self.parts: dict[str, list[dict[str, Any]]] = {}
         self.content = b""
 
     def add(self, kind: str, part: dict[str, Any]) -> int:
-        """Add a part, unless there is an equal one, and return its index."""
+        """Add a part, unless an equal one exists, and return its index."""
         known = self.parts.setdefault(kind, [])
         if part not in known:
             known.append(part)
@@ -67,7 +67,7 @@ class _File:
         return self.add("accessors", about)
 
     def packed(self) -> bytes:
-        """Compose the file: a header, the parts as JSON, the bytes."""
+        """Return the file: a header, the parts as JSON, the bytes."""
         described = {
             "asset": {"version": "2.0", "generator": "cembench"},
             "scene": 0,
@@ -83,6 +83,7 @@ class _File:
 
 
 def _add(file: _File, surface: Textured) -> None:
+    """Add a surface as a mesh and a node."""
     middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
     points = in_single_precision(surface.V - middle, "glTF")
     in_single_precision(middle, "glTF")
@@ -109,6 +110,7 @@ def _moved(middle: Sequence[float]) -> dict[str, Any]:
 
 
 def _material(file: _File, texture: bytes | None) -> int:
+    """Add a material, with a texture if one is given, and return its index."""
     surface: dict[str, Any] = {"metallicFactor": 0, "roughnessFactor": 1}
     if texture is not None:
         known = [
@@ -131,6 +133,7 @@ def _material(file: _File, texture: bytes | None) -> int:
 
 
 def _bytes_of(file: _File, view: int) -> bytes:
+    """Return the bytes of a view."""
     place = file.parts["bufferViews"][view]
     return file.content[place["byteOffset"] : place["byteOffset"] + place["byteLength"]]
 

@@ -1,4 +1,4 @@
-"""Arrays of NumPy, in full precision."""
+"""NumPy archives, in full precision."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cembench.mesh.writers.textured import Textured
 
 
 def npz_bytes(surface: Textured) -> bytes:
-    """Compose an archive of `V` (n, 3), `F` (m, 3), `uv` (k, 2) and, with seams, `F_uv` (m, 3)."""
+    """Return an archive of `V` (n, 3), `F` (m, 3), `uv` (k, 2) and, with seams, `F_uv` (m, 3)."""
     arrays = {"V": surface.V, "F": surface.F}
     if surface.uv is not None:
         arrays["uv"] = surface.uv

@@ -1,4 +1,4 @@
-"""Wavefront OBJ, and the material file that gives it a texture."""
+"""Wavefront OBJ, and the material file for a texture."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ import numpy as np
 from cembench.mesh.obj_text import obj_text
 from cembench.mesh.writers.textured import Textured
 
-#: What the material is called in OBJ and MTL.
+#: Name of the material in OBJ and MTL.
 MATERIAL = "map"
 
 
 def obj_bytes(surface: Textured) -> bytes:
-    """Compose an OBJ file; numbers are the shortest decimals that read back as the same."""
+    """Return an OBJ file; numbers are the shortest decimals that read back unchanged."""
     uv = None if surface.uv is None else surface.uv @ np.array([1, 1j])
     return obj_text(surface.V, surface.F, uv, surface.corners).encode()
 
 
 def with_material(text: str, library: str) -> str:
-    """Let an OBJ file use our material, and no other, from a library beside it.
+    """Make an OBJ file use our material, and no other, from a material library beside it.
 
-    Faces that a file colours with materials of its own would not show the texture.
+    Faces with materials of their own would not show the texture.
     """
     kept = [
         line for line in text.splitlines(keepends=True) if line.split()[:1] not in _OWN_MATERIALS
@@ -32,6 +32,6 @@ _OWN_MATERIALS = (["usemtl"], ["mtllib"])
 
 
 def mtl_bytes(texture_file: str) -> bytes:
-    """Compose the material: a texture, and no highlight."""
+    """Return the material file: a texture, and no highlight."""
     lines = [f"newmtl {MATERIAL}", "Ka 1 1 1", "Kd 1 1 1", "Ks 0 0 0", "d 1", "illum 1"]
     return "\n".join([*lines, f"map_Kd {texture_file}", ""]).encode("utf-8", "surrogateescape")

@@ -1,6 +1,6 @@
-"""Binary PLY with texture coordinates as MeshLab, Blender, VTK and trimesh read them.
+"""Binary PLY with texture coordinates that MeshLab, Blender, VTK and trimesh read.
 
-MeshLab takes them only in single precision: as `s` and `t` of a vertex, or, where the surface has
+MeshLab accepts them only in single precision: as `s` and `t` of a vertex or, if the surface has
 seams, as `texcoord` of a face.
 """
 
@@ -12,7 +12,7 @@ from cembench.mesh.writers.textured import Textured, in_single_precision
 
 
 def ply_bytes(surface: Textured) -> bytes:
-    """Compose a little-endian PLY file: coordinates float64, texture coordinates float32."""
+    """Return a little-endian PLY file: coordinates float64, texture coordinates float32."""
     V, F, uv = surface.V, surface.F, surface.uv
     lines = ["ply", "format binary_little_endian 1.0"]
     if surface.texture_file is not None:

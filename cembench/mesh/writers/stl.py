@@ -1,4 +1,4 @@
-"""Binary STL: triangles that stand alone, in single precision."""
+"""Binary STL: separate triangles in single precision."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from cembench.mesh.writers.textured import Textured, in_single_precision
 
 
 def stl_bytes(surface: Textured) -> bytes:
-    """Compose an STL file: each triangle with its normal."""
+    """Return an STL file with the normal of each triangle."""
     facets = np.zeros(
         len(surface.F), [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
     )

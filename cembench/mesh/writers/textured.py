@@ -1,4 +1,4 @@
-"""A surface with texture coordinates, as files hold it."""
+"""A surface with texture coordinates, for the writers."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class Textured:
     uv : float64 (k, 2), optional
         Texture coordinates; v points up.
     corners : int64 (m, 3), optional
-        Which of them each corner has; default: that of its vertex.
+        The texture coordinate of each corner (default: that of its vertex).
     texture : bytes, optional
-        The image that the texture coordinates look up, as a PNG file.
+        The texture image, as a PNG file.
     texture_file : str, optional
-        What that file is called, for formats that name one beside them.
+        Name of that file, for formats that refer to a file beside them.
     name : str
-        What the surface is called.
+        Name of the surface.
 
     """
 
@@ -44,13 +44,13 @@ class Textured:
 
     @property
     def has_seams(self) -> bool:
-        """Whether corners of one vertex have several texture coordinates."""
+        """Whether the corners at some vertex have different texture coordinates."""
         return self.corners is not None and not np.array_equal(self.corners, self.F)
 
     def cut_at_seams(self) -> Textured:
-        """Return the same with a vertex for each texture coordinate that a vertex has.
+        """Return the same surface with one vertex for each texture coordinate of a vertex.
 
-        A vertex comes first with the one that it has in the first triangle; copies come last.
+        The original vertex keeps the texture coordinate of its first triangle; copies come last.
         """
         if self.uv is None or self.corners is None:
             return self
@@ -64,9 +64,9 @@ class Textured:
         return replace(self, V=self.V[vertex], F=F, uv=self.uv[texture], corners=None)
 
     def normals(self) -> Points:
-        """Return a unit normal for each vertex, the triangles' weighted by area, (n, 3)."""
+        """Return unit normals at the vertices, averaged by triangle area, (n, 3)."""
         a, b, c = (self.V[self.F[:, k]] for k in range(3))
-        size = float(np.abs(self.V).max()) or 1.0  # so that squares do not overflow
+        size = float(np.abs(self.V).max()) or 1.0  # to avoid overflow of squares
         faces = np.cross((b - a) / size, (c - a) / size)
         total = np.zeros_like(self.V)
         for k in range(3):
@@ -83,7 +83,7 @@ def in_single_precision(points: Points, format_name: str) -> NDArray[np.float32]
     Raises
     ------
     MeshError
-        They are too large for it.
+        The coordinates are too large for single precision.
 
     """
     largest = float(np.finfo(np.float32).max)

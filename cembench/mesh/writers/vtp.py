@@ -1,4 +1,4 @@
-"""VTK's PolyData (`.vtp`), which ParaView and PyVista read, in full precision."""
+"""VTK PolyData (`.vtp`), read by ParaView and PyVista, in full precision."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TYPES = {"float64": "Float64", "int64": "Int64"}
 
 
 def vtp_bytes(surface: Textured) -> bytes:
-    """Compose a PolyData file; texture coordinates are its `TCoords`. Seams are cut open."""
+    """Return a PolyData file; texture coordinates are its `TCoords`. Seams are cut open."""
     flat = surface.cut_at_seams()
     m = len(flat.F)
     coordinates = _element("Points", [_array("Points", flat.V)])
@@ -38,6 +38,7 @@ def _element(name: str, content: Sequence[str], attributes: str = "") -> str:
 
 
 def _array(name: str, values: NDArray[Any]) -> str:
+    """Return an array as a binary DataArray element."""
     little = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<"))
     content = np.uint64(little.nbytes).astype("<u8").tobytes() + little.tobytes()
     components = f' NumberOfComponents="{values.shape[1]}"' if values.ndim > 1 else ""
