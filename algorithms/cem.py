@@ -44,8 +44,11 @@ def cem(
     (`order_kept` counts these steps; 0 on most surfaces); where negative cotangent weights still
     fold the final map, patches around the folds are laid out anew (`fold_repairs`).
     With the vertices ordered interior first, boundary last, and the last one pinned, a single
-    Cholesky factor serves the start, and its leading block all Dirichlet solves. `delaunay` takes
-    the weights of the intrinsic Delaunay triangulation.
+    Cholesky factor serves the start, by forward substitution, and its leading block all Dirichlet
+    solves, by back substitution. Where the boundary is short for the surface, its neighbours come
+    right before it (`ring_order.py` has the estimate): then iterations pass only the dense end of
+    the factor, and the rest of the interior is solved for once. The maps are the same. `delaunay`
+    takes the weights of the intrinsic Delaunay triangulation.
     """
     return map_from_triangle(
         mesh,
@@ -70,7 +73,7 @@ def map_from_triangle(
 ) -> Parameterization:
     """Map by CEM with the start's triangle given by hand; None for the usual one."""
     L = laplacian(mesh, delaunay=delaunay)
-    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,), iterations=max_iterations)
     ring = Cholesky(bordered.L_bb)
 
     def ring_solution(f_i: Complex) -> Complex:
@@ -87,7 +90,7 @@ def map_from_triangle(
         best=best,
     )
     iterations = int(np.argmin(history)) if best else len(history) - 1
-    uv = bordered.in_order(f_i, f_b)
+    uv = bordered.completed(f_i, f_b)
     uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
     extras = {
         "order_kept": order_kept,

@@ -85,6 +85,12 @@ def _names(kind: Any) -> str:
     return ", ".join(repr(name) for name in get_args(kind))
 
 
+def shows_trailing_block() -> bool:
+    """Does a factor, as systems are solved here, show its trailing block, so that solves halve?"""
+    how = _current.get()
+    return how.solves == "reuse" and how.backend == "cvxopt"
+
+
 Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 SolverOf = Callable[[sparse.csc_array], Solver]
 
@@ -94,6 +100,7 @@ class _Factor(Protocol):
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def schur_factor(self) -> NDArray[np.float64] | None: ...
+    def solve_trailing(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
     def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
     def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
 
@@ -163,6 +170,23 @@ class Cholesky:
             C = self._kept.schur_factor() if self._kept is not None else None
         return self._schur_factor_by_solves() if C is None else C
 
+    @property
+    def halves(self) -> bool:
+        """Are :meth:`solve_trailing`, :meth:`condensed` and :meth:`extended` half a solve each?"""
+        return self._kept is not None and self._kept.schur_factor() is not None
+
+    def solve_trailing(self, b: NDArray[Any]) -> NDArray[Any]:
+        """The entries of A x = b behind the leading block; b (n,) or (n, k), real or complex.
+
+        With a factor that shows its trailing block that is half a solve: the leading block's share
+        of the back substitution is left out.
+        """
+        if self._kept is not None and self.halves:
+            _count(b, 0.5)
+            with phase("solves"):
+                return by_real_columns(self._kept.solve_trailing, b)
+        return self.solve(b)[self._leading :]
+
     def condensed(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """What is left of a right-hand side b = (c, d) when the leading block is eliminated?
 
@@ -184,7 +208,7 @@ class Cholesky:
         x (n - leading,) or (n - leading, k), y alike; half a solve as in :meth:`condensed`.
         """
         k = self._leading
-        if self._kept is not None and self._kept.schur_factor() is not None:
+        if self._kept is not None and self.halves:
             _count(x, 0.5)
             with phase("solves"):
                 return by_real_columns(self._kept.extended, x)
@@ -280,6 +304,9 @@ class _SeparateFactors:
 
     def schur_factor(self) -> None:
         """These factors are not shown."""
+
+    def solve_trailing(self, B: NDArray[np.float64]) -> None:
+        """Nor half a solve."""
 
     def condensed(self, B: NDArray[np.float64]) -> None:
         """Nor half a solve."""
