@@ -18,6 +18,7 @@ from cembench.conformal.ring_order import ring_pays
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky, shows_trailing_block
+from cembench.linear_algebra.lower_triangle import permuted_lower
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.triangular import triangle_solved
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -87,11 +88,11 @@ class BorderedLaplacian:
             if self._ringed:
                 rest = np.setdiff1d(self.interior, self.beside, assume_unique=True)
                 self.interior = np.concatenate([rest, self.beside])
-            order = self._order = np.concatenate([self.interior, self.boundary])
-            self._ordered = sparse.csc_array(by_rows(L)[order][:, order].T)  # symmetric again
-            pinned = self._ordered[:-1, :-1]
+            self._order = np.concatenate([self.interior, self.boundary])
+            self._boundary_rows = by_rows(L)[self.boundary]
+            pinned = permuted_lower(by_rows(L), self._order[:-1])
         leading = len(self.interior) - (len(self.beside) if self._ringed else 0)
-        self._whole = Cholesky(pinned, leading=leading)
+        self._whole = Cholesky(pinned, leading=leading, lower=True)
 
     def _ring(self, L: sparse.sparray, iterations: int) -> NDArray[np.int64]:
         """The interior vertices that get values: the boundary's neighbours if that pays, or all."""
@@ -108,9 +109,8 @@ class BorderedLaplacian:
     @cached_property
     def L_bi(self) -> sparse.csr_array:
         """The boundary's rows of L, the columns of `beside`: all others are zero."""
-        n_i = len(self.interior)
         with phase("assembly"):
-            return sparse.csr_array(self._ordered)[n_i:, n_i - len(self.beside) : n_i]
+            return self._boundary_rows[:, self.beside].sorted_indices()
 
     @cached_property
     def _L_ib(self) -> sparse.csr_array:
@@ -120,9 +120,8 @@ class BorderedLaplacian:
     @cached_property
     def L_bb(self) -> sparse.csc_array:
         """The boundary's rows and columns of L."""
-        n_i = len(self.interior)
         with phase("assembly"):
-            return self._ordered[n_i:, n_i:]
+            return sparse.csc_array(self._boundary_rows[:, self.boundary])
 
     def in_order(self, f_i: NDArray[T], f_b: NDArray[T]) -> NDArray[T]:
         """Values on the interior and the boundary as one array (n,), in the order of the mesh."""

@@ -57,6 +57,7 @@ def laplacian_of_weights(
 
     The two triangles of an edge add up.
     """
+    F = F.astype(np.int32 if n < 2**31 else np.int64)  # as SciPy will have them
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
     one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T

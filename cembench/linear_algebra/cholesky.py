@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -21,6 +21,7 @@ from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite, ParameterError
 from cembench.core.extras import Extra, command
 from cembench.linear_algebra.backends import Backend, available_backends, default_backend
+from cembench.linear_algebra.lower_triangle import both_triangles
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.work import count_columns
 
@@ -112,6 +113,8 @@ class Cholesky:
     ----------
     A : sparse (n, n)
         Symmetric positive definite, both triangles stored.
+    lower : bool
+        A holds its lower triangle alone, each column from top to bottom.
     leading : int, optional
         Also solve with the block ``A[:leading, :leading]``; under "reuse" from the same factor,
         unless more than :data:`LARGEST_DENSE` rows follow it: then it has a factor of its own.
@@ -123,19 +126,35 @@ class Cholesky:
 
     """
 
-    def __init__(self, A: sparse.sparray, *, leading: int | None = None) -> None:
-        self._A = sparse.csc_array(A)
+    def __init__(
+        self, A: sparse.sparray, *, leading: int | None = None, lower: bool = False
+    ) -> None:
+        self._given, self._lower = sparse.csc_array(A), lower
         self._leading = leading
         self._how = _current.get()
         self._kept: _Factor | None = None
         if self._how.solves == "reuse":
-            self._kept = _factor(self._how.backend, self._A, leading)
+            self._kept = _factor(self._how.backend, self._read, leading)
+
+    @property
+    def _read(self) -> sparse.csc_array:
+        """What the library is given: CHOLMOD reads no more than the lower triangle."""
+        return self._given if self._how.backend == "cvxopt" else self._A
+
+    @cached_property
+    def _A(self) -> sparse.csc_array:
+        """Both triangles."""
+        return both_triangles(self._given) if self._lower else self._given
 
     def update(self, A: sparse.sparray) -> None:
-        """Turn to another matrix with the same pattern; under "reuse" its analysis is kept."""
-        self._A = sparse.csc_array(A)
+        """Turn to another matrix with the same pattern; under "reuse" its analysis is kept.
+
+        Both triangles are stored, or one, as at construction.
+        """
+        self._given = sparse.csc_array(A)
+        vars(self).pop("_A", None)
         if self._kept is not None:
-            self._kept.update(self._A)
+            self._kept.update(self._read)
 
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """A x = b; b (n,) or (n, k), real or complex; x alike."""

@@ -141,8 +141,11 @@ def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
     A = _in_order(A)
     columns = np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
     below = np.flatnonzero(A.indices >= columns)
-    rows = A.indices[below].astype(np.int64)
-    return spmatrix(A.data[below], rows, columns[below], A.shape, "d"), below
+    if len(below) < A.nnz:
+        data, rows, columns = A.data[below], A.indices[below], columns[below]
+    else:
+        data, rows = A.data, A.indices
+    return spmatrix(data, rows.astype(np.int64), columns, A.shape, "d"), below
 
 
 def _in_order(A: sparse.csc_array) -> sparse.csc_array:
