@@ -51,7 +51,10 @@ def area_of_sides(a: Real, b: Real, c: Real) -> Real:
 
     Kahan's order of the operations keeps the digits of thin triangles.
     """
-    z, y, x = np.sort([a, b, c], axis=0)
+    # In order of size, several times as fast as by a sort of three.
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    z, x = np.minimum(low, c), np.maximum(high, c)
+    y = np.maximum(low, np.minimum(high, c))
     product = (x + (y + z)) * (z - (x - y)) * (z + (x - y)) * (x + (y - z))
     area: Real = 0.25 * np.sqrt(np.maximum(product, 0))
     return area
