@@ -72,7 +72,7 @@ class _Corners:
         self.weight: Real = weights.flatten()
         self.twin = partners(F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel())
         self._apart = Independence(len(F))
-        self._moved_to = np.arange(F.size)  # the same before and after each flip
+        self._moved_to = np.empty(F.size, dtype=np.int64)
 
     def not_delaunay(self, corners: Indices) -> Indices:
         """Those of these corners whose edge is not Delaunay; the lower one of an edge's two."""
@@ -102,9 +102,9 @@ class _Corners:
         # Outer edges ih, ki, jk and hj: where they are, and where they go.
         old, new = np.concatenate([j2, j, i, i2]), np.concatenate([s, s + 2, t, t + 2])
         lengths, partners = self.length[old], self.twin[old]
+        self._moved_to[partners] = partners
         self._moved_to[old] = new
         partners = np.where(partners >= 0, self._moved_to[partners], -1)
-        self._moved_to[old] = old
         self.length[new], self.twin[new] = lengths, partners
         self.twin[partners[partners >= 0]] = new[partners >= 0]
         self.length[s + 1] = self.length[t + 1] = diagonal

@@ -91,7 +91,7 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
             return cotangent_laplacian(mesh.V, mesh.F)
         edges = _opposite_edges(mesh.V, mesh.F)
         dots, double_area = _products(*edges)
-        lengths = np.stack([np.sqrt(np.einsum("td,td->t", e, e)) for e in edges], axis=1)
+        lengths = np.stack([np.sqrt(sum(x * x for x in e.T)) for e in edges], axis=1)
         F, _, weights = intrinsic_delaunay(mesh.F, lengths, dots / (2 * double_area[:, None]))
         return laplacian_of_weights(F, weights, mesh.n)
 

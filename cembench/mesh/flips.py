@@ -20,7 +20,7 @@ class Independence:
     """
 
     def __init__(self, m: int) -> None:
-        self._first = np.full(m, np.iinfo(np.int64).max)  # the same before and after each call
+        self._first = np.empty(m, dtype=np.int64)
 
     def __call__(self, left: Indices, right: Indices) -> NDArray[np.bool_]:
         """Return which edges to take (k,), given the triangles on either side, best edges first.
@@ -28,10 +28,10 @@ class Independence:
         An edge is taken where no earlier one has either of its triangles.
         """
         order = np.arange(len(left))
+        self._first[left] = self._first[right] = len(left)
         for triangles in (left, right):
             np.minimum.at(self._first, triangles, order)
         free: NDArray[np.bool_] = (self._first[left] == order) & (self._first[right] == order)
-        self._first[left] = self._first[right] = np.iinfo(np.int64).max
         return free
 
 
