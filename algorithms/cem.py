@@ -35,8 +35,12 @@ def cem(
 
     Faithful to Algorithm 1: start (14), (18), (15), (16); iteration (30), (24), (25), (22), or (23)
     instead of (30) with ``inversion=False``. With the vertices ordered interior first, boundary
-    last, and the last one pinned, a single Cholesky factor serves the start, and its leading block
-    all Dirichlet solves. `delaunay` takes the weights of the intrinsic Delaunay triangulation.
+    last, and the last one pinned, a single Cholesky factor serves the start, by forward
+    substitution, and its leading block all Dirichlet solves, by back substitution. If the boundary
+    is short for the surface, its neighbours come right before it (`ring_order.py` estimates what
+    pays): then iterations use only the dense end of the factor, and the rest of the interior is
+    solved for once. The maps are the same. `delaunay` takes the weights of the intrinsic Delaunay
+    triangulation.
 
     Decided here, where the paper is silent: the start's triangle is the one whose barycentre is
     nearest to the mean vertex. The iteration ends after the first step that changes E_C by less
@@ -71,7 +75,7 @@ def map_from_triangle(
 ) -> Parameterization:
     """Map by CEM starting from the given triangle; None for the usual one."""
     L = laplacian(mesh, delaunay=delaunay)
-    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,), iterations=max_iterations)
     ring = Cholesky(bordered.L_bb)
 
     def ring_solution(f_i: Complex) -> Complex:
@@ -88,7 +92,7 @@ def map_from_triangle(
         best=best,
     )
     iterations = int(np.argmin(history)) if best else len(history) - 1
-    uv = bordered.in_order(f_i, f_b)
+    uv = bordered.completed(f_i, f_b)
     uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
     extras = {
         "order_kept": order_kept,

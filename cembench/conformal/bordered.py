@@ -14,9 +14,13 @@ from scipy import sparse
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.planar import polygon_area
+from cembench.conformal.ring_order import ring_pays
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky
+from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky, shows_trailing_block
+from cembench.linear_algebra.lower_triangle import permuted_lower
+from cembench.linear_algebra.real_columns import by_real_columns
+from cembench.linear_algebra.triangular import triangle_solved
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
@@ -38,12 +42,19 @@ class BorderedLaplacian:
     L : sparse (n, n)
         Its Laplacian.
     loops : sequence of int arrays
-        Its boundary loops, in the wanted order.
+        Its boundary loops, in the order wanted.
+    iterations : int
+        How many times at most the harmonic map is needed beside the boundary only, as in CEM. Where
+        that pays (:func:`cembench.conformal.ring_order.ring_pays`) the neighbours of the boundary
+        are put last in the interior, and :meth:`dirichlet` gives the values at these alone.
 
     Attributes
     ----------
     interior, boundary : int64
-        Indices i and b; b is the concatenation of the loops.
+        Indices i, and b: the loops one behind the other.
+    beside : int64
+        The interior vertices at which :meth:`dirichlet` gives values: the neighbours of the
+        boundary where their order was taken, else all.
     parts : tuple of slice
         The position of each loop in the boundary.
 
@@ -57,7 +68,12 @@ class BorderedLaplacian:
     """
 
     def __init__(
-        self, mesh: TriangleMesh, L: sparse.sparray, loops: Sequence[NDArray[np.int64]]
+        self,
+        mesh: TriangleMesh,
+        L: sparse.sparray,
+        loops: Sequence[NDArray[np.int64]],
+        *,
+        iterations: int = 0,
     ) -> None:
         self.interior, self.boundary = mesh.interior, np.concatenate(loops)
         ends = [0, *accumulate(map(len, loops))]
@@ -67,17 +83,34 @@ class BorderedLaplacian:
                 "the mesh has no interior vertex, so no harmonic map has any freedom"
             )
         with phase("assembly"):
-            order = self._order = np.concatenate([self.interior, self.boundary])
-            self._ordered = sparse.csc_array(by_rows(L)[order][:, order].T)  # symmetric again
-            pinned = self._ordered[:-1, :-1]
-        self._whole = Cholesky(pinned, leading=len(self.interior))
+            self.beside = self._ring(L, iterations)
+            self._ringed = len(self.beside) < len(self.interior)
+            if self._ringed:
+                rest = np.setdiff1d(self.interior, self.beside, assume_unique=True)
+                self.interior = np.concatenate([rest, self.beside])
+            self._order = np.concatenate([self.interior, self.boundary])
+            self._boundary_rows = by_rows(L)[self.boundary]
+            pinned = permuted_lower(by_rows(L), self._order[:-1])
+        leading = len(self.interior) - (len(self.beside) if self._ringed else 0)
+        self._whole = Cholesky(pinned, leading=leading, lower=True)
+
+    def _ring(self, L: sparse.sparray, iterations: int) -> NDArray[np.int64]:
+        """The interior vertices that get values: the boundary's neighbours if that pays, or all."""
+        if not iterations or not shows_trailing_block():
+            return self.interior
+        near = np.zeros(L.shape[0], dtype=bool)
+        near[by_rows(L)[self.boundary].indices] = True
+        near[self.boundary] = False
+        ring = np.flatnonzero(near)
+        sizes = len(self.interior), len(ring), len(self.boundary)
+        short = len(ring) + len(self.boundary) <= LARGEST_DENSE
+        return ring if short and ring_pays(*sizes, iterations) else self.interior
 
     @cached_property
     def L_bi(self) -> sparse.csr_array:
-        """The rows of L of the boundary and its columns of the interior."""
-        n_i = len(self.interior)
+        """The boundary's rows of L, the columns of `beside`: all others are zero."""
         with phase("assembly"):
-            return sparse.csr_array(self._ordered)[n_i:, :n_i]
+            return self._boundary_rows[:, self.beside].sorted_indices()
 
     @cached_property
     def _L_ib(self) -> sparse.csr_array:
@@ -86,10 +119,9 @@ class BorderedLaplacian:
 
     @cached_property
     def L_bb(self) -> sparse.csc_array:
-        """The rows and columns of L of the boundary."""
-        n_i = len(self.interior)
+        """The boundary's rows and columns of L."""
         with phase("assembly"):
-            return self._ordered[n_i:, n_i:]
+            return sparse.csc_array(self._boundary_rows[:, self.boundary])
 
     def in_order(self, f_i: NDArray[T], f_b: NDArray[T]) -> NDArray[T]:
         """Return values on the interior and the boundary as one array (n,) in mesh order."""
@@ -98,20 +130,50 @@ class BorderedLaplacian:
         return f
 
     def solved_boundary(self, rhs: Complex) -> Complex:
-        """Return the boundary values of L f = rhs (n,), sum(rhs) = 0, that end in 0."""
-        f = np.append(self._whole.solve(rhs[self._order][:-1]), 0.0)
-        return f[len(self.interior) :]
+        """The boundary values of L f = rhs (n,), 0 in sum, with f = 0 at the last of them."""
+        found = self._whole.solve_trailing(rhs[self._order][:-1])
+        return np.append(found, 0.0)[-len(self.boundary) :]
 
     def solve_interior(self, rhs_i: NDArray[Any]) -> NDArray[Any]:
         """Return f_i with L_ii f_i = rhs_i."""
         return self._whole.solve_leading(rhs_i)
 
     def dirichlet(self, f_b: Complex) -> Complex:
-        """Return the interior values f_i with L_ii f_i = -L_ib f_b (Eq. 22)."""
+        """The interior values with L_ii f_i = -L_ib f_b (Eq. 22), of the vertices `beside`.
+
+        By half a solve where the factor shows its trailing block.
+        """
+        # Constants are harmonic: so the last vertex can be taken to 0 and back.
+        if self._ringed:
+            with phase("solves"):
+                return by_real_columns(self._ring_values, (f_b - f_b[-1])[:-1]) + f_b[-1]
+        if self._whole.halves:
+            return self._whole.extended((f_b - f_b[-1])[:-1]) + f_b[-1]
         return self.solve_interior(-(self._L_ib @ f_b))
 
+    @cached_property
+    def _ring_triangles(self) -> tuple[Real, Real]:
+        """The dense factor's rows of the ring, and of the boundary below it."""
+        k, C = len(self.beside), self._whole.schur_factor()
+        return np.asfortranarray(C[:k, :k]), C[k:, :k]
+
+    def _ring_values(self, X: Real) -> Real:
+        """Return the values on the ring for boundary values X (B - 1, k), 0 at the last vertex."""
+        own, below = self._ring_triangles
+        return triangle_solved(own, -(below.T @ X), transposed=True)
+
+    def completed(self, f_i: Complex, f_b: Complex) -> Complex:
+        """The map (n,) of boundary values and what :meth:`dirichlet` gave for them."""
+        if self._ringed:
+            near = np.concatenate([f_i, f_b[:-1]]) - f_b[-1]
+            f_i = np.concatenate([self._whole.extended(near) + f_b[-1], f_i])
+        return self.in_order(f_i, f_b)
+
     def conformal_energy(self, f_i: Complex, f_b: Complex) -> float:
-        """Return E_C (Eq. 7) of a map that is harmonic inside, from the boundary rows alone."""
+        """E_C (Eq. 7) of a map that is harmonic inside: only the boundary's rows count.
+
+        `f_i` at the vertices `beside`.
+        """
         with phase("energy"):
             dirichlet = 0.5 * float(np.vdot(f_b, self.L_bb @ f_b + self.L_bi @ f_i).real)
             return dirichlet - polygon_area(f_b)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.mesh.flips import Independence, area_of_sides, distance_across
-from cembench.mesh.gluing import twins_of_half_edges
+from cembench.mesh.gluing import partners
 
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -51,13 +51,14 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
 
     """
     corners = _Corners(F, lengths, weights)
-    waiting = np.arange(F.size)
+    waiting = np.flatnonzero(corners.weight < 0)
     for _ in range(MOST_ROUNDS):
         wrong = corners.not_delaunay(waiting)
         if not len(wrong):
             break
         flipped = corners.sharing_no_triangle(wrong)
-        waiting = np.concatenate([wrong, corners.flip(flipped)])
+        touched = corners.flip(wrong[flipped])
+        waiting = np.concatenate([wrong[~flipped], touched])
     found = corners.vertex.reshape(-1, 3), corners.length.reshape(-1, 3)
     return *found, corners.weight.reshape(-1, 3)
 
@@ -69,26 +70,27 @@ class _Corners:
         self.vertex: Indices = F.flatten()
         self.length: Real = lengths.flatten()
         self.weight: Real = weights.flatten()
-        opposite = np.roll(twins_of_half_edges(F).reshape(-1, 3), -1, axis=1).ravel()
-        self.twin = np.where(opposite < 0, -1, opposite - opposite % 3 + (opposite + 2) % 3)
+        self.twin = partners(F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel())
         self._apart = Independence(len(F))
-        self._moved_to = np.arange(F.size)  # the same before and after each flip
+        self._moved_to = np.empty(F.size, dtype=np.int64)
 
     def not_delaunay(self, corners: Indices) -> Indices:
         """Return the corners whose edge is not Delaunay, the lower one of each edge's two."""
         twins = self.twin[corners]
-        corners, twins = corners[twins >= 0], twins[twins >= 0]
+        inside = twins >= 0
+        corners, twins = corners[inside], twins[inside]
         one, other = self.weight[corners], self.weight[twins]
         wrong = one + other < -ROUNDING * (np.abs(one) + np.abs(other))
-        wrong &= corners // 3 != twins // 3  # the same triangle on both sides
-        return np.unique(np.minimum(corners, twins)[wrong])
+        wrong &= corners // 3 != twins // 3  # such an edge cannot be flipped
+        lower = np.sort(np.minimum(corners, twins)[wrong], kind="stable")
+        return lower[np.diff(lower, prepend=-1) > 0]
 
-    def sharing_no_triangle(self, corners: Indices) -> Indices:
-        """Return those edges, in order, whose triangles belong to no earlier one."""
-        return corners[self._apart(corners // 3, self.twin[corners] // 3)]
+    def sharing_no_triangle(self, corners: Indices) -> NDArray[np.bool_]:
+        """Whether, of these edges one after another, no earlier one has the same triangle."""
+        return self._apart(corners // 3, self.twin[corners] // 3)
 
     def flip(self, corners: Indices) -> Indices:
-        """Flip these edges, of triangles (k, i, j) and (h, j, i); return all corners of those.
+        """Flip these edges, of triangles (k, i, j) and (h, j, i); the corners of their outer edges.
 
         Edge ij becomes kh: the triangles become (k, i, h) and (h, j, k).
         """
@@ -100,9 +102,9 @@ class _Corners:
         # Outer edges ih, ki, jk and hj: where they are, and where they go.
         old, new = np.concatenate([j2, j, i, i2]), np.concatenate([s, s + 2, t, t + 2])
         lengths, partners = self.length[old], self.twin[old]
+        self._moved_to[partners] = partners
         self._moved_to[old] = new
         partners = np.where(partners >= 0, self._moved_to[partners], -1)
-        self._moved_to[old] = old
         self.length[new], self.twin[new] = lengths, partners
         self.twin[partners[partners >= 0]] = new[partners >= 0]
         self.length[s + 1] = self.length[t + 1] = diagonal
@@ -110,7 +112,7 @@ class _Corners:
         changed = np.concatenate([s, t])[:, None] + np.arange(3)
         self.vertex[changed] = np.concatenate(triangles, axis=1).T
         self.weight[changed] = half_cotangents_of_sides(self.length[changed])
-        return changed.ravel()
+        return new
 
 
 def half_cotangents_of_sides(lengths: Real) -> Real:

@@ -12,7 +12,6 @@ from scipy import sparse
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
 from cembench.core.clock import phase
-from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
@@ -23,15 +22,26 @@ def corner_products(
 
     V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is at vertex ``F[t, c]``. Areas are unsigned.
     """
+    return _products(*_opposite_edges(V, F))
+
+
+def _opposite_edges(
+    V: NDArray[np.float64], F: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The edges (m, d) opposite to the corners 0, 1, 2."""
     a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
-    # Edges opposite to the corners 0, 1, 2.
-    e0, e1, e2 = c - b, a - c, b - a
-    dots = np.empty(F.shape)
+    return c - b, a - c, b - a
+
+
+def _products(
+    e0: NDArray[np.float64], e1: NDArray[np.float64], e2: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    dots = np.empty((len(e0), 3))
     for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
         np.einsum("td,td->t", p, q, out=dots[:, k])
     np.negative(dots, out=dots)
-    # Lagrange's identity with dot products alone would suffer from cancellation on slivers.
-    if V.shape[1] == 2:
+    # Lagrange's identity through the dot products alone would cancel on slivers.
+    if e0.shape[1] == 2:
         double_area = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
     else:
         x = e1[:, 1] * e2[:, 2] - e1[:, 2] * e2[:, 1]
@@ -57,6 +67,7 @@ def laplacian_of_weights(
 
     The weights of the two triangles of an edge are added.
     """
+    F = F.astype(np.int32 if n < 2**31 else np.int64)  # as SciPy will have them
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
     one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
@@ -104,8 +115,10 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
     with phase("laplacian"):
         if not delaunay:
             return cotangent_laplacian(mesh.V, mesh.F)
-        lengths = side_lengths(mesh.V, mesh.F)
-        F, _, weights = intrinsic_delaunay(mesh.F, lengths, half_cotangents(mesh.V, mesh.F))
+        edges = _opposite_edges(mesh.V, mesh.F)
+        dots, double_area = _products(*edges)
+        lengths = np.stack([np.sqrt(sum(x * x for x in e.T)) for e in edges], axis=1)
+        F, _, weights = intrinsic_delaunay(mesh.F, lengths, dots / (2 * double_area[:, None]))
         return laplacian_of_weights(F, weights, mesh.n)
 
 

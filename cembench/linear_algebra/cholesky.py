@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
@@ -21,6 +21,7 @@ from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite, ParameterError
 from cembench.core.extras import Extra, command
 from cembench.linear_algebra.backends import Backend, available_backends, default_backend
+from cembench.linear_algebra.lower_triangle import both_triangles
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.work import count_columns
 
@@ -112,6 +113,12 @@ def _names(kind: Any) -> str:
     return ", ".join(repr(name) for name in get_args(kind))
 
 
+def shows_trailing_block() -> bool:
+    """Does a factor, as systems are solved here, show its trailing block, so that solves halve?"""
+    how = _current.get()
+    return how.solves == "reuse" and how.backend == "cvxopt"
+
+
 Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 SolverOf = Callable[[sparse.csc_array], Solver]
 
@@ -123,6 +130,7 @@ class _Factor(Protocol):
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def schur_factor(self) -> NDArray[np.float64] | None: ...
+    def solve_trailing(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
     def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
     def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
 
@@ -133,7 +141,9 @@ class Cholesky:
     Parameters
     ----------
     A : sparse (n, n)
-        Symmetric positive definite, with both triangles stored.
+        Symmetric positive definite, both triangles stored.
+    lower : bool
+        A holds its lower triangle alone, each column from top to bottom.
     leading : int, optional
         Also solve with the block ``A[:leading, :leading]``. Under "reuse" the same factor is used,
         unless more than :data:`LARGEST_DENSE` rows follow the block; then it has its own factor.
@@ -154,19 +164,35 @@ class Cholesky:
 
     """
 
-    def __init__(self, A: sparse.sparray, *, leading: int | None = None) -> None:
-        self._A = sparse.csc_array(A)
+    def __init__(
+        self, A: sparse.sparray, *, leading: int | None = None, lower: bool = False
+    ) -> None:
+        self._given, self._lower = sparse.csc_array(A), lower
         self._leading = leading
         self._how = _current.get()
         self._kept: _Factor | None = None
         if self._how.solves == "reuse":
-            self._kept = _factor(self._how.backend, self._A, leading)
+            self._kept = _factor(self._how.backend, self._read, leading)
+
+    @property
+    def _read(self) -> sparse.csc_array:
+        """What the library is given: CHOLMOD reads no more than the lower triangle."""
+        return self._given if self._how.backend == "cvxopt" else self._A
+
+    @cached_property
+    def _A(self) -> sparse.csc_array:
+        """Both triangles."""
+        return both_triangles(self._given) if self._lower else self._given
 
     def update(self, A: sparse.sparray) -> None:
-        """Replace the matrix by one with the same pattern; "reuse" keeps the symbolic analysis."""
-        self._A = sparse.csc_array(A)
+        """Turn to another matrix with the same pattern; under "reuse" its analysis is kept.
+
+        Both triangles are stored, or one, as at construction.
+        """
+        self._given = sparse.csc_array(A)
+        vars(self).pop("_A", None)
         if self._kept is not None:
-            self._kept.update(self._A)
+            self._kept.update(self._read)
 
     def solve(self, b: NDArray[Any]) -> NDArray[Any]:
         """Return x with A x = b; b is (n,) or (n, k), real or complex, and so is x."""
@@ -201,6 +227,23 @@ class Cholesky:
             C = self._kept.schur_factor() if self._kept is not None else None
         return self._schur_factor_by_solves() if C is None else C
 
+    @property
+    def halves(self) -> bool:
+        """Whether :meth:`solve_trailing`, :meth:`condensed` and :meth:`extended` are half a solve each."""
+        return self._kept is not None and self._kept.schur_factor() is not None
+
+    def solve_trailing(self, b: NDArray[Any]) -> NDArray[Any]:
+        """The entries of A x = b behind the leading block; b (n,) or (n, k), real or complex.
+
+        With a factor that shows its trailing block that is half a solve: the leading block's share
+        of the back substitution is left out.
+        """
+        if self._kept is not None and self.halves:
+            _count(b, 0.5)
+            with phase("solves"):
+                return by_real_columns(self._kept.solve_trailing, b)
+        return self.solve(b)[self._leading :]
+
     def condensed(self, b: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return d - E B^-1 c for right-hand sides b = (c, d): B eliminated, forward only.
 
@@ -222,7 +265,7 @@ class Cholesky:
         x is (n - leading,) or (n - leading, k), and so is y; half a solve as in :meth:`condensed`.
         """
         k = self._leading
-        if self._kept is not None and self._kept.schur_factor() is not None:
+        if self._kept is not None and self.halves:
             _count(x, 0.5)
             with phase("solves"):
                 return by_real_columns(self._kept.extended, x)
@@ -320,6 +363,9 @@ class _SeparateFactors:
 
     def schur_factor(self) -> None:
         """Return None: the library does not expose its factor."""
+
+    def solve_trailing(self, B: NDArray[np.float64]) -> None:
+        """Return None: the library has no half solves."""
 
     def condensed(self, B: NDArray[np.float64]) -> None:
         """Return None: the library has no half solves."""

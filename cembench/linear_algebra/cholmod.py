@@ -18,7 +18,7 @@ from scipy import sparse
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.supernodes import factor_entries, trailing_block
-from cembench.linear_algebra.triangular import triangle_times
+from cembench.linear_algebra.triangular import triangle_solved, triangle_times
 from cembench.linear_algebra.work import count_analysis, count_factorisation
 
 # Codes of `cholmod.solve`: the whole system, and its four steps.
@@ -95,15 +95,22 @@ class CholmodFactor:
             self._trailing = trailing_block(self._symbolic, self._lower.size[0], self._leading)
         return self._trailing
 
+    def solve_trailing(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """x_t of A x = B for B (n, k): L y = B ends in y_t with C^T x_t = y_t."""
+        C = self.schur_factor()
+        return None if C is None else triangle_solved(C, self._forward_end(B), transposed=True)
+
     def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return B_t - A_tl A_ll^-1 B_l for B (n, k): C y_t, where L y = B ends in y_t."""
         C = self.schur_factor()
-        if C is None:
-            return None
+        return None if C is None else triangle_times(C, self._forward_end(B))
+
+    def _forward_end(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """y_t of L y = B."""
         x = matrix(np.asfortranarray(B))
         cholmod.solve(self._symbolic, x, sys=_PERMUTE)
         cholmod.solve(self._symbolic, x, sys=_FORWARD)
-        return triangle_times(C, np.array(x)[self._leading :])
+        return np.array(x)[self._leading :]
 
     def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return -A_ll^-1 A_lt B for B (n - leading, k): the solution of L^T x = (0, C^T B)."""
@@ -135,8 +142,11 @@ def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
     A = _in_order(A)
     columns = np.repeat(np.arange(A.shape[1]), np.diff(A.indptr))
     below = np.flatnonzero(A.indices >= columns)
-    rows = A.indices[below].astype(np.int64)
-    return spmatrix(A.data[below], rows, columns[below], A.shape, "d"), below
+    if len(below) < A.nnz:
+        data, rows, columns = A.data[below], A.indices[below], columns[below]
+    else:
+        data, rows = A.data, A.indices
+    return spmatrix(data, rows.astype(np.int64), columns, A.shape, "d"), below
 
 
 def _in_order(A: sparse.csc_array) -> sparse.csc_array:

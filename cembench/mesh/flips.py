@@ -20,7 +20,7 @@ class Independence:
     """
 
     def __init__(self, m: int) -> None:
-        self._first = np.full(m, np.iinfo(np.int64).max)  # the same before and after each call
+        self._first = np.empty(m, dtype=np.int64)
 
     def __call__(self, left: Indices, right: Indices) -> NDArray[np.bool_]:
         """Return the selected edges (k,), given the triangles on either side, best edges first.
@@ -28,10 +28,10 @@ class Independence:
         An edge is selected if no earlier edge has either of its triangles.
         """
         order = np.arange(len(left))
+        self._first[left] = self._first[right] = len(left)
         for triangles in (left, right):
             np.minimum.at(self._first, triangles, order)
         free: NDArray[np.bool_] = (self._first[left] == order) & (self._first[right] == order)
-        self._first[left] = self._first[right] = np.iinfo(np.int64).max
         return free
 
 
@@ -51,7 +51,10 @@ def area_of_sides(a: Real, b: Real, c: Real) -> Real:
 
     Kahan's order of operations preserves the digits of thin triangles.
     """
-    z, y, x = np.sort([a, b, c], axis=0)
+    # In order of size, several times as fast as by a sort of three.
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    z, x = np.minimum(low, c), np.maximum(high, c)
+    y = np.maximum(low, np.minimum(high, c))
     product = (x + (y + z)) * (z - (x - y)) * (z + (x - y)) * (x + (y - z))
     area: Real = 0.25 * np.sqrt(np.maximum(product, 0))
     return area

@@ -37,14 +37,24 @@ def paired_half_edges(edge: Indices, faces: Indices) -> Indices:
 
 
 def twins_of_half_edges(F: Indices) -> Indices:
-    """Return each half-edge's twin on an oriented manifold; -1 on the boundary."""
-    ends = np.sort(half_edges(F), axis=1)
-    keys = ends[:, 0] * (int(F.max(initial=0)) + 1) + ends[:, 1]
+    """Return the half-edge on the other side of each one of an oriented manifold; -1: boundary."""
+    return partners(F.ravel(), F[:, [1, 2, 0]].ravel())
+
+
+def partners(i: Indices, j: Indices) -> Indices:
+    """Return which other edge has the ends of each edge ij, in either order; -1 where none has.
+
+    No more than two edges have the same ends.
+    """
+    keys = np.minimum(i, j) * (max(i.max(initial=0), j.max(initial=0)) + 1)
+    keys += np.maximum(i, j)
     order = np.argsort(keys, kind="stable")
-    same = np.flatnonzero(np.diff(keys[order]) == 0)
-    twins = np.full(F.size, -1)
-    twins[order[same]], twins[order[same + 1]] = order[same + 1], order[same]
-    return twins
+    keys = keys[order]
+    same = np.flatnonzero(keys[1:] == keys[:-1])
+    one, other = order[same], order[same + 1]
+    found = np.full(len(keys), -1)
+    found[one], found[other] = other, one
+    return found
 
 
 def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:

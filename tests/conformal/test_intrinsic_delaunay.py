@@ -3,12 +3,15 @@ import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from scipy import sparse
 
 from cembench import DiskMesh
 from cembench.conformal import intrinsic_delaunay as own
 from cembench.conformal.laplacian import half_cotangents, laplacian
-from cembench.mesh.flips import area_of_sides
+from cembench.mesh.files import read_mesh
+from cembench.mesh.flips import Independence, area_of_sides
 from tests import gallery
+from tests.real_meshes import real_mesh
 
 
 def of(V, F):
@@ -78,3 +81,33 @@ def test_flips_end_where_rounding_makes_both_edges_look_wrong():
     L = laplacian(DiskMesh(V, F), delaunay=True)
     assert np.isfinite(L.data).all()
     assert abs(L.sum(axis=1)).max() < 1e-12 * abs(L).max()
+
+
+@pytest.mark.parametrize("name", ["chinese_lion.obj", "canonical_face.obj", "mountain.ply"])
+def test_no_weight_inside_is_negative_on_a_real_mesh(name):
+    """Sides of the boundary cannot be flipped."""
+    mesh = read_mesh(real_mesh(name))
+
+    before, after = (
+        laplacian(mesh, delaunay=delaunay)[mesh.interior] for delaunay in (False, True)
+    )
+    before, after = (sparse.coo_array(L) for L in (before, after))
+    largest = [L.data[mesh.interior[L.row] != L.col].max() for L in (before, after)]
+    assert largest[0] > 1e-2
+    assert largest[1] < 1e-9 * before.data.max()
+
+
+def test_a_mesh_that_is_delaunay_stays_as_it_is():
+    mesh = flat_disk(400)
+    once = of(mesh.V, mesh.F)
+    again = own.intrinsic_delaunay(*once)
+    for before, after in zip(once, again, strict=True):
+        np.testing.assert_array_equal(before, after)
+
+
+def test_edges_are_flipped_at_once_only_where_they_share_no_triangle():
+    apart = Independence(6)
+    left, right = np.array([3, 0, 4, 3]), np.array([1, 1, 5, 1])
+    # The second edge shares triangle 1 with the first; the last is the first once more.
+    for _ in range(2):
+        assert apart(left, right).tolist() == [True, False, True, False]

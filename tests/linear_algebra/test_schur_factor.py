@@ -53,6 +53,18 @@ def test_it_is_the_factor_of_the_schur_complement(system, backend, solves):
     assert (np.diag(C) > 0).all()
 
 
+@pytest.mark.parametrize("backend", available_backends())
+@pytest.mark.parametrize("solves", ["reuse", "backslash"])
+def test_what_stands_behind_the_leading_block_is_that_of_the_whole_solution(
+    system, backend, solves
+):
+    A, k = system
+    b = np.random.default_rng(0).standard_normal((len(A.toarray()), 2)) @ [1, 1j]
+    with linear_algebra(solves, backend):
+        found = Cholesky(A, leading=k).solve_trailing(b)
+    np.testing.assert_allclose(found, np.linalg.solve(A.toarray(), b)[k:], atol=1e-11)
+
+
 def test_the_factor_shows_it_without_a_solve(system, count_calls):
     A, k = system
     solved = count_calls(cholmod.CholmodFactor, "solve_leading")

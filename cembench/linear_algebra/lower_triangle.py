@@ -1,0 +1,49 @@
+"""Lower triangles of symmetric matrices, all that a Cholesky factorisation reads."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+
+def permuted_lower(A: sparse.csr_array, order: NDArray[np.int64]) -> sparse.csc_array:
+    """Return the lower triangle of ``A[order][:, order]``, in one pass over A.
+
+    Parameters
+    ----------
+    A : sparse (n, n)
+        Symmetric, by rows.
+    order : int64 (k,)
+        Which rows and columns, each once; k may be less than n.
+
+    Returns
+    -------
+    lower : sparse (k, k)
+        By columns, each from top to bottom.
+
+    Examples
+    --------
+    >>> A = sparse.csr_array([[4.0, 1.0, 2.0], [1.0, 5.0, 0.0], [2.0, 0.0, 6.0]])
+    >>> permuted_lower(A, np.array([2, 0])).toarray()
+    array([[6., 0.],
+           [2., 4.]])
+
+    """
+    k = len(order)
+    rows = A[order]
+    kind = rows.indices.dtype
+    place = np.full(A.shape[0], k, dtype=kind)
+    place[order] = np.arange(k, dtype=kind)
+    columns = place[rows.indices]
+    kept = columns <= np.repeat(np.arange(k, dtype=kind), np.diff(rows.indptr))
+    ends = np.concatenate([[0], np.cumsum(kept)])[rows.indptr].astype(kind)
+    lower = sparse.csr_array((rows.data[kept], columns[kept], ends), shape=(k, k)).tocsc()
+    # Turning rows into columns takes them one after the other.
+    lower.has_sorted_indices = True
+    return lower
+
+
+def both_triangles(lower: sparse.csc_array) -> sparse.csc_array:
+    """Return the symmetric matrix with this lower triangle."""
+    return sparse.csc_array(lower + sparse.tril(lower, -1).T)
