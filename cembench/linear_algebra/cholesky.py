@@ -229,7 +229,7 @@ class Cholesky:
 
     @property
     def halves(self) -> bool:
-        """Whether :meth:`solve_trailing`, :meth:`condensed` and :meth:`extended` are half a solve each."""
+        """Whether `solve_trailing`, `condensed` and `extended` are half a solve each."""
         return self._kept is not None and self._kept.schur_factor() is not None
 
     def solve_trailing(self, b: NDArray[Any]) -> NDArray[Any]:
