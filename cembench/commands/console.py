@@ -132,6 +132,6 @@ def assignments(given: Sequence[str]) -> dict[str, str]:
     for assignment in given:
         name, equals, value = assignment.partition("=")
         if not equals or not name:
-            raise ParameterError(f"-p {assignment!r} is not allowed; write NAME=VALUE.")
+            raise ParameterError(f"-p {assignment!r} is not of the form NAME=VALUE.")
         pairs[name.strip()] = value.strip()
     return pairs

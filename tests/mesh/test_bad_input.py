@@ -100,7 +100,7 @@ def test_bad_usage(arguments, message, cli, tmp_path):
 
 def test_run_needs_something_to_run_on(cli):
     code, _, err = cli("run")
-    assert (code, "nothing to run on" in err) == (2, True)
+    assert (code, "no surface to run on" in err) == (2, True)
 
 
 def test_two_surfaces_of_one_name(cli, tmp_path):
