@@ -40,8 +40,9 @@ class Run:
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> import cembench
-    >>> cembench.Run("results/run").folder.name
+    >>> cembench.Run(Path("results/run")).folder.name
     'run'
 
     """

@@ -95,7 +95,7 @@ def test_a_run_over_a_set_has_one_round_and_keeps_what_the_set_gave(cli, folder,
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (["--limit", "3", "--surfaces", "flat-disk"], "--limit is of --set"),
+        (["--limit", "3", "--surfaces", "flat-disk"], "--limit needs --set"),
         (["--set", "EMPTY"], "gives no surface"),
         (["--set", "nowhere"], "there is no set 'nowhere'"),
     ],

@@ -1,4 +1,4 @@
-"""What did not end ok, and what was asked for and is not there."""
+"""Cells that did not end ok or were not finished."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from cembench.report.document import Column, Table, Text, Value, words
 
 
 def not_ok(evidence: Evidence) -> Table | Text:
-    """A line for each cell without a valid map; one sentence where there is none."""
+    """Return a table of cells without a valid map, or a sentence if there is none."""
     rows = []
     for record in evidence.records:
         outcome, cell = record.outcome, record.cell

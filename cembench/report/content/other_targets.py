@@ -1,4 +1,4 @@
-"""Maps to other targets than the disk: they are never in one table with disks unmarked."""
+"""Maps to targets other than the disk, which are never mixed with disks unmarked."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from cembench.report.content.evidence import DISK, Evidence
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.document import Column, Table, Value, words
 
-#: What means the same for every target.
+#: Metrics that have the same meaning for every target.
 _COMPARABLE = tuple(
     metric
     for metric in METRICS
@@ -17,7 +17,7 @@ _COMPARABLE = tuple(
 
 
 def other_targets(evidence: Evidence) -> Table | None:
-    """A line a surface and algorithm; None where all algorithms map to the disk."""
+    """Return a table by surface and algorithm; None if all algorithms map to the disk."""
     rows = []
     policy = evidence.policies[0]
     for surface in evidence.surfaces:

@@ -1,4 +1,4 @@
-"""How much of a time is book-keeping: factors kept (reuse) against factored anew (backslash)?"""
+"""Times under both linear-algebra policies: reuse and backslash."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ BOTH = ("reuse", "backslash")
 
 
 def has_both(evidence: Evidence) -> bool:
-    """Did the run measure both ways of solving?"""
+    """Whether the run measured both policies."""
     return all(policy in evidence.policies for policy in BOTH)
 
 
 def both_gap(evidence: Evidence) -> Gap:
-    """What is missing in a run of one policy."""
+    """Return the gap of a run with only one policy."""
     other = next(policy for policy in BOTH if policy not in evidence.policies)
     return Gap(
-        "Factors kept against factored anew",
-        f"this run solved systems in one way: {', '.join(evidence.policies)}.",
+        "Factorisations reused or repeated",
+        f"this run has only one linear-algebra policy: {', '.join(evidence.policies)}.",
         f"the same `cembench run` with --solves reuse,backslash (lacking here: {other})",
     )
 
@@ -33,7 +33,7 @@ def both_gap(evidence: Evidence) -> Gap:
 def seconds_under(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
 ) -> tuple[Value, float | None]:
-    """A cell's seconds under a policy, as a value and as a number."""
+    """Return a cell's seconds under a policy, as a value and as a number."""
     record = evidence.find(surface, series, policy)
     if record is None or record.outcome.status != "ok" or record.outcome.median_seconds is None:
         key = record.cell.key if record else ""
@@ -44,7 +44,7 @@ def seconds_under(
 
 
 def policies_table(evidence: Evidence) -> Table:
-    """Seconds under both policies side by side, and their ratio, for every algorithm."""
+    """Return a table of seconds under both policies and their ratio, for every algorithm."""
     columns = [Column("surface", numeric=False)]
     for series in evidence.series:
         columns += [Column(title, series.label) for title in (*BOTH, "ratio")]
@@ -61,7 +61,7 @@ def policies_table(evidence: Evidence) -> Table:
                 ratios[series.label].append(b / a)
                 cells.append(Value(f"{b / a:.2f}", b / a, "derived"))
             else:
-                cells.append(missing("not both were measured"))
+                cells.append(missing("not measured under both policies"))
         rows.append(tuple(cells))
     means, counts = [words("geometric mean")], [words("n, surfaces counted")]
     for series in evidence.series:
@@ -82,7 +82,7 @@ def policies_table(evidence: Evidence) -> Table:
 
 
 def speedups_table(evidence: Evidence) -> Table:
-    """The average rates of speedup of CEM under both policies."""
+    """Return a table of CEM's average rates of speedup under both policies."""
     series = [s for s in evidence.disk_series if s.algorithm != REFERENCE and s.main]
     columns = [Column("CEM over", numeric=False)]
     for policy in BOTH:
@@ -111,12 +111,12 @@ def speedups_table(evidence: Evidence) -> Table:
         "How much of the speedup of CEM is the algorithm, and how much keeping factors",
         tuple(columns),
         tuple(rows),
-        "Rates of speedup (Eq. 33) on the surfaces that are or stand for models of the paper.",
+        "Rates of speedup (Eq. 33) on the surfaces that are or stand in for models of the paper.",
     )
 
 
 def policies_plot(evidence: Evidence) -> Plot:
-    """The ratios as points over the surfaces."""
+    """Return a plot of the ratios by surface."""
     drawn = []
     for series in evidence.series:
         names, values = [], []

@@ -1,4 +1,4 @@
-"""Table 1: what does a map cost, in seconds, and how many iterations does CEM take?"""
+"""Table 1: seconds of a map, and iterations of CEM."""
 
 from __future__ import annotations
 

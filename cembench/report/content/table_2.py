@@ -1,4 +1,4 @@
-"""Table 2: the rate of speedup of CEM over the others (Eq. 33), and its averages."""
+"""Table 2: the rates of speedup of CEM over the others (Eq. 33), and their averages."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ CAPTION = (
 
 
 def table_2(evidence: Evidence) -> list[Table]:
-    """Rates of speedup with their averages in both readings; a set for each way of solving."""
+    """Return the rates of speedup and their averages in both readings, for each policy."""
     tables: list[Table] = []
     for policy in evidence.policies:
         tables += three_kinds(
@@ -67,7 +67,7 @@ def _quantities(
 
 
 def averages_table(evidence: Evidence, policy: str) -> Table:
-    """Both readings of the averages: stated, over all printed models, over the run's, measured."""
+    """Return both readings of the averages: stated, printed for all or these models, measured."""
     columns = [Column("reading", numeric=False)]
     for algorithm in COMPARED:
         columns += [
@@ -125,7 +125,7 @@ def _stated(number: float) -> str:
 
 
 def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[float], ...]:
-    """Printed for all models; printed for those measured; measured."""
+    """Return the rates printed for all models, printed for those measured, and measured."""
     measured, there = measured_rates(evidence, algorithm, policy)
     return printed_rates(algorithm), printed_rates(algorithm, there), measured
 
@@ -133,7 +133,7 @@ def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[fl
 def measured_rates(
     evidence: Evidence, algorithm: str, policy: str
 ) -> tuple[list[float], list[str]]:
-    """The rates of speedup of CEM over an algorithm, one for each model; and which these are."""
+    """Return the rates of speedup of CEM over an algorithm by model, and the models."""
     rates, models = [], []
     series = evidence.series_of(algorithm)
     for surface in evidence.one_each if series else ():

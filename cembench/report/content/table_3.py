@@ -15,7 +15,7 @@ CAPTION = (
 
 
 def table_3(evidence: Evidence) -> list[Table]:
-    """Conformal energies; how systems are solved does not change them."""
+    """Return the table of conformal energies, which do not depend on the policy."""
     return three_kinds(evidence, 3, "conformal energy", _quantities, caption=CAPTION)
 
 

@@ -1,4 +1,4 @@
-"""Table 4: by how many degrees the angles change, mean and standard deviation."""
+"""Table 4: mean and standard deviation of the angular distortion in degrees."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CAPTION = (
 
 
 def table_4(evidence: Evidence) -> list[Table]:
-    """Mean and standard deviation of angular distortions."""
+    """Return the table of means and standard deviations of angular distortions."""
     return three_kinds(
         evidence, 4, "angular distortion in degrees, mean and SD", _quantities, caption=CAPTION
     )

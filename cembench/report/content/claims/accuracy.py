@@ -1,4 +1,4 @@
-"""Claims about how good the maps are."""
+"""Claims about the accuracy of the maps."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from cembench.report.document import Claim
 from cembench.results.records import Record
 
 Inspections = Mapping[str, Inspection]
-#: "Similar": within this share of the smallest of the three; "slightly": by at most that.
+#: "Similar" means within this share of the smallest of the three; "slightly", by at most that.
 SIMILAR = 0.25
 
 
 def cem_records(evidence: Evidence) -> list[tuple[MeasuredSurface, Record]]:
-    """CEM's records that ended ok or invalid: those with a map that can be judged."""
+    """Return CEM's records that ended ok or invalid, those with a map to judge."""
     series = evidence.series_of(REFERENCE)
     found = [(s, evidence.find(s, series)) for s in evidence.surfaces] if series else []
     return [(s, r) for s, r in found if r is not None and r.outcome.metrics]
 
 
 def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are CEM's maps free of folds?"""
+    """Test the claim that CEM's maps have no folds."""
     found = cem_records(evidence)
     clean = [s for s, r in found if r.outcome.metrics.get("flipped_triangles") == 0]
     folded = [
@@ -50,7 +50,7 @@ def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Do CEM's maps keep angles?"""
+    """Test the claim that CEM's maps preserve angles."""
     found = cem_records(evidence)
     errors = [r.outcome.metrics.get("angle_error_mean_deg") for _, r in found]
     known = [float(e) for e in errors if e is not None]
@@ -75,7 +75,7 @@ def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are most angular distortions of the paper's faces below one degree?"""
+    """Test the claim that most angular distortions of the paper's faces are below one degree."""
     series = evidence.series_of(REFERENCE)
     label = series.label if series else ""
     shares = {
@@ -101,14 +101,14 @@ def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def energy_similar(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the energies of FDM, LDM and CEM similar?"""
+    """Test the claim that the energies of FDM, LDM and CEM are similar."""
     return _similar(
         evidence, "energy-similar", "conformal_energy", "the conformal energy", "figures 11 and 12"
     )
 
 
 def deviation_similar(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the standard deviations of the distortions by FDM, LDM and CEM similar?"""
+    """Test the claim that the standard deviations by FDM, LDM and CEM are similar."""
     what = "the standard deviation of the angular distortions"
     return _similar(evidence, "deviation-similar", "angle_error_sd_deg", what, "Fig. 12")
 
@@ -135,7 +135,7 @@ def _similar(evidence: Evidence, name: str, metric: str, what: str, figure: str)
 
 
 def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the mean distortions of FDM and LDM slightly better than CEM's?"""
+    """Test the claim that the mean distortions of FDM and LDM are slightly better than CEM's."""
     found = _triples(evidence, "angle_error_mean_deg")
     better, held = 0, 0
     gaps = []
@@ -160,7 +160,7 @@ def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim
 
 
 def _reading_of_fdm(evidence: Evidence) -> str:
-    """Say which FDM it is: the public program's, slip included, or the corrected one."""
+    """Return a remark on the FDM variant: the public program, or the corrected one."""
     series = evidence.series_of("fdm")
     if series is None or "public_program" not in series.parameters:
         return ""
@@ -176,7 +176,7 @@ def _reading_of_fdm(evidence: Evidence) -> str:
 
 
 def _triples(evidence: Evidence, metric: str) -> dict[MeasuredSurface, tuple[float, ...]]:
-    """The figures of FDM, LDM and CEM on the models where all three ended ok."""
+    """Return the figures of FDM, LDM and CEM on the models where all three ended ok."""
     value: Callable[[Record | None], float | None] = lambda r: (  # noqa: E731
         r.outcome.metrics.get(metric) if r is not None and r.outcome.status == "ok" else None
     )

@@ -1,4 +1,4 @@
-"""Which algorithms give the best accuracy for their time (Pareto)?"""
+"""Plot of accuracy against time, with the Pareto front of the algorithms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ METRIC = "angle_error_mean_deg"
 
 
 def accuracy_against_time(evidence: Evidence) -> Plot | None:
-    """A point for each cell, relative to the best on its surface, and the middle of each cloud."""
+    """Return a plot with a point per cell, relative to the best on its surface, and the means."""
     panels = tuple(p for policy in evidence.policies if (p := _panel(evidence, policy)))
     if not panels:
         return None
@@ -58,7 +58,7 @@ def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
 
 
 def _middle(label: str, cloud: Sequence[Point]) -> Point:
-    """Geometric mean of a cloud."""
+    """Return the geometric mean of a cloud of points."""
     x, y = (float(np.exp(np.mean(np.log([p[k] for p in cloud])))) for k in (0, 1))
     return Point(x, y, label)
 
@@ -68,7 +68,7 @@ def _beats(one: Point, other: Point) -> bool:
 
 
 def _figures(record: Record) -> tuple[float, float] | None:
-    """Seconds and mean distortion; None where the cell has not both, above zero."""
+    """Return seconds and mean distortion; None unless both are known and positive."""
     outcome = record.outcome
     error = outcome.metrics.get(METRIC)
     if outcome.status != "ok" or not outcome.median_seconds or not error:
