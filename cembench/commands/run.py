@@ -218,9 +218,7 @@ def merge(
     else:
         out.print(f"{count} cells in {output}", soft_wrap=True)
     if len(machines) > 1:
-        warn(
-            f"measured in {len(machines)} environments; compare only ratios from the same run"
-        )
+        warn(f"measured in {len(machines)} environments; compare only ratios from the same run")
 
 
 def export(

@@ -74,7 +74,7 @@ def beside(output: Path, wishes: Wishes) -> list[Path]:
     if suffix == ".ply":
         return [texture]
     raise ParameterError(
-        f"{output}: {suffix} names no texture; use .glb, .obj or .ply with --checker or --bake."
+        f"{output}: {suffix} names no texture; --checker and --bake go with .glb, .obj or .ply."
     )
 
 

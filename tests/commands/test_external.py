@@ -40,7 +40,10 @@ def face(cli):
             ("map", "f.obj", "--command", "x {input} {output}", "--program", "circle=a"),
             "is not a number",
         ),
-        (("map", "f.obj", "--command", "x {input} {output}", "-a", "cem"), "both name an algorithm"),
+        (
+            ("map", "f.obj", "--command", "x {input} {output}", "-a", "cem"),
+            "both name an algorithm",
+        ),
         (("map", "f.obj", "--command", "cem {input} {output}"), "--program name=NAME"),
         (("map", "f.obj", "--command", "x {output}"), "where the mesh file goes"),
         (("validate",), "a program with --command COMMAND"),

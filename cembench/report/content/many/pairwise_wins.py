@@ -63,7 +63,7 @@ def _table(evidence: Evidence, name: str, title: str, score: Score) -> Table | N
         tuple(rows),
         "Number of surfaces on which the algorithm of the row beats that of the column, out of "
         "those that both were tried on; equal figures are left out. A cell that did not end ok "
-        "loses to one that did. A star marks a number that differs from chance with a confidence of "
+        "loses to one that did. A star marks a number beyond chance, with a confidence of "
         f"{100 * (1 - ERROR):.0f} % for all {len(pairs)} pairs of this table together (two-sided "
         "sign tests, Holm). Only surfaces are counted; the size of the difference does not matter.",
     )
