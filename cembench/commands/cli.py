@@ -262,7 +262,7 @@ def run(
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Measure algorithms on surfaces, each call in its own process.
+    """Measure algorithms on surfaces, with fresh processes for every round.
 
     Rounds continue until the figures are precise (--precision); wide intervals get more rounds.
     Each result is saved at once, and what the folder already holds is not measured again.

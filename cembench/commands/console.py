@@ -52,7 +52,7 @@ class PlainConsole(Console):
 
     def on_broken_pipe(self) -> NoReturn:
         """Raise, so that :func:`cembench.commands.ending.ending` chooses the exit code."""
-        raise BrokenPipeError(errno.EPIPE, "nobody reads the output")
+        raise BrokenPipeError(errno.EPIPE, "the output pipe is closed")
 
 
 class _PlainStatus(Status):

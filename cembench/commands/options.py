@@ -101,8 +101,8 @@ Budget = Annotated[
     str | None,
     typer.Option(
         metavar="TIME",
-        help="Time after which no cell gets more than 7 rounds, e.g. 30m (default: 150s for "
-        "`quick`, 1h for `standard`, 4h for `paper`, else 30m).",
+        help="Time after which only the first 7 rounds of each cell are completed, e.g. 30m "
+        "(default: 150s for `quick`, 1h for `standard`, 4h for `paper`, else 30m).",
     ),
 ]
 RepeatBusy = Annotated[

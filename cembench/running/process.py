@@ -164,7 +164,7 @@ def _ended_within(process: StartedProcess, seconds: float) -> bool:
     if process.poll() is not None:
         return True
     if hasattr(os, "pidfd_open"):
-        with suppress(ProcessLookupError):  # nobody asks for its code any more: it has ended
+        with suppress(ProcessLookupError):  # the process has ended and its exit code was collected
             handle = os.pidfd_open(process.pid)
             try:
                 select.select([handle], [], [], seconds)
@@ -177,7 +177,7 @@ def _ended_within(process: StartedProcess, seconds: float) -> bool:
 
 
 def _follow(tree: dict[int, psutil.Process], root: int) -> None:
-    """Add what the processes of the tree have started since."""
+    """Add the new children of the processes in the tree."""
     for known in list(tree.values()):
         with suppress(psutil.Error):
             for child in known.children(recursive=known.pid == root):
@@ -193,10 +193,10 @@ def _resident_bytes(process: psutil.Process) -> int:
 
 
 def _drain(log: Path, said: bytes) -> bytes:
-    """Give the space of a log that grows too large back, but for its end.
+    """Free the space of a log that grows too large, except for its end; return the output kept.
 
-    Linux frees the file's beginning while the process writes on. Elsewhere the file is emptied, and
-    what is written between the last look and that is lost.
+    On Linux the beginning of the file is freed while the process keeps writing. Elsewhere the file
+    is emptied, and output written since the last look is lost.
     """
     with suppress(OSError):  # the process may have removed it
         state = log.stat()
@@ -210,7 +210,7 @@ def _drain(log: Path, said: bytes) -> bytes:
 
 
 def _freed(handle: int, size: int) -> bool:
-    """Whether the system could free the first bytes of a file; they read as zeros then."""
+    """Free the first bytes of a file, which then read as zeros; return whether it worked."""
     keep_size, punch_hole = 1, 2  # of <linux/falloc.h>
     if sys.platform != "linux" or size <= 0:
         return False
@@ -253,7 +253,7 @@ def _end_all(
 
 
 def _lives(process: psutil.Process) -> bool:
-    """Does it still do something? One that nobody has asked for its code does not."""
+    """Whether a process is still running; a zombie is not."""
     try:
         return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
@@ -261,7 +261,7 @@ def _lives(process: psutil.Process) -> bool:
 
 
 def _marked(mark: str) -> list[psutil.Process]:
-    """The processes whose environment holds the mark, whoever their parent is by now."""
+    """Return the processes with the mark in their environment, whatever their parent is now."""
     found = []
     for one in psutil.process_iter():
         with suppress(psutil.Error, OSError):
@@ -271,9 +271,9 @@ def _marked(mark: str) -> list[psutil.Process]:
 
 
 def die_with_parent(parent: int) -> None:
-    """Let the system end this process when its parent is killed (Linux; elsewhere nothing).
+    """Make the system end this process when its parent is killed (Linux only).
 
-    `parent` is the parent's number: it may have been killed by now.
+    `parent` is the parent's process id; the parent may have been killed already.
     """
     if sys.platform != "linux":
         return
@@ -286,9 +286,9 @@ def die_with_parent(parent: int) -> None:
 
 
 def limit_memory(memory_bytes: int) -> None:
-    """Refuse this process what exceeds the limit between two looks at it (not on Windows).
+    """Limit the memory that this process can reserve between two looks at it (not on Windows).
 
-    The system counts what is reserved rather than what is resident, hence half as much again.
+    The system counts reserved rather than resident memory, so the bound is half as much again.
     """
     try:
         import resource

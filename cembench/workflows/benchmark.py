@@ -157,7 +157,7 @@ def benchmark(
     plugins: Sequence[str] = (),
     watcher: Watcher | None = None,
 ) -> Run:
-    """Benchmark algorithms on surfaces, each call in its own process.
+    """Benchmark algorithms on surfaces, with fresh processes for every round.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def benchmark(
     rounds : int, optional
         Fixed number of rounds, instead of a precision; fewer than six give no interval.
     budget : float, optional
-        Seconds after which no cell gets more than seven rounds; None: no limit.
+        Seconds after which only the first seven rounds of each cell are completed; None: no limit.
     reference : str
         The algorithm with which the others are compared.
     out : path, optional

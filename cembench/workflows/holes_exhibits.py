@@ -249,7 +249,7 @@ def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -
         Exhibit(
             name="holes",
             title="Surfaces with holes",
-            text="Koebe's method after one sweep and after the best number of sweeps, beside the "
+            text="Koebe's method after one sweep and after the best number of sweeps, and the "
             "other maps to a disk with holes.",
             command=command,
             origin="stand-in" if standing else "surface",

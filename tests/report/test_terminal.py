@@ -71,5 +71,5 @@ def test_a_busy_machine_is_told_once():
     ]
     outcome = record.outcome.model_copy(update={"rounds": tuple(rounds)})
     text = shown(results_table([record.model_copy(update={"outcome": outcome})]))
-    assert "busy beside 2 of 6 processes" in text
+    assert "busy during 2 of 6 processes" in text
     assert "busy" not in shown(results_table([record]))

@@ -97,8 +97,8 @@ class Evidence:
         records = store.records()
         if not records:
             raise RecordError(
-                f"{run} holds no record: no cell of it is finished. `cembench status {run}` says "
-                "what was asked for; the same `cembench run` again goes on with it."
+                f"{run} holds no record: none of its cells is finished. `cembench status {run}` "
+                "shows what was requested; run the same `cembench run` again to resume it."
             )
         kept = _latest(records)
         return cls(store, tuple(kept), tuple(read_exhibits(run)), len(records) - len(kept))

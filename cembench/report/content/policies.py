@@ -72,11 +72,11 @@ def policies_table(evidence: Evidence) -> Table:
         counts += [words(""), words(""), Value(str(len(found)), len(found), "derived")]
     return Table(
         "reuse-against-backslash",
-        "Seconds with factors kept (reuse) and factored anew at every solve (backslash)",
+        "Seconds with factorisations reused (reuse) or repeated at every solve (backslash)",
         tuple(columns),
         (*rows, tuple(means), tuple(counts)),
-        "The ratio is what an implementation saves by keeping a factor while its matrix stands, "
-        "whatever the algorithm. The paper's MATLAB factored anew.",
+        "The ratio shows what an implementation saves by reusing a factorisation, "
+        "whatever the algorithm. The paper's MATLAB code factored at every solve.",
         footer_rows=2,
     )
 
@@ -108,7 +108,7 @@ def speedups_table(evidence: Evidence) -> Table:
         rows.append(tuple(cells))
     return Table(
         "speedup-by-policy",
-        "How much of the speedup of CEM is the algorithm, and how much keeping factors",
+        "Speedup of CEM under both policies: the algorithm, and the reuse of factorisations",
         tuple(columns),
         tuple(rows),
         "Rates of speedup (Eq. 33) on the surfaces that are or stand in for models of the paper.",
@@ -127,8 +127,8 @@ def policies_plot(evidence: Evidence) -> Plot:
         drawn.append(Bars(series.label, names, values, "both", evidence.looks[series.label]))
     return Plot(
         "reuse-against-backslash",
-        "What factoring anew costs",
+        "Cost of repeated factorisation",
         (PlotPanel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
-        "Seconds with a factorisation at every solve over seconds with factors kept.",
-        "A line for each algorithm over the surfaces; iterative ones lie high.",
+        "Ratio of seconds with a factorisation at every solve to seconds with reused ones.",
+        "A line for each algorithm over the surfaces; iterative ones are high.",
     )

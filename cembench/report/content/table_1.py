@@ -15,7 +15,7 @@ CAPTION = (
 
 
 def table_1(evidence: Evidence) -> list[Table]:
-    """Seconds and iterations; a table for each way of solving that the run has."""
+    """Return the table of seconds and iterations for each policy of the run."""
     tables = []
     for policy in evidence.policies:
         caption = CAPTION + f"Here {POLICIES.get(policy, policy)}."

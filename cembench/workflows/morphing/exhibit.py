@@ -47,7 +47,7 @@ def lay_down(
         f"morph-{stem}",
         "strip.png",
         strip_page(morph, sides[0]),
-        f"From {names[0]} to {names[-1]}: the path at seven moments, from the front and aside.",
+        f"From {names[0]} to {names[-1]}: seven moments of the path, from the front and the side.",
     )
     board = _picture(
         run,

@@ -145,8 +145,8 @@ def check_landmarks(landmarks: Landmarks, meshes: Sequence[DiskMesh]) -> None:
                 )
             if v in on_boundary:
                 raise ParameterError(
-                    f"{where} lies on the boundary, which stays on the circle as the conformal map "
-                    "laid it; choose a vertex inside."
+                    f"{where} is on the boundary, whose image is fixed by the conformal map; "
+                    "choose an interior vertex."
                 )
             seen[v] = name
 

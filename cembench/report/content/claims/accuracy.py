@@ -44,8 +44,8 @@ def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
         + (f"; folded: {'; '.join(folded)}" if folded else "")
         + f". The repair of folds was needed in {repaired}.",
         verdict_of(len(clean), len(found)),
-        f"{tested_on([s for s, _ in found])} The paper shows it on Left Hand; weights that are "
-        "negative can fold a triangle, and are raised here until none is.",
+        f"{tested_on([s for s, _ in found])} The paper shows it on Left Hand. Negative weights "
+        "can fold a triangle; cembench raises them until no triangle is folded.",
     )
 
 

@@ -113,7 +113,7 @@ def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
         "with the average rate of the speedup 8.5/17.2/4.1",
         "Section 5, below Eq. (33)",
         f"The arithmetic mean of the rates, as the paper takes it, reaches {ABOUT:.0%} of the "
-        "stated value for each algorithm; the geometric mean is given beside it.",
+        "stated value for each algorithm; the geometric mean is given too.",
         found,
         verdict,
         f"{tested_on(evidence.one_each)} {OURS} In print the geometric means are 6.8 / 12.4 / 3.5, "
@@ -220,7 +220,7 @@ def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
         "The rate of speedup of CEM algorithm with respect to QIEM, FDM, and LDM, defined by "
         "Eq. (33)",
         "Table 2",
-        "Each printed rate lies within what the rounding of the printed seconds allows.",
+        "Each printed rate agrees with the printed seconds to within their rounding.",
         f"{agree} of {tested} cells agree; not: {'; '.join(odd) or 'none'}. With the misprint the "
         f"mean over FDM would be {spread:.2f}.",
         verdict_of(agree, tested),

@@ -132,7 +132,7 @@ def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
         "the matrix K, defined as in Theorem 2, maps all the entries of a vector f to their "
         "convex hull",
         "Remark 4",
-        "Of points on the unit circle and of hundred random sets, no image lies outside their "
+        "For points on the unit circle and a hundred random sets, no image is outside their "
         "convex hull by more than rounding; the largest distance is given.",
         listed or f"No surface of at most {DENSE:,} vertices is kept in this run.",
         verdict_of(held, len(out)),
@@ -213,7 +213,7 @@ def circular_holes(evidence: Evidence, inspections: Inspections) -> Claim:
         "the generalized CEM algorithm is aimed to find a conformal map f that maps M to a unit "
         "disk with circular holes",
         "Section 3.3",
-        "Every boundary's image lies within 1 % of its radius from a circle.",
+        "Every boundary's image is within 1 % of its radius from a circle.",
         (listed or "No algorithm for surfaces with holes in this run.") + shown,
         verdict_of(round_, len(found)),
         tested_on(

@@ -18,7 +18,7 @@ def energy_over_models(evidence: Evidence) -> Plot:
         "Conformal energy over the models",
         _pair(evidence, "conformal_energy", axis, 3, lambda a: a),
         "Left: this run's surfaces. Right: as printed for the models they are or stand in for.",
-        "A line for each algorithm over the models; the lines lie close together.",
+        "A line for each algorithm over the models; the lines are close together.",
         "Figure 11",
     )
 
