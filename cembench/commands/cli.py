@@ -264,10 +264,11 @@ def run(
 ) -> None:
     """Measure algorithms on surfaces, with fresh processes for every round.
 
-    Rounds continue until the figures are precise (--precision); wide intervals get more rounds.
-    Each result is saved at once, and what the folder already holds is not measured again.
-    -p NAME=VALUE sets a parameter of all algorithms that have it, -p ALGORITHM.NAME=VALUE of one.
-    docs/measuring.md explains what is timed and what an interval means.
+    Rounds continue until the figures are precise (--precision); wide intervals
+    get more rounds. Each result is saved at once, and what the folder already
+    holds is not measured again. -p NAME=VALUE sets a parameter of all algorithms
+    that have it, -p ALGORITHM.NAME=VALUE of one. docs/measuring.md explains what
+    is timed and what an interval means.
     """
     from cembench.results import run_folder
     from cembench.results.paper.profiles import algorithms_of, paper_parameters, surfaces_of
@@ -345,9 +346,9 @@ def reproduce(
 ) -> None:
     """Measure every algorithm on stand-ins for the paper's eight smallest models, and report.
 
-    It measures one round, which takes minutes; `run --profile quick` measures enough rounds for
-    intervals. What the folder already holds is not measured again. The report is written to the
-    same folder.
+    It measures one round, which takes minutes; `run --profile quick` measures
+    enough rounds for intervals. What the folder already holds is not measured
+    again. The report is written to the same folder.
     """
     from cembench.core import folders
     from cembench.registry import load_registry

@@ -32,10 +32,11 @@ def cut(
 ) -> None:
     """Cut a surface open along short curves until it is a disk, and write it.
 
-    A closed surface without handles is cut between two points far from each other, a surface with
-    handles along a short cut graph; holes are joined to the cut. OUTPUT_seam.csv gives, for each
-    vertex of the disk, the vertex of the surface that it is a copy of. `cembench map --cut` cuts,
-    maps, and writes the UVs for the uncut surface.
+    A closed surface without handles is cut between two points far from each
+    other, a surface with handles along a short cut graph; holes are joined to the
+    cut. OUTPUT_seam.csv gives, for each vertex of the disk, the vertex of the
+    surface that it is a copy of. `cembench map --cut` cuts, maps, and writes the
+    UVs for the uncut surface.
     """
     from cembench.core.notices import NoticeKind
     from cembench.core.outputs import refuse_inputs, refuse_present

@@ -15,8 +15,8 @@ Command = Annotated[
     typer.Option(
         "--command",
         metavar="COMMAND",
-        help="A program to run as an algorithm: 'mysolver {input} -o {output}'. Any "
-        "language; see docs/external_solvers.md.",
+        help="A program to run as an algorithm, in any language: 'mysolver {input} -o {output}'. "
+        "See external_solvers.md in docs.",
     ),
 ]
 Settings = Annotated[

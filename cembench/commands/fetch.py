@@ -47,11 +47,11 @@ def fetch(
 ) -> None:
     """Fetch public surfaces, check them, and print their paths.
 
-    Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its
-    SHA-256 must match. $CEMBENCH_DATA_URL points to a mirror. A failed
-    download does not stop the others; run the same command again to resume.
-    `--group ict-face` fetches the files of the face model. `map NAME` and
-    `run --dataset NAME` fetch what they need.
+    Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its SHA-256
+    must match. $CEMBENCH_DATA_URL points to a mirror. A failed download does not
+    stop the others; run the same command again to resume. `--group ict-face`
+    fetches the files of the face model. `map NAME` and `run --dataset NAME` fetch
+    what they need.
     """
     from cembench.registry import load_registry
     from cembench.report.render.terminal import datasets_table

@@ -42,8 +42,9 @@ def holes(
 ) -> None:
     """Map surfaces with holes, and draw the steps of Koebe's method (Figures 1 and 7).
 
-    One sweep is the paper's Algorithm 2. The table compares it with the best number of sweeps, by
-    conformal energy, and with every other algorithm for this class. docs/holes.md explains it.
+    One sweep is the paper's Algorithm 2. The table compares it with the best
+    number of sweeps, by conformal energy, and with every other algorithm for this
+    class. docs/holes.md explains it.
     """
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry

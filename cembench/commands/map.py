@@ -146,11 +146,12 @@ def map_(
 ) -> None:
     """Map surfaces, check the maps, and write them.
 
-    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
-    hold all digits; PLY and GLB single precision. An OBJ file keeps its groups, materials,
-    normals, colours and polygons. With --cut, the uncut surface is written, with one UV per
-    corner. Several surfaces written to one file share the unit square, each in its own part;
-    larger surfaces get larger parts.
+    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk.
+    OBJ, VTP and NPZ hold all digits; PLY and GLB single precision. An OBJ file
+    keeps its groups, materials, normals, colours and polygons. With --cut, the
+    uncut surface is written, with one UV per corner. Several surfaces written to
+    one file share the unit square, each in its own part; larger surfaces get
+    larger parts.
     """
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.drawing.own_pictures import check_replaceable

@@ -99,9 +99,10 @@ def morph(
 ) -> None:
     """Morph surfaces into each other through conformal maps (Section 6).
 
-    The first landmark goes to the centre of the disk, the others are registered by (34), and the
-    first surface's vertices are carried onto all others. Without --landmarks those are taken that
-    the surfaces have by name, as the generated faces do; with none at all, curvature aligns them.
+    The first landmark goes to the centre of the disk, the others are registered
+    by Eq. 34, and the first surface's vertices are carried onto all others. By
+    default, the named landmarks that all surfaces have are used, such as those of
+    the generated faces. Without any landmarks, curvature aligns the surfaces.
     """
     from cembench.core.outputs import refuse_inputs
     from cembench.drawing.camera import viewpoints

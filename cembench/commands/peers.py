@@ -55,9 +55,10 @@ def peers(
 ) -> None:
     """Compare our algorithms with installed libraries and programs by others, and report.
 
-    Peers that are not installed are listed with how to install them. Each cell gets one round,
-    which takes minutes; --repeats 6 gives intervals. A peer that fails or maps badly is a result:
-    the exit code is 1 only if one of our algorithms fails.
+    Peers that are not installed are listed with how to install them. Each cell
+    gets one round, which takes minutes; --repeats 6 gives intervals. A peer that
+    fails or maps badly is a result: the exit code is 1 only if one of our
+    algorithms fails.
     """
     from cembench.commands.progress import LiveProgress, PlainProgress
     from cembench.commands.report import make_report

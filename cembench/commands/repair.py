@@ -41,10 +41,11 @@ def repair(
 ) -> None:
     """Repair a surface, print what was done, and write it.
 
-    Steps, in order: faces with missing vertices dropped, polygons cut into triangles, coincident
-    vertices welded, degenerate and duplicate triangles fixed or dropped, non-manifold edges and
-    vertices split, triangles oriented consistently, components chosen, ears dropped, holes filled,
-    isolated vertices removed. docs/repair.md describes each step.
+    Steps, in order: faces with missing vertices dropped, polygons cut into
+    triangles, coincident vertices welded, degenerate and duplicate triangles
+    fixed or dropped, non-manifold edges and vertices split, triangles oriented
+    consistently, components chosen, ears dropped, holes filled, isolated vertices
+    removed. docs/repair.md describes each step.
     """
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.mesh.files import check_writable_format, write_mesh

@@ -26,8 +26,9 @@ def report(
 ) -> None:
     """Write a report of a run: the paper's tables, figures and claims, as measured.
 
-    The folder holds index.html (one file that works offline), report.md, report.tex, and each
-    table, figure and its data as separate files. The four tables are printed here too.
+    The folder holds index.html (one file that works offline), report.md,
+    report.tex, and each table, figure and its data as separate files. The four
+    tables are printed here too.
     """
     written, folder = make_report(run, output, verify=verify)
     if as_json:

@@ -26,7 +26,8 @@ DEFAULT_RUN = Path("results/run")
 def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = False) -> None:
     """Show a run's progress, the cells that did not end ok, and files that were changed.
 
-    The exit code is 1 if a record or a map no longer agrees with its recorded figures.
+    The exit code is 1 if a record or a map no longer agrees with its recorded
+    figures.
     """
     from cembench.results.store import Store
     from cembench.results.verify import Depth, Kind
@@ -137,9 +138,10 @@ def _show_records(found: list[Record]) -> None:
 def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = False) -> None:
     """Show which cells became faster or slower from one run to another.
 
-    Seconds are divided by those of a reference kernel, which every round times; this removes the
-    machine's drift between the runs, as far as it affects the kernel. The test is a rank-sum test
-    at the 5 % level. To compare two algorithms, measure both in one run.
+    Seconds are divided by those of a reference kernel, which every round times;
+    this removes the machine's drift between the runs, as far as it affects the
+    kernel. The test is a rank-sum test at the 5 % level. To compare two
+    algorithms, measure both in one run.
     """
     from dataclasses import asdict
 
@@ -198,7 +200,8 @@ def merge(
 ) -> None:
     """Merge the records of several runs into one folder.
 
-    If several runs hold a cell, a record that ended ok is preferred, then the later one.
+    If several runs hold a cell, a record that ended ok is preferred, then the
+    later one.
     """
     from cembench.results.store import Store
     from cembench.results.store import merge as merged

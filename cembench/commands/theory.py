@@ -35,9 +35,10 @@ def theory(
 ) -> None:
     """Test the statements of the paper's Section 4 on a surface.
 
-    Tested are the premises (Definition 1, signs of the weights), Theorem 2, Corollary 1, Remark 2,
-    Theorem 3 and Remark 3; the spectrum of K and the speed of the iteration are shown too. The exit
-    code is 1 if a statement fails although all premises hold. docs/theory.md explains the figures.
+    Tested are the premises (Definition 1, signs of the weights), Theorem 2,
+    Corollary 1, Remark 2, Theorem 3 and Remark 3; the spectrum of K and the speed
+    of the iteration are shown too. The exit code is 1 if a statement fails
+    although all premises hold. docs/theory.md explains the figures.
     """
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry

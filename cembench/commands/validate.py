@@ -71,7 +71,7 @@ def validate(
         typer.Option(
             min=0,
             max=MOST_FACES,
-            help="Largest mesh, in triangles, for the growth of time; 0: skip it.",
+            help="Triangles of the largest mesh in the scaling stage; 0: skip it.",
         ),
     ] = 30_000,
     parameter: Parameters = [],  # noqa: B006
@@ -96,10 +96,10 @@ def validate(
 ) -> None:
     """Check whether a solver is correct, and compare its quality and speed with baselines.
 
-    There are four stages, each run only if the ones before found no fault: the contract,
-    correctness on surfaces with a known map, quality and speed against a baseline, and growth of
-    time with size. Exit code 0: valid, and --require is met; 1: not; 2: wrong usage.
-    docs/write_a_solver.md has an example.
+    There are four stages, each run only if the ones before found no fault: the
+    contract, correctness on surfaces with a known map, quality and speed against
+    a baseline, and growth of time with size. Exit code 0: valid, and --require is
+    met; 1: not; 2: wrong usage. docs/write_a_solver.md has an example.
     """
     from cembench.core import extras, folders
     from cembench.running.local import Options
