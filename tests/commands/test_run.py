@@ -66,7 +66,7 @@ def test_compare_tells_what_changed_and_that_the_machines_differ(runs):
     lines = out.splitlines()
     assert [line.split()[-1] for line in lines[1:3]] == ["faster", "undecided"]
     told = " ".join(lines[3:])
-    assert "drifted between the runs is not known" in told
+    assert "drift between the runs is unknown" in told
     assert "Holm, 2 comparisons" in told
     assert max(map(len, out.splitlines())) <= 80
     assert "measured under different conditions" in err

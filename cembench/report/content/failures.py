@@ -42,5 +42,5 @@ def not_ok(evidence: Evidence) -> Table | Text:
         tuple(Column(heading, numeric=False) for heading in headings),
         (*rows, *missing),
         "Such cells are gaps in the tables, count as infinitely slow in performance profiles, and "
-        "are left out of averages, which say their n.",
+        "are left out of averages, which state their n.",
     )

@@ -140,7 +140,8 @@ def _times(first: _Standing, second: _Standing, compared: Comparison) -> Finding
     )
     return Finding(
         f"{compared.ratio:.2f} times",
-        f"as fast as {second.series.label}, the next fastest, is {first.series.label}; {told}",
+        f"the speed of {second.series.label}, the next fastest, is reached by "
+        f"{first.series.label}; {told}",
     )
 
 
@@ -150,7 +151,7 @@ def _holding(claims: Sequence[Claim]) -> Finding:
     partly = f"; {counts['holds in part']} in part" if counts["holds in part"] else ""
     few = f"; {counts['too few rounds']} have too few rounds" if counts["too few rounds"] else ""
     return Finding(
-        f"{counts['holds']} of {tested}", f"claims of the paper that were tested hold{partly}{few}"
+        f"{counts['holds']} of {tested}", f"tested claims of the paper hold{partly}{few}"
     )
 
 

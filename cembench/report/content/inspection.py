@@ -79,7 +79,7 @@ class Inspection:
         """Why there are no pictures."""
         return (
             f"the run does not hold the surface {self.surface.name}: it was measured before runs "
-            "kept their surfaces"
+            "stored their surfaces"
         )
 
 
@@ -175,7 +175,7 @@ class _Drawer:
                 "curvature",
                 "mean curvature",
                 f"{of}, coloured by the mean curvature of the surface: orange where it bulges "
-                "outwards, blue where inwards.",
+                "outwards, blue where it bulges inwards.",
                 f"{of}, coloured by mean curvature",
                 coloured,
             ),

@@ -66,6 +66,6 @@ def other_targets(evidence: Evidence) -> Table | None:
             *(Column(metric.heading) for metric in _COMPARABLE),
         ),
         tuple(rows),
-        f"E_C is divided by the area of the image, whose size is free here; angles compare with "
-        f"those of disks, but a free boundary makes the problem an easier one. Solves: {policy}.",
+        f"E_C is divided by the area of the image, whose size is free here. Angles can be compared "
+        f"with those of disks, but a free boundary makes the problem easier. Solves: {policy}.",
     )

@@ -44,9 +44,9 @@ def surface_page(
                 f"{name}-maps",
                 "The surface and its image by each algorithm, under one checkerboard",
                 tuple(seen.checkerboards.values()),
-                "Squares stay squares where a map is conformal. Where they would be large on the "
-                "surface they are divided 3 by 3, in both panels alike. Folded triangles are red. "
-                "Images are turned so that what is up on the surface is up in them.",
+                "Squares stay squares where a map is conformal. Squares that would be large on the "
+                "surface are divided 3 by 3 in both panels. Folded triangles are red. Images are "
+                "rotated to match the upright surface.",
                 seen.scene,
             )
         )

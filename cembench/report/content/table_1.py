@@ -9,8 +9,9 @@ from cembench.report.document import Table
 
 CAPTION = (
     "Seconds from the arrays V and F in memory to the map: the median of the rounds here, and what "
-    "the paper printed of MATLAB programs on a laptop of 2.60 GHz. Machines, languages and "
-    "libraries differ: compare within a column pair only how the algorithms stand to each other. "
+    "the paper printed for MATLAB programs on a laptop of 2.60 GHz. Machines, languages and "
+    "libraries differ, so compare only the ratios between algorithms, not printed with measured "
+    "seconds. "
 )
 
 

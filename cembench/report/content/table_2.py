@@ -27,8 +27,8 @@ from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.records import Record
 
 CAPTION = (
-    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 where CEM takes half the time, negative where "
-    "CEM is slower. Here it is the median of the ratios within rounds. "
+    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 if CEM takes half the time, negative if CEM is "
+    "slower. Here it is the median of the ratios within rounds. "
 )
 
 
@@ -45,7 +45,9 @@ def table_2(evidence: Evidence) -> list[Table]:
             caption=CAPTION + f"Here {POLICIES.get(policy, policy)}.",
             footers=READINGS,
             algorithms=COMPARED,
-            notes=("averages over the printed column take its numbers as printed, misprint too",),
+            notes=(
+                "averages of the printed column use its numbers as printed, including the misprint",
+            ),
         )
         if evidence.models:
             tables.append(averages_table(evidence, policy))
@@ -106,10 +108,10 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
         columns=tuple(columns),
         rows=(*rows, tuple(counts)),
         caption=(
-            "The mean of rates lets single large ratios dominate; the geometric mean and the mean "
-            "of the savings count every model alike. 'Printed, these' are the printed rates of "
-            "the models that were measured here too. A model counts once: where it was measured "
-            "itself, its stand-in does not count."
+            "In the mean of rates, single large ratios dominate; the geometric mean and the mean "
+            "of the savings weight every model equally. 'Printed, these' are the printed rates of "
+            "the models that were measured here too. Each model counts once: if it was measured "
+            "itself, its stand-in is left out."
         ),
         notes=(
             "the misprint (Knit Cap Man, FDM) is replaced by the 28.07 that Table 1 gives",

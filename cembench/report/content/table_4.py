@@ -9,8 +9,8 @@ from cembench.report.document import Table
 
 CAPTION = (
     "Angular distortion: the absolute difference between the angle on the surface and on the disk, "
-    "in degrees, over all corners of all triangles. It depends on the mesh: on a stand-in it is "
-    "another number than on the paper's model."
+    "in degrees, over all corners of all triangles. It depends on the mesh: a stand-in has a "
+    "different value than the paper's model."
 )
 
 

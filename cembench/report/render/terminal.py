@@ -250,11 +250,11 @@ def _drift_words(changes: Sequence[Change]) -> str:
     known = [change.drift for change in changes if change.drift is not None]
     if not known:
         return (
-            "How far the machine drifted between the runs is not known: not both timed the "
-            "reference kernel."
+            "The machine's drift between the runs is unknown: not both runs timed the reference "
+            "kernel."
         )
-    told = "Ratios are over the reference kernel's, which every round times (rank-sum test, 5 %)"
-    told += f": it took {min(known):.2f}"
+    told = "Seconds are divided by those of the reference kernel (rank-sum test, 5 %)"
+    told += f", which took {min(known):.2f}"
     told += f" to {max(known):.2f}" if f"{min(known):.2f}" != f"{max(known):.2f}" else ""
     told += " times as long in the later run."
     if len(known) < len(changes):

@@ -22,11 +22,11 @@ def accuracy_against_time(evidence: Evidence) -> Plot | None:
         "accuracy-against-time",
         "Accuracy against time, relative to the best on each surface",
         panels,
-        "Right: times as slow as the fastest algorithm on the same surface; up: times the smallest "
-        "mean angular distortion there. At (1, 1) an algorithm is best in both. Joined points are "
-        "the geometric means of the algorithms that no other one beats in both; maps to the disk "
-        "alone.",
-        "A cloud of points for each algorithm; the nearer to the lower left corner, the better.",
+        "Horizontal: time relative to the fastest algorithm on the same surface. Vertical: mean "
+        "angular distortion relative to the smallest there. At (1, 1) an algorithm is best in "
+        "both. Joined points are the geometric means of the algorithms that no other algorithm "
+        "beats in both. Maps to the disk only.",
+        "A cloud of points for each algorithm; closer to the lower left corner is better.",
     )
 
 

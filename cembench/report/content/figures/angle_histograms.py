@@ -41,8 +41,8 @@ def angle_histograms(
         "figure-9",
         "Histograms of the angular distortion of CEM's maps",
         tuple(panels),
-        f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps; in "
-        f"each heading the share below one degree. Bars beyond {SHOWN:g} degrees are left out.",
+        f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps. Each "
+        f"heading gives the share below one degree. Bars above {SHOWN:g} degrees are left out.",
         "Bars that are highest near zero degrees and fall off quickly.",
         "Figure 9",
     )

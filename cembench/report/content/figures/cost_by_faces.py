@@ -75,9 +75,9 @@ def cost_by_faces(evidence: Evidence) -> Plot:
         "figure-10",
         "Computational cost against number of triangles",
         tuple(panels),
-        "Seconds against triangles on logarithmic axes; straight lines are fitted powers, whose "
-        "exponents stand in the table below. Here all surfaces of the run count, also those that "
-        "are not in the paper; the printed seconds are of another machine.",
+        "Seconds against triangles on logarithmic axes. Lines are fitted power laws, whose "
+        "exponents are in the table below. All surfaces of the run are included, even those not in "
+        "the paper; the printed seconds are from a different machine.",
         "Points along straight lines that rise from left to right, one for each algorithm.",
         "Figure 10",
     )
@@ -119,8 +119,8 @@ def exponents_table(evidence: Evidence) -> Table:
         "Fitted exponents: seconds grow as the number of triangles to this power",
         tuple(columns),
         tuple(rows),
-        "Least squares of logarithms; ± one standard error. The size of a surface is not all that "
-        "matters: iterations differ from surface to surface.",
+        "Least squares of logarithms; ± one standard error. Size is not all: iterations "
+        "differ between surfaces.",
         (f"an exponent needs at least {FEWEST} sizes",),
     )
 

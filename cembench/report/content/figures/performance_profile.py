@@ -84,10 +84,10 @@ def performance_profile(evidence: Evidence) -> Plot | None:
         "Performance profiles of the time",
         tuple(panels),
         "Share of the surfaces on which an algorithm takes at most tau times as long as the "
-        "fastest; what did not end ok counts as infinitely slow, and so does a map whose mean "
-        f"angle error is more than {AS_GOOD} times the smallest on that surface and more than "
-        f"{DEGREES} degrees above it. Only maps to the disk, and only surfaces that all of these "
-        f"were tried on: {', '.join(counts)}.{_left_out(evidence)}",
+        "fastest. A cell that did not end ok counts as infinitely slow, and so does a map whose "
+        f"mean angle error is more than {AS_GOOD} times the smallest on that surface and more than "
+        f"{DEGREES} degrees above it. Only maps to the disk are compared, on the surfaces that all "
+        f"of these algorithms were tried on: {', '.join(counts)}.{_left_out(evidence)}",
         "Staircases: the further up and left, the faster on more surfaces.",
     )
 

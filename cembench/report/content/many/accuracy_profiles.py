@@ -46,9 +46,9 @@ def accuracy_profiles(evidence: Evidence, policy: str) -> Plot | None:
         "Performance profiles of accuracy",
         tuple(panels),
         "Share of the surfaces on which an algorithm's figure is at most tau times the best one "
-        "there; what did not end ok counts as infinitely bad, so that a curve ends at the success "
-        "rate. On the surfaces (n) that all the algorithms of a panel were tried on; factors above "
-        f"{FARTHEST:g} are not told apart.",
+        "there. A cell that did not end ok counts as infinitely bad, so a curve ends at the "
+        "success rate. Only surfaces (n) that all algorithms of a panel were tried on are "
+        f"included; factors above {FARTHEST:g} are not distinguished.",
         "Staircases: the further up and left, the more accurate on more surfaces.",
     )
 

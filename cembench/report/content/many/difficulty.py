@@ -131,11 +131,11 @@ def errors_by_difficulty(
     left = f" Not drawn: {others}." if others else ""
     return Plot(
         "errors-by-difficulty",
-        "Angle errors by what makes a surface hard",
+        "Angle errors by the difficulty of surfaces",
         tuple(panels),
         "Each point is a valid map to the disk. The span is that of the conformal factor of the "
         "surface's best map, a ratio of lengths (99.9 over 0.1 percentile of the triangles); "
         "crowding is the same along the boundary, in the common gauge (99 over 1 percentile of "
         f"its edges).{left}",
-        "Clouds of points; where they rise to the right, surfaces of that kind are harder.",
+        "Clouds of points; if they rise to the right, surfaces of that kind are harder.",
     )
