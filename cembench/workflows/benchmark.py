@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 class Run:
     """A folder of records: what `cembench run` writes and `cembench report` reads.
 
-    Attributes
+    Parameters
     ----------
     folder : Path
         Folder with the records and maps.
@@ -51,6 +51,11 @@ class Run:
 
     def records(self) -> list[Record]:
         """Return every record.
+
+        Returns
+        -------
+        list of Record
+            The records, sorted by file name.
 
         Raises
         ------
@@ -85,7 +90,19 @@ class Run:
         return pd.DataFrame(self.rows(reference))
 
     def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
-        """Return the data of :meth:`table` as one dictionary per cell."""
+        """Return the data of :meth:`table` as one dictionary per cell.
+
+        Parameters
+        ----------
+        reference : str
+            The algorithm whose speedup over the others (Eq. 33) is included.
+
+        Returns
+        -------
+        list of dict
+            The rows.
+
+        """
         from cembench.results.record_rows import rows
 
         return rows(self.records(), reference)
@@ -111,7 +128,26 @@ class Run:
         return compared[[*columns, "verdict"]].reset_index(drop=True)
 
     def report(self, folder: str | os.PathLike[str] | None = None) -> Report:
-        """Write the report, like `cembench report`; `folder` defaults to RUN/report."""
+        """Write the report, like `cembench report`.
+
+        Parameters
+        ----------
+        folder : path, optional
+            The report's folder; default: ``report`` in the run's folder.
+
+        Returns
+        -------
+        Report
+            The contents of the report.
+
+        Raises
+        ------
+        MissingExtra
+            A package for reports is not installed.
+        RecordError
+            The run has no records, or the folder cannot be written.
+
+        """
         from cembench.report.write_report import write_report
 
         target = Path(folder) if folder is not None else self.folder / "report"

@@ -20,6 +20,7 @@ def list_algorithms(plugins: Iterable[str] = ()) -> list[Algorithm]:
     Returns
     -------
     list of Algorithm
+        The algorithms, sorted by name.
 
     Examples
     --------
@@ -42,6 +43,7 @@ def list_surfaces(plugins: Iterable[str] = ()) -> list[Surface]:
     Returns
     -------
     list of Surface
+        The surface families, sorted by name.
 
     Examples
     --------

@@ -38,7 +38,7 @@ DEFAULT_ALGORITHMS: Mapping[type[TriangleMesh], str] = {
 class Result:
     """A checked map of a surface to the plane.
 
-    Attributes
+    Parameters
     ----------
     mesh : TriangleMesh
         The surface.

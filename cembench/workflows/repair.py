@@ -28,7 +28,7 @@ _KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh, TriangleMesh)
 class Repair:
     """The result of a repair.
 
-    Attributes
+    Parameters
     ----------
     meshes : tuple of TriangleMesh
         The surfaces, the one with the most triangles first; each is a :class:`DiskMesh` or

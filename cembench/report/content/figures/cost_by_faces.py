@@ -119,7 +119,7 @@ def exponents_table(evidence: Evidence) -> Table:
         "Fitted exponents: seconds grow as the number of triangles to this power",
         tuple(columns),
         tuple(rows),
-        "Least squares of logarithms; ± one standard error. Size is not all: iterations "
+        "Least squares of logarithms; ± one standard error. Iterations also "
         "differ between surfaces.",
         (f"an exponent needs at least {FEWEST} sizes",),
     )
