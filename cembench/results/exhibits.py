@@ -46,7 +46,7 @@ class ExhibitTable(BaseModel):
     @model_validator(mode="after")
     def _rows_fit(self) -> Self:
         if any(len(row) != len(self.columns) for row in self.rows):
-            raise ValueError(f"a row has not {len(self.columns)} values, as there are columns")
+            raise ValueError(f"a row does not have {len(self.columns)} values, one for each column")
         return self
 
 

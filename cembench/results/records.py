@@ -158,7 +158,7 @@ class FaultKind(StrEnum):
     TIMEOUT = "timeout"
     #: The process ended without an answer: a signal, or an exit code.
     PROCESS_ENDED = "process_ended"
-    #: The process left an answer that cannot be read.
+    #: The answer of the process cannot be read.
     UNREADABLE_ANSWER = "unreadable_answer"
     #: A dependency is not installed on this machine.
     NOT_THERE = "not_there"

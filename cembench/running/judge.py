@@ -30,7 +30,7 @@ from cembench.results.records import Fault, FaultKind
 
 Complex = NDArray[np.complex128]
 
-#: How far from the unit circle a boundary vertex of a disk may lie.
+#: Tolerance of a disk's boundary vertices from the unit circle.
 CIRCLE_TOLERANCE = 1e-9
 #: Tolerance for a hole's image to count as a circle, relative to its radius.
 CIRCULAR = 1e-3
@@ -42,7 +42,7 @@ class Promise(BaseModel):
     model_config = ConfigDict(frozen=True)
 
     target: Target = "disk"
-    #: How far from the unit circle the boundary of a disk may lie.
+    #: Tolerance of a disk's boundary from the unit circle.
     circle: float = CIRCLE_TOLERANCE
     #: Whether the map depends only on the triangles, not on the shape.
     combinatorial: bool = False

@@ -230,7 +230,7 @@ def _end_all(
 ) -> tuple[int, int]:
     """End the process and every descendant, twice: one may have started another meanwhile.
 
-    Gives the code that the process ended with and the number of descendants that were there.
+    Returns the exit code of the process and the number of descendants.
     """
     code, left = process.poll(), set()
     for _ in range(2):

@@ -148,5 +148,5 @@ def copes(mapped: list[CheckedMap]) -> ValidationFinding:
         ok=not bad,
         measured="; ".join(said) or right,
         allowed="a finite map, or AlgorithmFailed with the cause, on any mesh of its type",
-        remedy="raise cembench.AlgorithmFailed where the method does not apply.",
+        remedy="raise cembench.AlgorithmFailed if the method does not apply.",
     )

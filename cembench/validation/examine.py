@@ -86,7 +86,7 @@ def examine(
     algorithm = solver.algorithm
     if algorithm.target == "atlas":
         raise ParameterError(
-            f"{algorithm.name} makes an atlas, and validate examines maps with one UV a vertex. "
+            f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
             "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
         )
     if asked.up_to:

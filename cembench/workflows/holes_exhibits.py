@@ -145,7 +145,7 @@ def _lay_down_pictures(
         run,
         Exhibit(
             name=name,
-            title=f"{mesh.name} and its image, a disk with round holes",
+            title=f"{mesh.name} and its image, a disk with circular holes",
             text=f"The result of one sweep of Koebe's method. {caption}.",
             command=command,
             origin=origin,

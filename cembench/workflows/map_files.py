@@ -251,7 +251,7 @@ def _texture(
     if surface.repaired:
         raise ParameterError(
             "--bake needs the faces of the original file, but the surface was repaired; run "
-            "`cembench repair` first, and bake from its output."
+            "`cembench repair` to see what it changes, and fix the file so that it keeps its UVs."
         )
     old = read_obj_uv(surface.path, textured.F)
     assert textured.uv is not None

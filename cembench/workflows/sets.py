@@ -65,7 +65,7 @@ class SurfaceSet:
 #: All named sets.
 SETS: Mapping[str, SurfaceSet] = MappingProxyType(
     {
-        "real-disks": SurfaceSet("real disks, models of the paper too", ("paper", "disks")),
+        "real-disks": SurfaceSet("real disks, including models of the paper", ("paper", "disks")),
         "real-holes": SurfaceSet("real surfaces with holes", ("holes",)),
         "closed": SurfaceSet("real closed surfaces of genus 0, cut open", ("closed",)),
         "stress": SurfaceSet("surfaces that are hard to map, or damaged", ("stress",)),
@@ -239,7 +239,7 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
     ]
     if found.refused:
         rows = tuple((one.name, one.error, one.source) for one in found.refused)
-        columns = ("surface", "why not", "from")
+        columns = ("surface", "reason", "from")
         tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
     return Exhibit(
         name=EXHIBIT,

@@ -320,7 +320,7 @@ def _dense_statements(K: BoundaryOperator, leading: Real) -> list[Check]:
         Check("K > 0", "Theorem 2", smallest > 0, smallest, "its smallest entry"),
         Check("all other eigenvalues inside", "Corollary 1", inside < 1, inside, "largest modulus"),
         _within(
-            "centralisation puts 0 for 1 and keeps the others",
+            "centralisation replaces 1 by 0 and keeps the others",
             "Remark 2",
             float(np.abs(deflated - kept).max()),
             "largest change of another eigenvalue",

@@ -58,7 +58,7 @@ def test_verdicts_of_a_table_hold_together_and_what_that_costs_is_said():
     text = " ".join(printed(cells).split())
     assert text.count("undecided") == 2
     assert "(Holm, 2 comparisons)" in text
-    assert "Each alone, 2 more would be called different" in text
+    assert "Taken alone, 2 more would be called different" in text
     assert "Holm" not in printed(cells[:2])
 
 

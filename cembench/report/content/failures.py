@@ -29,7 +29,7 @@ def not_ok(evidence: Evidence) -> Table | Text:
             words(cell.algorithm),
             words(cell.solves),
             words("missing"),
-            words("asked for, not finished: the same `cembench run` again goes on"),
+            words("requested but not finished: run the same `cembench run` again to resume"),
         )
         for cell in absent
     ]

@@ -130,5 +130,5 @@ def policies_plot(evidence: Evidence) -> Plot:
         "Cost of repeated factorisation",
         (PlotPanel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
         "Ratio of seconds with a factorisation at every solve to seconds with reused ones.",
-        "A line for each algorithm over the surfaces; iterative ones are high.",
+        "A line for each algorithm over the surfaces; those of iterative algorithms are high.",
     )

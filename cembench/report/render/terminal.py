@@ -163,11 +163,11 @@ def _corrected_words(found: Sequence[Comparison]) -> list[Text]:
         one.verdict != alone.verdict for one, alone in zip(corrected(tested), tested, strict=True)
     )
     told = (
-        f"Verdicts hold together with 95 % (Holm, {len(tested)} comparisons); "
-        "intervals are single ones."
+        f"All verdicts together hold with 95 % (Holm, {len(tested)} comparisons); "
+        "each interval holds by itself."
     )
     if lost:
-        told += f" Each alone, {lost} more would be called different; more rounds decide them."
+        told += f" Taken alone, {lost} more would be called different; more rounds would decide."
     return [Text(told, style="dim")]
 
 

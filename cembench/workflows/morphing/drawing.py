@@ -82,7 +82,7 @@ class Film:
         return len(self.times), self.side, self.side * len(self.rotations), 3
 
     def in_window(self, frame: int, view: int) -> Real:
-        """Window coordinates (n, 3) of the vertices: x right, y up, -1 to 1, z to the viewer."""
+        """Return window coordinates (n, 3): x right and y up from -1 to 1, z to the viewer."""
         return position(self.stops, self.times[frame]) @ self.rotations[view].T
 
 

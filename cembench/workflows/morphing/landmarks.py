@@ -92,7 +92,9 @@ def read_landmarks(
             [_vertex(*item, where=where) for item in zip(cells[1:], meshes, known, strict=True)]
         )
     if not names:
-        raise ParameterError(f"landmarks {path}: no row in it; leave out --landmarks for none.")
+        raise ParameterError(
+            f"landmarks {path}: the file has no rows; write at least one, or leave out --landmarks."
+        )
     found = Landmarks(tuple(names), np.array(rows, dtype=np.int64))
     check_landmarks(found, meshes)
     return found

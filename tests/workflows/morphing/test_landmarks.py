@@ -39,7 +39,7 @@ BAD = {
     "no names": (f"nose,tip,{j}\n", "'tip' is neither .* it has no named landmarks"),
     "a fraction": (f"nose,1.5,{j}\n", "'1.5' is neither a vertex index"),
     "boundary": (f"nose,{i},{EDGE}\n", "is on the boundary"),
-    "empty": ("name,a,b\n", "no row in it"),
+    "empty": ("name,a,b\n", "has no rows"),
 }
 
 

@@ -67,7 +67,7 @@ def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
         "computed by CEM algorithm preserve angles",
         "Section 5",
         "The mean angular distortion is below 5 degrees, which the paper's worst model (Chinese "
-        "Vase, 4.50) keeps.",
+        "Vase, 4.50) meets.",
         words,
         verdict_of(small, len(known)),
         f"{tested_on([s for s, _ in found])} The pictures are in this report; the bound is ours.",
@@ -94,7 +94,7 @@ def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
         "On each of the four faces of Fig. 9 more than half of the corners change by less than one "
         "degree; recomputed from the stored maps.",
         (listed or "None of the four faces is in this run")
-        + f". Of all surfaces of the run it is so on {every} of {len(shares)}.",
+        + f". This holds on {every} of all {len(shares)} surfaces of the run.",
         verdict_of(held, len(named)),
         tested_on(list(named)),
     )
@@ -129,7 +129,7 @@ def _similar(evidence: Evidence, name: str, metric: str, what: str, figure: str)
         if worst
         else "No model with all three in this run.",
         verdict_of(held, len(spreads)),
-        f"{tested_on(list(spreads))} What counts as similar is our reading."
+        f"{tested_on(list(spreads))} The meaning of 'similar' is our reading."
         + _reading_of_fdm(evidence),
     )
 
@@ -167,7 +167,7 @@ def _reading_of_fdm(evidence: Evidence) -> str:
     if series.parameters["public_program"]:
         return (
             " FDM is its authors' public program, which turns the map by a + b/2 where the "
-            "middle (a + b)/2 of an edge is meant: the printed figures contain that slip."
+            "middle (a + b)/2 of an edge is meant: the printed figures contain that error."
         )
     return (
         " FDM is the corrected reading; the printed figures contain a slip of its authors' public "

@@ -193,7 +193,7 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
         "it need not on all larger ones.",
         words,
         timed_verdict(int(bool(smallest and smallest[0] < 1)), int(bool(times)), used),
-        f"{OURS} The machine is in the report's head.",
+        f"{OURS} The head of the report describes the machine.",
     )
 
 

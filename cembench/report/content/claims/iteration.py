@@ -55,7 +55,7 @@ def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections)
         "Remark 3",
         "Once E_C falls in a step of CEM's iteration, it falls in all further ones. ('Become' "
         "allows a rise at first.)",
-        f"so on {len(become)} of {len(histories)} surfaces, on {len(falling)} of them in every step"
+        f"true on {len(become)} of {len(histories)} surfaces, on {len(falling)} of them in each step"
         + (f"; steps that rise: {'; '.join(rising)}" if rising else ""),
         verdict_of(len(become), len(histories)),
         f"{tested_on(list(histories))} Iteration ends after the first step that changes E_C by "
@@ -109,7 +109,7 @@ def inversion_converges_better(evidence: Evidence, inspections: Inspections) -> 
         "Remark 3",
         "CEM with the inversion (30) ends with an E_C not above that of CEM without it (23), under "
         "the same stopping rule.",
-        f"so on {better} of {tested} surfaces"
+        f"true on {better} of {tested} surfaces"
         if tested
         else "This run has no CEM without inversion; measure it into the same folder with "
         "`cembench run ... -a cem -p cem.inversion=False`.",

@@ -88,7 +88,7 @@ def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Claim:
         "Corollary 1; K is positive by Theorem 2",
         f"All eigenvalues of K (Eq. 27) on every surface of the run with at most {DENSE:,} "
         "vertices, and the sign of its entries.",
-        "; ".join(parts) or f"No surface of at most {DENSE:,} vertices is kept in this run.",
+        "; ".join(parts) or f"This run stores no surface of at most {DENSE:,} vertices.",
         verdict_of(held, len(tested)),
         tested_on(tested),
     )
@@ -134,7 +134,7 @@ def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
         "Remark 4",
         "For points on the unit circle and a hundred random sets, no image is outside their "
         "convex hull by more than rounding; the largest distance is given.",
-        listed or f"No surface of at most {DENSE:,} vertices is kept in this run.",
+        listed or f"This run stores no surface of at most {DENSE:,} vertices.",
         verdict_of(held, len(out)),
         f"{tested_on(list(out))} It follows from K > 0 and K 1 = 1, so it can fail where a weight "
         "is negative.",
@@ -180,7 +180,7 @@ def other_weights(evidence: Evidence, inspections: Inspections) -> Claim:
         "K > 0, its largest eigenvalue 1 and all others smaller, with the weight 1 on every edge "
         "(Tutte) and with random weights from 0.01 to 100, on each small surface that satisfies "
         "Definition 1.",
-        "; ".join(parts) or f"No such surface of at most {DENSE:,} vertices is kept in this run.",
+        "; ".join(parts) or f"This run stores no such surface of at most {DENSE:,} vertices.",
         verdict_of(held, len(tested)),
         tested_on(tested),
     )

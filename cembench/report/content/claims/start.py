@@ -110,7 +110,7 @@ def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
         f"the same map up to a constant, within {SAME:g} of its size.",
         f"so on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
         if off
-        else f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(held, len(off)),
         tested_on(list(off)),
     )
@@ -140,7 +140,7 @@ def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
         "no more matrices and solves for fewer columns: counted, not timed.",
         f"the same on {same} of {len(off)} surfaces, at most {max(off.values()):.1e} apart{work}"
         if off
-        else f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(min(same, less), len(off)),
         f"{tested_on(list(off))} (21) is solved by Woodbury's formula, as the paper says it can "
         "be: three columns, of orders that differ by two.",
@@ -164,7 +164,7 @@ def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
         "Section 3.1, below Eq. (12)",
         f"In degrees, the mean over the {NEAR:.0%} of the triangles nearest to p (at least "
         f"{LEAST_NEAR}) is above that over the triangles at the boundary.",
-        listed or f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        listed or f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(held, len(ratios)),
         f"{tested_on(list(ratios))} On a flat disk with p in its middle Eq. (11) with the natural "
         "boundary has the solution 1 / z + conj(z), whose |mu| is |z|^2: conformal at p, where "
