@@ -55,7 +55,7 @@ def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections)
         "Remark 3",
         "Once E_C falls in a step of CEM's iteration, it falls in all further ones. ('Become' "
         "allows a rise at first.)",
-        f"true on {len(become)} of {len(histories)} surfaces, on {len(falling)} of them in each step"
+        f"true on {len(become)} of {len(histories)} surfaces, in every step on {len(falling)}"
         + (f"; steps that rise: {'; '.join(rising)}" if rising else ""),
         verdict_of(len(become), len(histories)),
         f"{tested_on(list(histories))} Iteration ends after the first step that changes E_C by "
