@@ -208,7 +208,7 @@ def map_(
         jobs = jobs_of(shells, registry, candidates, assignments(parameter), how, plugin)
         files.append(FileJobs(shells, jobs, None if together else place_of))
     if preview and is_atlas:
-        note("no picture was drawn: the islands of an atlas have no common place in the plane")
+        note("no picture was drawn: the islands of an atlas have no fixed positions in the plane")
     elif preview:
         chosen = [file.jobs[0].task.algorithm for file in files]
         drawn_files = picture_files(sources, chosen, [file.output for file in files])

@@ -84,7 +84,7 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
 
 
 def impossible(used: Used, found: Round, began: float, ended: float) -> list[Fault]:
-    """Return a fault if a process's times are impossible by its parent's clock."""
+    """Return a fault if a process's times contradict its parent's clock."""
     told = used.cold + used.wall
     if min(found.calls) <= 0 or used.cold < 0 or min(used.own, used.others) < 0:
         why = "a call took no time or negative time"

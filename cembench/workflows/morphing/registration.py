@@ -209,9 +209,9 @@ def _step(
 ) -> tuple[Complex, float]:
     """Return the minimiser for the largest lambda found, up to `lam`, without folds; and lambda.
 
-    The landmarks move by a share of about g = 2 lambda / (C + 2 lambda), where C is the capacity of
-    their disks: about 2, for disks that are small but not very small. The share up to the first
-    fold determines the next lambda to try.
+    The landmarks move about the share g = 2 lambda / (C + 2 lambda) of the distance to their
+    targets. C is the capacity of their disks, about 2 for disks that are small but not very small.
+    The share up to the first fold determines the next lambda to try.
     """
     tried = lam
     for _ in range(MOST_TRIES):

@@ -44,7 +44,7 @@ def success_table(evidence: Evidence, policy: str) -> Table:
         columns,
         tuple(rows),
         "Valid maps, and how the other cells ended, for the surfaces that an algorithm takes and "
-        "was tried on. The interval (Wilson) is for the share on other surfaces like these. A cell "
+        "was tried on. The Wilson interval is for the share on other surfaces of this kind. A cell "
         "can have several faults.",
     )
 
