@@ -149,7 +149,7 @@ def _of_the_circle(
     found, order = [], []
     off = np.abs(np.abs(z) - 1).max()
     if off > tolerance:
-        told = f"the {name} is off the unit circle by up to {off:.2g}"
+        told = f"the {name} lies off the unit circle by up to {off:.2g}"
         found.append(_fault(FaultKind.OFF_CIRCLE, told))
     around, winding, backward = turns(z)
     if around != 1 and winding not in (0, 1):  # 0: all points may be on one half of the circle

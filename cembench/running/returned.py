@@ -68,7 +68,7 @@ def map_of(found: Any, mesh: TriangleMesh, target: str = "disk") -> NDArray[np.c
     bad = np.flatnonzero(~np.isfinite(plain))
     if len(bad):
         places = "corners" if isinstance(found, Atlas) else "vertices"
-        told = f"uv is NaN or infinite at {len(bad)} {places}, the first is {bad[0]}"
+        told = f"uv is NaN or infinite at {len(bad)} {places}, the first being {bad[0]}"
         return Fault(kind=FaultKind.NOT_FINITE, detail=told)
     return np.array(plain, dtype=np.complex128).ravel()
 
