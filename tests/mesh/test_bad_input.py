@@ -108,7 +108,7 @@ def test_two_surfaces_of_one_name(cli, tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "same.obj").write_text(obj(size * np.asarray(V), F))
     code, _, err = cli("run", "--mesh", tmp_path / "a/same.obj", "--mesh", tmp_path / "b/same.obj")
-    assert (code, "two surfaces are called 'same'" in err) == (2, True)
+    assert (code, "two different surfaces are called 'same'" in err) == (2, True)
 
 
 def test_a_tube_goes_to_the_algorithms_that_take_holes(cli, tmp_path):

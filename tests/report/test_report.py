@@ -170,7 +170,7 @@ def test_no_run_and_no_record_are_errors_and_nothing_is_written(cli):
     (cli.folder / "empty" / "records").mkdir(parents=True)
     code, _, err = cli("report", "empty", "-o", "out")
     assert code == 2
-    assert "empty holds no record: no cell of it is finished" in err
+    assert "empty holds no record: none of its cells is finished" in err
     assert not (cli.folder / "out").exists()
 
 
