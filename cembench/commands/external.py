@@ -65,7 +65,7 @@ def _setting(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if key not in KEYS or not equals:
         raise ParameterError(
-            f"--program {text!r} is unknown; write KEY=VALUE with one of the keys "
+            f"--program {text!r} is unknown; write KEY=VALUE, where KEY is one of: "
             f"{', '.join(KEYS)}."
         )
     if key == "fit" and value not in _TRUTH:
