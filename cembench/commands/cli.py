@@ -1,4 +1,4 @@
-"""The command line. Exit code 0 if every asked cell ended ok, 1 if one did not, 2 on bad usage.
+"""The command line. Exit code 0 if every cell ended ok, 1 if one did not, 2 on wrong usage.
 
 Other codes (a closed pipe, a signal, a fault of cembench itself) are in
 :mod:`cembench.commands.ending`.
@@ -89,7 +89,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
 )
-Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is there.")]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is already recorded.")]
 
 
 def _print_version(asked: bool) -> None:
@@ -110,11 +110,11 @@ def _global_options(
         ),
     ] = False,
 ) -> None:
-    """Take the options that belong to no verb."""
+    """Handle the options that belong to no command."""
 
 
 class Kind(StrEnum):
-    """What `list` lists."""
+    """The kinds of things that `list` lists."""
 
     algorithms = "algorithms"
     surfaces = "surfaces"
@@ -126,27 +126,28 @@ class Kind(StrEnum):
     "cembench list surfaces --measure  ·  cembench list --plugin mine.py",
 )
 def list_(
-    kind: Annotated[Kind | None, typer.Argument(help="Only these.")] = None,
+    kind: Annotated[Kind | None, typer.Argument(help="List only these.")] = None,
     *,
-    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Say all about each.")] = False,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show all details.")] = False,
     measure: Annotated[
         bool,
-        typer.Option("--measure", help="Measure the stand-ins that were not: minutes."),
+        typer.Option("--measure", help="Measure the stand-ins not yet measured (takes minutes)."),
     ] = False,
     plugin: Plugins = [],  # noqa: B006 - typer copies defaults
     as_json: Json = False,
 ) -> None:
-    """Which algorithms and surfaces are there?
+    """List the algorithms and surfaces.
 
-    `list surfaces` also tells of the stand-ins for the paper's models: counts,
-    whether they meet their rows of its Table 2, how unevenly CEM scales them,
-    where thumbnails lie. Of all of them with --measure, else of those measured.
+    `list surfaces` also describes the stand-ins for the paper's models: their
+    counts, whether they match their rows of Table 2, how unevenly CEM scales
+    them, and where their thumbnails are. Only stand-ins that were measured are
+    shown; --measure measures the others.
     """
     from cembench.report.render.terminal import algorithms_table, facts_table, surfaces_table
 
     registry = registry_with(plugin)
     if measure and kind is not Kind.surfaces:
-        raise ParameterError("--measure goes with surfaces: cembench list surfaces --measure.")
+        raise ParameterError("--measure is only for surfaces: cembench list surfaces --measure.")
     facts = _facts(registry, measure=measure) if kind is Kind.surfaces else {}
     if as_json:
         print_json(_registry_as_json(registry, kind, facts))
@@ -154,7 +155,7 @@ def list_(
     if kind in (None, Kind.algorithms):
         out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
         if registry.peers:
-            words = f"\nOf others, see `cembench peers`: {', '.join(registry.peers)}"
+            words = f"\nSolvers by others (see `cembench peers`): {', '.join(registry.peers)}"
             out.print(words, style="dim")
     if kind is None:
         out.print()
@@ -169,7 +170,7 @@ def list_(
         if missing:
             out.print(
                 f"\n{missing} of {len(facts)} stand-ins are not measured yet: "
-                "`cembench list surfaces --measure` does it, in minutes.",
+                "run `cembench list surfaces --measure` (takes minutes).",
                 style="dim",
             )
 
@@ -187,15 +188,17 @@ def run(
     *,
     profile: Annotated[
         Profile | None,
-        typer.Option(help="The paper's models: the 8 smallest, up to 210 k faces, all 20."),
+        typer.Option(
+            help="The paper's models: the 8 smallest, those up to 210 k faces, or all 20."
+        ),
     ] = None,
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
     mesh_dir: Annotated[
         list[Path],
-        typer.Option("--mesh-dir", help="All mesh files of a folder but NPZ. Repeatable."),
+        typer.Option("--mesh-dir", help="All mesh files in a folder but NPZ. Repeatable."),
     ] = [],  # noqa: B006
     dataset: Annotated[
-        list[str], typer.Option("--dataset", help="Fetched surfaces (see `fetch`), with commas.")
+        list[str], typer.Option("--dataset", help="Public surfaces (see `fetch`), comma-separated.")
     ] = [],  # noqa: B006
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
@@ -206,19 +209,19 @@ def run(
         typer.Option(
             "--set",
             help="Many surfaces: real-disks, real-holes, closed, stress, ict-faces, "
-            "ict-faces-holes, thingi10k, a folder, or an archive. One round, unless --rounds or "
-            "--precision says more. Repeatable.",
+            "ict-faces-holes, thingi10k, a folder, or an archive. One round each, unless --rounds "
+            "or --precision is given. Repeatable.",
         ),
     ] = [],  # noqa: B006
     limit: Annotated[
-        int | None, typer.Option(min=1, max=1_000_000, help="So many surfaces of each --set.")
+        int | None, typer.Option(min=1, max=1_000_000, help="Surfaces of each --set, at most.")
     ] = None,
     algorithms: Annotated[
         list[str],
         typer.Option(
             "-a",
             "--algorithms",
-            help="Comma-separated, or all; default: the usual ones (see `cembench list`), and the "
+            help="Comma-separated, or all. Default: the usual ones (see `cembench list`), or the "
             "paper's four for `--profile quick`.",
         ),
     ] = [],  # noqa: B006
@@ -236,33 +239,37 @@ def run(
     timeout: Timeout = 600.0,
     memory: Memory = None,
     solves: Annotated[
-        list[str], typer.Option("--solves", help="reuse, backslash, or both with a comma.")
+        list[str], typer.Option("--solves", help="reuse, backslash, or both, comma-separated.")
     ] = ["reuse"],  # noqa: B006
     backend: BackendOption = Backend(default_backend()),  # noqa: B008
     threads: Threads = 1,
     reference: Annotated[
         str | None,
-        typer.Option(help="The algorithm whose speedup over the others is shown; default: cem."),
+        typer.Option(help="Show this algorithm's speedup over the others (default: cem)."),
     ] = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
+        Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
     ] = Path("results/run"),
     mend: Repair = False,
     fresh: Fresh = False,
     rerun_failed: Annotated[
-        bool, typer.Option("--rerun-failed", help="Measure again what did not end ok.")
+        bool, typer.Option("--rerun-failed", help="Measure again the cells that did not end ok.")
     ] = False,
     dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Print the cells and what they will cost.")
+        bool,
+        typer.Option(
+            "--dry-run", help="Print the cells and their estimated cost; measure nothing."
+        ),
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Measure algorithms on surfaces, each pair in processes of its own.
+    """Measure algorithms on surfaces, with fresh processes for every round.
 
-    Rounds go on until figures are precise (--precision), most where intervals are widest.
-    Every finished process is on disk at once; what the folder already holds is not measured again.
-    -p NAME=VALUE goes to all algorithms that have it, -p ALGORITHM.NAME=VALUE to one.
-    docs/measuring.md tells what is timed, and what an interval means.
+    Rounds continue until the figures are precise (--precision); wide intervals
+    get more rounds. Each result is saved at once, and what the folder already
+    holds is not measured again. -p NAME=VALUE sets a parameter of all algorithms
+    that have it, -p ALGORITHM.NAME=VALUE of one. docs/measuring.md explains what
+    is timed and what an interval means.
     """
     from cembench.results import run_folder
     from cembench.results.paper.profiles import algorithms_of, paper_parameters, surfaces_of
@@ -302,14 +309,14 @@ def run(
     generated = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
     if not files and not generated and not sets:
         raise ParameterError(
-            "nothing to run on: name a --profile, or at least one --mesh FILE, --dataset NAME (see "
-            "`cembench fetch`), --set NAME or --surfaces NAME (see `cembench list surfaces`)."
+            "no surface to run on: name a --profile, or at least one --mesh FILE, --dataset NAME "
+            "(see `cembench fetch`), --set NAME or --surfaces NAME (see `cembench list surfaces`)."
         )
     if limit is not None and not sets:
-        raise ParameterError("--limit is of --set: name one, or leave it out.")
+        raise ParameterError("--limit needs --set: add --set NAME, or leave --limit out.")
     if mend and sets:
         raise ParameterError(
-            "--repair is of --mesh and --mesh-dir: mend the files of a set with `cembench repair`, "
+            "--repair works with --mesh and --mesh-dir: mend the files of a set with `cembench repair`, "
             "or leave it out."
         )
     with err.status("reading surfaces", spinner="line"):
@@ -337,7 +344,7 @@ def run(
 @app.command(epilog="Example:  cembench reproduce -o results/reproduce")
 def reproduce(
     *,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Where the results go.")] = Path(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")] = Path(
         "results/reproduce"
     ),
     fresh: Fresh = False,
@@ -345,8 +352,9 @@ def reproduce(
 ) -> None:
     """Measure every algorithm on stand-ins for the paper's eight smallest models, and report.
 
-    One round each, so that it takes minutes; `run --profile quick` has the rounds that intervals
-    need. What the folder already holds is not measured again. The report lies in it too.
+    It measures one round, which takes minutes; `run --profile quick` measures
+    enough rounds for intervals. What the folder already holds is not measured
+    again. The report is written to the same folder.
     """
     from cembench.core import folders
     from cembench.registry import load_registry
@@ -391,10 +399,10 @@ _MARKS = {True: ("bad", "bold red"), False: ("--", "yellow")}
 
 @app.command(epilog="Example:  cembench doctor --json")
 def doctor(*, as_json: Json = False) -> None:
-    """Is everything there that cembench needs? What is missing, and what brings it?"""
+    """Check the installation, and say how to install what is missing."""
     from cembench.workflows.doctor import examine
 
-    with err.status("looking", spinner="line"):
+    with err.status("checking", spinner="line"):
         findings = examine()
     if as_json:
         print_json([asdict(finding) for finding in findings])
@@ -409,7 +417,7 @@ def doctor(*, as_json: Json = False) -> None:
         raise typer.Exit(1)
 
 
-#: Modules whose verbs are not written in this one.
+#: Modules that hold the other commands.
 _MORE = (
     run_verbs,
     report_verbs,
@@ -427,7 +435,7 @@ for verb, example in (entry for module in _MORE for entry in module.VERBS):
 
 
 def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
-    """Run the tasks with a live table on a terminal, and with a line a cell elsewhere."""
+    """Run the tasks, with a live table on a terminal and one line per cell elsewhere."""
     from cembench.running.local import run_tasks
 
     with resumable(), _progress(len(tasks)) as progress:
@@ -474,7 +482,7 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
 
 
 def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_json: bool) -> None:
-    """Say which cells would be measured, and what that will cost."""
+    """Print which cells would be measured, and their estimated cost."""
     from cembench.commands.progress import duration
     from cembench.report.render.terminal import plan_table
     from cembench.running.estimate import estimate, planned_seconds
@@ -508,12 +516,12 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
         print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest})
         return
     shown = [
-        (cell, faces, cost.basis if cost else f"there: {held[cell.key]}", cost)
+        (cell, faces, cost.basis if cost else f"recorded: {held[cell.key]}", cost)
         for cell, faces, cost in lines
     ]
     out.print(plan_table(shown))
     rough = (
-        " (rough: little of this was measured here before)"
+        " (rough: few similar cells were measured here before)"
         if any(cost.basis == "rough" for cost in costs)
         else ""
     )
@@ -528,13 +536,13 @@ def _policies(given: list[str]) -> list[str]:
     for name in names:
         if name not in [policy.value for policy in Solves]:
             raise ParameterError(
-                f"--solves {name!r} is unknown; allowed: reuse, backslash, or both with a comma."
+                f"--solves {name!r} is unknown; allowed: reuse, backslash, or reuse,backslash."
             )
     return names or [Solves.reuse.value]
 
 
 def _facts(registry: Registry, *, measure: bool) -> dict[str, SurfaceFacts | None]:
-    """What is known of the surfaces that are kept on disk; found where it is not, if asked to."""
+    """Return the recorded facts of each kept surface; with `measure`, find the missing ones."""
     from cembench.report.surface_facts import find_facts, kept_facts
 
     families = [family for family in registry.surfaces.values() if family.kept]
@@ -585,7 +593,7 @@ def _registry_as_json(
 
 
 def main() -> None:
-    """Run the command line; :mod:`cembench.commands.ending` decides how it ends."""
+    """Run the command line; :mod:`cembench.commands.ending` chooses the exit code."""
     with ending():
         app()
 

@@ -1,7 +1,7 @@
-"""What every verb of the command line shares: where it writes to, and how it says things.
+"""Consoles, messages and option parsing that all commands share.
 
-Data is shown as it is. A name, a title or a path may hold what looks like markup (``[/fast]``) or
-the control codes of a terminal: no string printed here is read as either. Styles are given as
+Data is printed as it is. A name, a title or a path may hold what looks like markup (``[/fast]``) or
+terminal control codes; no string printed here is interpreted as either. Styles are given as
 arguments or as :class:`rich.text.Text`, never inside a string.
 """
 
@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Registry
 
-#: Control codes become pictures of themselves; tabs and line ends stay.
+#: Control codes are replaced by visible symbols; tabs and line ends are kept.
 _VISIBLE = {code: 0x2400 + code for code in range(32) if chr(code) not in "\t\n"}
 _VISIBLE |= {0x7F: 0x2421} | dict.fromkeys(range(0x80, 0xA0), 0xFFFD)
 
 
 class PlainConsole(Console):
-    """A console that reads nothing in a string but its characters."""
+    """A console that prints strings literally, without markup or control codes."""
 
     def __init__(self, *, stderr: bool = False) -> None:
         super().__init__(stderr=stderr, highlight=False, markup=False, emoji=False)
@@ -39,7 +39,7 @@ class PlainConsole(Console):
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Yield the segments of what is printed, with control codes made visible."""
+        """Yield the printed segments, with control codes made visible."""
         for segment in super().render(renderable, options):
             if segment.control:
                 yield segment
@@ -47,12 +47,12 @@ class PlainConsole(Console):
                 yield Segment(segment.text.translate(_VISIBLE), segment.style)
 
     def status(self, status: RenderableType, **options: Any) -> Status:
-        """Return a spinner with these words."""
+        """Return a spinner with this text."""
         return _PlainStatus(_literal(status), console=self, **options)
 
     def on_broken_pipe(self) -> NoReturn:
-        """Leave it to :func:`cembench.commands.ending.ending` how to end."""
-        raise BrokenPipeError(errno.EPIPE, "nobody reads the output")
+        """Raise, so that :func:`cembench.commands.ending.ending` chooses the exit code."""
+        raise BrokenPipeError(errno.EPIPE, "the output pipe is closed")
 
 
 class _PlainStatus(Status):
@@ -71,39 +71,39 @@ Json = Annotated[bool, typer.Option("--json", help="Print JSON on standard outpu
 
 
 def print_json(data: Any) -> None:
-    """Print data as JSON, and nothing else, on standard output."""
+    """Print data as JSON on standard output."""
     sys.stdout.write(json.dumps(data, indent=2) + "\n")
 
 
 def print_pair(name: str, value: object) -> None:
-    """Print a name in bold and what belongs to it, on one line however long."""
+    """Print a name in bold and its value, on one line however long."""
     out.print(Text.assemble((name, "bold"), "  ", str(value)), soft_wrap=True)
 
 
 def complain(message: str) -> None:
-    """Say on standard error what is wrong."""
+    """Print an error on standard error."""
     err.print(f"error: {message}", style="bold red", soft_wrap=True)
 
 
 def warn(message: str) -> None:
-    """Say on standard error what the user should know."""
+    """Print a warning on standard error."""
     err.print(f"warning: {message}", style="yellow", soft_wrap=True)
 
 
 def note(message: str, style: str = "yellow") -> None:
-    """Say on standard error what is good to know."""
+    """Print a remark on standard error."""
     err.print(f"note: {message}", style=style, soft_wrap=True)
 
 
 def print_notices(meshes: Iterable[TriangleMesh]) -> None:
-    """Say on standard error what was noticed of surfaces when they were read."""
+    """Print the notices of surfaces on standard error."""
     for mesh in meshes:
         for notice in mesh.notices:
             note(f"{mesh.name}: {notice}")
 
 
 def registry_with(plugins: Sequence[str]) -> Registry:
-    """Load the registry with the user's plug-ins, and show which while that takes its time."""
+    """Load the registry with the user's plug-ins, behind a spinner that names them."""
     from cembench.registry import load_registry
 
     if not plugins:
@@ -115,17 +115,17 @@ def registry_with(plugins: Sequence[str]) -> Registry:
 
 
 def split(names: list[str]) -> list[str]:
-    """Names out of options that were repeated, or hold several with commas."""
+    """Return the names given by a repeated or comma-separated option."""
     return [part.strip() for name in names for part in name.split(",") if part.strip()]
 
 
 def assignments(given: Sequence[str]) -> dict[str, str]:
-    """The parameters that ``-p NAME=VALUE`` sets.
+    """Return the parameters that ``-p NAME=VALUE`` sets.
 
     Raises
     ------
     ParameterError
-        One that is not of that form.
+        An assignment is not of that form.
 
     """
     pairs = {}

@@ -1,4 +1,4 @@
-"""The verb `cut`: a closed surface, or one with handles, becomes a disk."""
+"""The command `cut`: cut a closed surface, or one with handles, into a disk."""
 
 from __future__ import annotations
 
@@ -14,26 +14,29 @@ from cembench.core.errors import MeshError
 
 
 def cut(
-    mesh: Annotated[Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL or MAT.")],
+    mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
-    output: Annotated[Path, typer.Option("-o", "--output", help="The disk: OBJ, OFF or PLY.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="File for the disk: OBJ, OFF or PLY.")
+    ],
     between: Annotated[
         tuple[int, int] | None,
-        typer.Option(metavar="A B", help="Vertices, counted from 0, that the cut has to reach."),
+        typer.Option(metavar="A B", help="Two vertices that the cut must reach, counted from 0."),
     ] = None,
     mend: Repair = False,
     force: Annotated[
         bool,
-        typer.Option("--force", help="Write over the input, or an OUTPUT_seam.csv that is there."),
+        typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv."),
     ] = False,
     as_json: Json = False,
 ) -> None:
     """Cut a surface open along short curves until it is a disk, and write it.
 
-    A closed surface without handles is cut between two points that lie far from each other, handles
-    along a short cut graph, and holes are joined to the cut. OUTPUT_seam.csv names the vertex of
-    the surface that each vertex of the disk is a copy of. `cembench map --cut` cuts, maps, and
-    writes the UVs for the uncut surface.
+    A closed surface without handles is cut between two points far from each
+    other, a surface with handles along a short cut graph; holes are joined to the
+    cut. OUTPUT_seam.csv gives, for each vertex of the disk, the vertex of the
+    surface that it is a copy of. `cembench map --cut` cuts, maps, and writes the
+    UVs for the uncut surface.
     """
     from cembench.core.notices import NoticeKind
     from cembench.core.outputs import refuse_inputs, refuse_present
@@ -71,7 +74,7 @@ def cut(
         print_json(about | steps)
         return
     for notice in disk.mesh.notices:
-        if notice.kind is not NoticeKind.CUT_OPEN:  # told below
+        if notice.kind is not NoticeKind.CUT_OPEN:  # printed below
             note(f"{mesh.stem}: {notice}")
     if repaired is not None:
         print_steps(repaired.steps)
@@ -83,7 +86,7 @@ def cut(
         out.print(str(path), soft_wrap=True)
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         cut,

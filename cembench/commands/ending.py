@@ -1,13 +1,13 @@
-"""How the command line ends, whatever happens in a verb.
+"""Exit codes and last messages of the command line.
 
 ====  ===================================================================================
-0     every cell asked for ended ok
-1     one did not, or something in a run does not agree
-2     the call or the input was wrong; a message says what, where and what to do
-70    a fault of cembench itself; its traceback is in a file, or shown with CEMBENCH_DEBUG=1
+0     every requested cell ended ok
+1     a cell did not end ok, or the contents of a run disagree
+2     the usage or the input was wrong; a message says what, where and what to do
+70    an internal error of cembench; its traceback is in a file, or shown by CEMBENCH_DEBUG=1
 74    the system refused to read or write a file
-129   stopped by SIGHUP, as 130 by Ctrl-C and 143 by SIGTERM; temporary files are gone
-141   nobody reads the output any more (``cembench list | head -1``)
+129   stopped by SIGHUP (130: by Ctrl-C, 143: by SIGTERM); temporary files are removed
+141   the output pipe was closed (``cembench list | head -1``)
 ====  ===================================================================================
 """
 
@@ -28,26 +28,26 @@ from cembench.commands.console import complain, err
 from cembench.core.errors import CembenchError
 
 BAD_USAGE, FAULT, SYSTEM, CLOSED_PIPE = 2, 70, 74, 141
-#: Set to anything, it shows the traceback of a fault on standard error.
+#: Environment variable: if set, the traceback of an internal error goes to standard error.
 DEBUG = "CEMBENCH_DEBUG"
-#: What Ctrl-C is answered with.
+#: Message after Ctrl-C.
 STOPPED, STOPPED_AND_KEPT = "Stopped.", "Stopped; the same command resumes."
 
 
 class _Passed(BaseException):
-    """Carries an exception past the command-line library, which has an ending of its own for it."""
+    """Carries an exception past the command-line library, which would handle it differently."""
 
     def __init__(self, error: Exception) -> None:
         self.error = error
 
 
 class _Resumable(KeyboardInterrupt):
-    """Ctrl-C where what was done is kept."""
+    """Ctrl-C during work whose results so far are kept."""
 
 
 @contextmanager
 def resumable() -> Iterator[None]:
-    """Let Ctrl-C out of the enclosed tell that the same command goes on where it was stopped."""
+    """Make Ctrl-C in this block print that the same command resumes the work."""
     try:
         yield
     except KeyboardInterrupt as error:
@@ -55,10 +55,10 @@ def resumable() -> Iterator[None]:
 
 
 class Verbs(TyperGroup):
-    """The verbs; OSError and EOFError out of one of them are no usage errors and no Ctrl-D."""
+    """The commands; an OSError or EOFError in one is not treated as wrong usage or Ctrl-D."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Call the verb."""
+        """Call the command."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt as error:
@@ -70,16 +70,16 @@ class Verbs(TyperGroup):
 
 @contextmanager
 def ending() -> Iterator[None]:
-    """Turn whatever comes out of the enclosed into an exit code and a message."""
+    """Turn any exception in this block into a message and an exit code."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError):  # a stream that was replaced may not be able to
+        with suppress(AttributeError):  # a replaced stream may not support this
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     before = _stop_on_signals()
     try:
         try:
             yield
         except SystemExit:
-            sys.stdout.flush()  # now, while a closed pipe can still be told from a fault
+            sys.stdout.flush()  # now, while a closed pipe can still be distinguished from a fault
             raise
     except _Passed as passed:
         _end_of(passed.error)
@@ -100,10 +100,10 @@ def _end_of(error: Exception) -> NoReturn:
     told = "".join(traceback.format_exception(error))
     if isinstance(error, OSError):
         where = f"{os.fspath(error.filename)!r}: " if error.filename is not None else ""
-        message = f"{where}{error.strerror or error}. The system refused to read or write it."
+        message = f"{where}{error.strerror or error}. The operating system refused the access."
         code = SYSTEM
     else:
-        message = f"cembench met a fault of its own: {type(error).__name__}: {error}. "
+        message = f"internal error in cembench: {type(error).__name__}: {error}. "
         message += "Please report it, with " + _kept(told)
         code = FAULT
     complain(message)
@@ -114,7 +114,7 @@ def _end_of(error: Exception) -> NoReturn:
 
 
 def _kept(told: str) -> str:
-    """Lay a traceback into a file and return its name in words, or how to see it."""
+    """Write a traceback to a file; return where it is, or how to show it."""
     if DEBUG not in os.environ:
         with (
             suppress(OSError),
@@ -128,11 +128,11 @@ def _kept(told: str) -> str:
         ):
             file.write(told)
             return f"the traceback in {file.name}."
-    return f"the traceback that {DEBUG}=1 shows."
+    return f"the traceback that {DEBUG}=1 prints."
 
 
 def _forget_output() -> None:
-    """Let what is buffered go nowhere, so that the interpreter does not complain at its end."""
+    """Discard buffered output, so that the interpreter does not complain at exit."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for stream in (sys.stdout, sys.stderr):
         try:
@@ -143,10 +143,10 @@ def _forget_output() -> None:
 
 
 def _stop_on_signals() -> dict[int, Any]:
-    """Let SIGTERM and SIGHUP unwind like Ctrl-C does, so that temporary folders are removed.
+    """Make SIGTERM and SIGHUP unwind like Ctrl-C, so that temporary folders are removed.
 
-    A signal that is ignored (``nohup``) stays so; a second one does not interrupt the clearing up.
-    Returns what handled them before.
+    An ignored signal (``nohup``) stays ignored; a second signal does not interrupt the cleanup.
+    Returns the previous handlers.
     """
     known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
     mortal = [number for number in known if signal.getsignal(number) is signal.SIG_DFL]

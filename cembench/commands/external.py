@@ -1,4 +1,4 @@
-"""The options by which a command line names a program to be measured."""
+"""The options that name an external program to measure."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ Command = Annotated[
     typer.Option(
         "--command",
         metavar="COMMAND",
-        help="A program to run as an algorithm: 'mysolver {input} -o {output}'. It may be of any "
-        "language; see docs/external_solvers.md.",
+        help="A program to run as an algorithm, in any language: 'mysolver {input} -o {output}'. "
+        "See external_solvers.md in docs.",
     ),
 ]
 Settings = Annotated[
@@ -24,39 +24,39 @@ Settings = Annotated[
     typer.Option(
         "--program",
         metavar="KEY=VALUE",
-        help="Of --command: name, target, input, output, seconds, version, circle, fit. "
+        help="Settings of --command: name, target, input, output, seconds, version, circle, fit. "
         "Repeatable.",
     ),
 ]
-#: What `--program` may set, beside the fields of a declaration.
+#: The keys that `--program` may set.
 KEYS = ("name", "target", "input", "output", "seconds", "version", "circle", "fit")
 _TRUTH = {"yes": True, "no": False}
 
 
 def declared_command(command: str | None, settings: list[str]) -> tuple[list[str], list[str]]:
-    """Return the plug-in that a command makes, and the name of its algorithm; nothing without one.
+    """Return the plug-in made from a command and its algorithm's name; empty without a command.
 
     Raises
     ------
     ParameterError
-        A setting without a command, an unknown one, or one of the wrong type.
+        A setting has no command, is unknown, or has the wrong type.
     RegistryError
-        A declaration that cannot be right.
+        The declaration is inconsistent.
 
     """
     from cembench.registry import COMMAND, declared_by, load_registry
 
     if command is None:
         if settings:
-            raise ParameterError(f"--program {settings[0]} goes with --command COMMAND.")
+            raise ParameterError(f"--program {settings[0]} needs --command COMMAND.")
         return [], []
     given = {"command": command, "folder": str(Path.cwd())}
     plugin = COMMAND + json.dumps(given | dict(_setting(one) for one in settings))
     (spec,) = declared_by(plugin)
     if spec.name in load_registry().algorithms:
         raise ParameterError(
-            f"the command would be called {spec.name!r}, as an algorithm is; give it another name "
-            "with --program name=NAME."
+            f"the command's name would be {spec.name!r}, which is a registered algorithm; choose "
+            "another with --program name=NAME."
         )
     return [plugin], [spec.name]
 
@@ -65,7 +65,8 @@ def _setting(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if key not in KEYS or not equals:
         raise ParameterError(
-            f"--program {text!r} is not understood; write KEY=VALUE with one of: {', '.join(KEYS)}."
+            f"--program {text!r} is unknown; write KEY=VALUE, where KEY is one of: "
+            f"{', '.join(KEYS)}."
         )
     if key == "fit" and value not in _TRUTH:
         raise ParameterError(f"--program fit={value!r} is not allowed; write yes or no.")
@@ -73,5 +74,7 @@ def _setting(text: str) -> tuple[str, Any]:
         try:
             return key, float(value)
         except ValueError:
-            raise ParameterError(f"--program circle={value!r} is not a number.") from None
+            raise ParameterError(
+                f"--program circle={value!r} is not a number; write a tolerance."
+            ) from None
     return key, _TRUTH[value] if key == "fit" else value

@@ -1,4 +1,4 @@
-"""The verb that fetches surfaces: fetch."""
+"""The command `fetch`: download public surfaces."""
 
 from __future__ import annotations
 
@@ -22,31 +22,36 @@ if TYPE_CHECKING:
 
 def fetch(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="NAME", help="Which; none: list them all.")
+        list[str] | None,
+        typer.Argument(metavar="NAME", help="Surfaces to fetch; with none, list them all."),
     ] = None,
     *,
     group: Annotated[
         list[str],
-        typer.Option("--group", help="All of a group: paper, disks, holes, closed, stress."),
+        typer.Option("--group", help="A whole group: paper, disks, holes, closed or stress."),
     ] = [],  # noqa: B006
     have: Annotated[
         list[Path],
-        typer.Option("--have", help="A folder whose files are taken where they are the same."),
+        typer.Option(
+            "--have", help="A folder with files already downloaded; matching ones are copied."
+        ),
     ] = [],  # noqa: B006
-    jobs: Annotated[int, typer.Option(min=1, max=16, help="Files fetched at once.")] = 4,
+    jobs: Annotated[int, typer.Option(min=1, max=16, help="Parallel downloads.")] = 4,
     timeout: Annotated[
         float,
-        typer.Option(min=0.1, max=LONGEST, callback=finite, help="Seconds a server may be silent."),
+        typer.Option(
+            min=0.1, max=LONGEST, callback=finite, help="Seconds to wait for a silent server."
+        ),
     ] = 60.0,
     as_json: Json = False,
 ) -> None:
-    """Fetch public surfaces, check them, and say where they lie.
+    """Fetch public surfaces, check them, and print their paths.
 
-    Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its
-    SHA-256 must be the known one. $CEMBENCH_DATA_URL points to a mirror.
-    A file that fails stops none of the others; the same command again goes
-    on where this one ended. `--group ict-face` fetches the files of the face
-    model. `map NAME` and `run --dataset NAME` fetch by themselves.
+    Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its SHA-256
+    must match. $CEMBENCH_DATA_URL points to a mirror. A failed download does not
+    stop the others; run the same command again to resume. `--group ict-face`
+    fetches the files of the face model. `map NAME` and `run --dataset NAME` fetch
+    what they need.
     """
     from cembench.registry import load_registry
     from cembench.report.render.terminal import datasets_table
@@ -74,7 +79,7 @@ def fetch(
 def _fetch_all(
     wanted: list[Dataset], jobs: int, timeout: float, have: list[Path], *, quiet: bool
 ) -> dict[str, dict[str, Any]]:
-    """Fetch them, say how it goes, and return what is known of each by name."""
+    """Fetch the datasets with progress; return a summary of each by name."""
     from cembench.mesh import datasets
 
     missing = {d.path: d for d in wanted if not datasets.is_fetched(d)}
@@ -90,14 +95,14 @@ def _fetch_all(
                 found[one.dataset.name]["error"] = str(one.error)
                 complain(str(one.error))
             elif not quiet:
-                only = " (no licence stated: do not pass it on)" if one.dataset.fetch_only else ""
+                only = " (no licence stated: do not redistribute)" if one.dataset.fetch_only else ""
                 told = f"{one.dataset.name}: {one.path}{only}"
                 out.print(told, markup=False, soft_wrap=True)
     failed = sum("error" in about for about in found.values())
     if len(wanted) > 1 and not quiet:
         err.print(
-            f"{len(found) - failed} of {len(wanted)} are there"
-            + (f", {failed} could not be fetched; the same command tries them again" * bool(failed))
+            f"{len(found) - failed} of {len(wanted)} fetched"
+            + (f", {failed} failed; run the same command to try again" * bool(failed))
             + ".",
             style="dim",
         )
@@ -105,7 +110,7 @@ def _fetch_all(
 
 
 def _intent(count: int, missing: list[Dataset]) -> str:
-    """Say how many files there are and how much is to be fetched, before it begins."""
+    """Return a line with the number of files and the bytes still to fetch."""
     from cembench.report.render.terminal import bytes_text
 
     total = bytes_text(sum(d.size or 0 for d in missing))
@@ -115,7 +120,7 @@ def _intent(count: int, missing: list[Dataset]) -> str:
 
 
 def fetched(dataset: Dataset, *, timeout: float = 60.0) -> Path:
-    """Where is the file to read this dataset from? Fetched if need be, with a bar on a terminal.
+    """Return the file of a dataset, fetched if necessary, with a progress bar on a terminal.
 
     Raises
     ------
@@ -152,7 +157,7 @@ def _about(dataset: Dataset) -> dict[str, Any]:
 
 @dataclass
 class _Bar:
-    """One line of bars, told of bytes."""
+    """The progress bar of one file."""
 
     bars: Bars
     line: TaskID
@@ -161,17 +166,17 @@ class _Bar:
     seen: int = 0
 
     def update(self, count: int) -> None:
-        """Show that so many more have arrived."""
+        """Add bytes that have arrived."""
         self.bars.update(self.line, advance=count, total=self.total or None)
         self._advance_whole(count)
 
     def reset(self) -> None:
-        """Show that none have arrived; the loop of the download ends with this and all at once."""
+        """Set the bar to zero; the download loop ends with this and one update for all bytes."""
         self.bars.reset(self.line)
         self._advance_whole(-self.seen)
 
     def close(self) -> None:
-        """Show no more of this file where there are others."""
+        """Hide the bar of this file if there are others."""
         self.bars.stop_task(self.line)
         if self.whole is not None:
             self.bars.update(self.line, visible=False)
@@ -184,7 +189,7 @@ class _Bar:
 
 @contextmanager
 def bars(datasets: list[Dataset]) -> Iterator[Callable[[Dataset], Progress | None]]:
-    """On a terminal a bar for each file that is being fetched, and nothing elsewhere."""
+    """Yield a function that makes a bar for each file on a terminal, and nothing elsewhere."""
     if not err.is_terminal:
         yield lambda dataset: None
         return
@@ -203,7 +208,7 @@ def bars(datasets: list[Dataset]) -> Iterator[Callable[[Dataset], Progress | Non
         yield bar
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         fetch,

@@ -1,4 +1,4 @@
-"""The verb that shows the steps of Koebe's method and what they come to (Figures 1 and 7)."""
+"""The command `holes`: the steps of Koebe's method and its result (Figures 1 and 7)."""
 
 from __future__ import annotations
 
@@ -18,28 +18,33 @@ STAND_IN = "ho-face-with-holes"
 def holes(
     meshes: Annotated[
         list[str],
-        typer.Argument(metavar="MESH", help="Surface with holes: a file, or a known name."),
+        typer.Argument(
+            metavar="MESH", help="Surface with holes: a mesh file, or a registered name."
+        ),
     ] = [STAND_IN],  # noqa: B006 - typer copies defaults
     *,
     outer: Annotated[
         int | None,
         typer.Option(
-            min=0, max=2**63 - 1, help="A vertex of the outer boundary; default: the widest one's."
+            min=0,
+            max=2**63 - 1,
+            help="A vertex of the outer boundary (default: the widest boundary).",
         ),
     ] = None,
     sweeps: Annotated[
-        int, typer.Option(min=1, max=1000, help="The most sweeps that are tried.")
+        int, typer.Option(min=1, max=1000, help="Maximum number of sweeps to try.")
     ] = 8,
     faces: Faces = None,
     run: Annotated[
-        Path, typer.Option("--run", "-o", "--output", help="The run that gets the exhibits.")
+        Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
     ] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
     """Map surfaces with holes, and draw the steps of Koebe's method (Figures 1 and 7).
 
-    One sweep is the paper's Algorithm 2. The table compares it with the best number of sweeps, by
-    conformal energy, and with every other algorithm for this class. docs/holes.md explains it.
+    One sweep is the paper's Algorithm 2. The table compares it with the best
+    number of sweeps, by conformal energy, and with every other algorithm for this
+    class. docs/holes.md explains it.
     """
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
@@ -109,7 +114,7 @@ def _show(rows: list[dict[str, Any]], run: Path) -> None:
     out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         holes,

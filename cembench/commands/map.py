@@ -1,4 +1,4 @@
-"""The verb that maps surfaces and writes them with their UVs."""
+"""The command `map`: map surfaces and write them with their UVs."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ from cembench.workflows.places import Place
 if TYPE_CHECKING:
     from cembench.workflows.map_surfaces import Mapped
 
-#: What is taken where the user names no algorithm: the first that takes the surface.
+#: Default algorithms, in order of preference; the first that takes the surface is used.
 USUAL = ("direct-cem", "direct-cem-holes")
 EXAMPLES = (
     "Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
@@ -58,7 +58,7 @@ def map_(
     meshes: Annotated[
         list[Path],
         typer.Argument(
-            metavar="MESH...", help="Surfaces: OBJ, OFF, PLY, STL, MAT, or a name of `fetch`."
+            metavar="MESH...", help="Mesh files (OBJ, OFF, PLY, STL, MAT), or names from `fetch`."
         ),
     ],
     *,
@@ -67,7 +67,7 @@ def map_(
         typer.Option(
             "-a",
             "--algorithm",
-            help="See `list`; default: direct-cem, or direct-cem-holes for a surface with holes.",
+            help="See `list` (default: direct-cem; direct-cem-holes for surfaces with holes).",
         ),
     ] = None,
     parameter: Parameters = [],  # noqa: B006
@@ -76,19 +76,22 @@ def map_(
         typer.Option(
             "-o",
             "--output",
-            help="Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. Of several surfaces: a folder, or "
+            help="Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. For several surfaces: a folder, or "
             "a file with all of them.",
         ),
     ] = None,
     place: Annotated[
-        Place, typer.Option("--uv", help="UVs in the unit square, or as the map is (a disk).")
+        Place,
+        typer.Option(
+            "--uv", help="Move the UVs into the unit square, or keep the map as it is (a disk)."
+        ),
     ] = Place.unit,
     checker: Annotated[
-        bool, typer.Option("--checker", help="Add a checkerboard texture; GLB has it always.")
+        bool, typer.Option("--checker", help="Add a checkerboard texture; GLB always has one.")
     ] = False,
     bake: Annotated[
         Path | None,
-        typer.Option(help="A texture made for the OBJ's own UVs: paint it anew for these."),
+        typer.Option(help="A texture for the OBJ's own UVs, to be repainted for the new ones."),
     ] = None,
     samples: Annotated[
         Path | None,
@@ -96,34 +99,40 @@ def map_(
     ] = None,
     remeshed: Annotated[
         Path | None,
-        typer.Option("--remesh", help="Mesh the surface anew through the map, into this file."),
+        typer.Option(
+            "--remesh", help="Remesh the surface through the map, and write it to this file."
+        ),
     ] = None,
     side: Annotated[
-        int, typer.Option(min=4, max=8192, help="Samples along a side, for the two above.")
+        int,
+        typer.Option(
+            min=4, max=8192, help="Samples along a side, for --geometry-image and --remesh."
+        ),
     ] = 129,
     page: Annotated[
         Path | None,
-        typer.Option("--html", help="A page on which to turn surface and map; needs no network."),
+        typer.Option(
+            "--html", help="Write a page with a 3-D view of surface and map; works offline."
+        ),
     ] = None,
     preview: Annotated[
-        bool, typer.Option("--preview", help="Draw a PNG, beside the output; folds are red.")
+        bool,
+        typer.Option("--preview", help="Draw a PNG beside the output; folded triangles are red."),
     ] = False,
     keep_invalid: Annotated[
         bool,
-        typer.Option(
-            "--keep-invalid", help="Write a map that is not valid too; the exit code stays 1."
-        ),
+        typer.Option("--keep-invalid", help="Write invalid maps too; the exit code stays 1."),
     ] = False,
     force: Annotated[
         bool,
         typer.Option(
-            "--force", help="Write over the input, a picture not made here, or FOLDER's files."
+            "--force", help="Overwrite the input, a picture not made by `map`, or files in FOLDER."
         ),
     ] = False,
     mend: Repair = False,
     cut: Annotated[
         bool,
-        typer.Option("--cut", help="Cut the surface into a disk first, as `cembench cut` does."),
+        typer.Option("--cut", help="Cut the surface into a disk first, like `cembench cut`."),
     ] = False,
     plugin: Plugins = [],  # noqa: B006
     command: Command = None,
@@ -137,11 +146,12 @@ def map_(
 ) -> None:
     """Map surfaces, check the maps, and write them.
 
-    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
-    hold all digits; PLY and GLB single precision. An OBJ file keeps what else it has: groups,
-    materials, normals, colours, polygons. Of a surface that is --cut, the uncut one is written,
-    with a UV per corner. Several surfaces in one file, or several files in one, share the square,
-    each in its own part; larger surfaces get more of it.
+    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk.
+    OBJ, VTP and NPZ hold all digits; PLY and GLB single precision. An OBJ file
+    keeps its groups, materials, normals, colours and polygons. With --cut, the
+    uncut surface is written, with one UV per corner. Several surfaces written to
+    one file share the unit square, each in its own part; larger surfaces get
+    larger parts.
     """
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.drawing.own_pictures import check_replaceable
@@ -163,7 +173,7 @@ def map_(
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
     declared, named = declared_command(command, program)
     if named and algorithm:
-        raise ParameterError("-a and --command name two algorithms; map with one after the other.")
+        raise ParameterError("-a and --command both name an algorithm; give only one of them.")
     plugin = [*plugin, *declared]
     registry = registry_with(plugin)
     asked_for = named or ([algorithm] if algorithm else USUAL)
@@ -198,7 +208,7 @@ def map_(
         jobs = jobs_of(shells, registry, candidates, assignments(parameter), how, plugin)
         files.append(FileJobs(shells, jobs, None if together else place_of))
     if preview and is_atlas:
-        note("an atlas has no picture: islands lie anywhere in the plane")
+        note("no picture was drawn: the islands of an atlas have no fixed positions in the plane")
     elif preview:
         chosen = [file.jobs[0].task.algorithm for file in files]
         drawn_files = picture_files(sources, chosen, [file.output for file in files])
@@ -239,14 +249,14 @@ def map_(
         if not mapped.ok:
             complain(_failure(mapped, named=count > 1))
     for path in missing:
-        complain(f"{path} was not written, because a map is missing in it")
+        complain(f"{path} was not written, because one of its surfaces has no map")
     if missing or not all(mapped.ok for mapped in found):
         raise typer.Exit(1)
 
 
 def _failure(mapped: Mapped, *, named: bool) -> str:
     outcome = mapped.record.outcome
-    kept = " (this map was written all the same: --keep-invalid)" if mapped.written else ""
+    kept = " (written anyway, because of --keep-invalid)" if mapped.written else ""
     which = f"{mapped.record.cell.mesh}: " if named else ""
     return f"{which}{outcome.status}: {outcome.cause}{kept}"
 
@@ -257,7 +267,7 @@ def _repair_of(mapped: Mapped) -> dict[str, Any]:
 
 
 def _show_all(mapped: Mapped, *, keep_invalid: bool) -> None:
-    """Print all figures of the one surface that was mapped, and where it was written."""
+    """Print all figures of a single mapped surface, and the files written."""
     from cembench.report.render.terminal import figures_table
 
     out.print(figures_table(mapped.record))
@@ -269,7 +279,7 @@ def _show_all(mapped: Mapped, *, keep_invalid: bool) -> None:
 
 
 def _show_line(mapped: Mapped, number: int, count: int) -> None:
-    """Print one of several surfaces on a line: how it ended, its figures, where it was written."""
+    """Print one of several mapped surfaces on a line: status, figures and files."""
     record = mapped.record
     metrics = record.outcome.metrics
     parts = [f"{number:>{len(str(count))}} of {count}  {record.cell.mesh}: {record.outcome.status}"]

@@ -1,4 +1,4 @@
-"""The verb that morphs surfaces into each other."""
+"""The command `morph`: morph surfaces into each other."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from cembench.core.errors import AlgorithmFailed, ParameterError
 
 
 class Pose(StrEnum):
-    """What is done to the later surfaces before the path is drawn through them."""
+    """How the later surfaces are moved before the path is drawn through them."""
 
     similarity = "similarity"
     rigid = "rigid"
@@ -37,13 +37,13 @@ class Pose(StrEnum):
 
 def morph(
     surfaces: Annotated[
-        list[str], typer.Argument(help="Two or more: mesh files, or names of `list surfaces`.")
+        list[str], typer.Argument(help="Two or more mesh files, or names from `list surfaces`.")
     ],
     *,
     landmarks: Annotated[
         Path | None,
         typer.Option(
-            help="CSV, a row each: name, vertex on the first surface, on the second, ...; or none."
+            help="CSV file, one row per landmark: name, vertex on each surface, from 0; or `none`."
         ),
     ] = None,
     output: Annotated[
@@ -53,7 +53,7 @@ def morph(
         ),
     ] = [],  # noqa: B006 - typer copies defaults
     algorithm: Annotated[
-        str, typer.Option("-a", "--algorithm", help="Any with target disk.")
+        str, typer.Option("-a", "--algorithm", help="An algorithm with target disk.")
     ] = "cem",
     parameter: Parameters = [],  # noqa: B006
     lam: Annotated[
@@ -63,7 +63,7 @@ def morph(
             min=1e-6,
             max=1e12,
             callback=finite,
-            help="Weight of the landmarks in (34).",
+            help="Weight of the landmarks in Eq. 34.",
         ),
     ] = 100.0,
     reach: Annotated[
@@ -72,33 +72,37 @@ def morph(
             min=0,
             max=1,
             callback=finite,
-            help="Radius of a landmark, in its distance to the next; 0: a vertex.",
+            help="Landmark radius, as a share of the distance to the next; 0: the vertex alone.",
         ),
     ] = 0.4,
     frames: Annotated[
-        int, typer.Option(min=2, max=100_000, help="Of the whole path; 24 a second.")
+        int, typer.Option(min=2, max=100_000, help="Number of frames, played at 24 per second.")
     ] = 48,
     views: Annotated[
-        str, typer.Option(help="Of a film, with commas.")
+        str, typer.Option(help="Views of a film, comma-separated.")
     ] = "front,side,three-quarter",
-    size: Annotated[int, typer.Option(min=64, max=2160, help="Pixels of a view's side.")] = 480,
+    size: Annotated[int, typer.Option(min=64, max=2160, help="Side of a view, in pixels.")] = 480,
     pose: Annotated[
-        Pose, typer.Option(help="Turn, move and scale the later surfaces to the first; or not.")
+        Pose,
+        typer.Option(
+            help="Fit the later surfaces to the first by rotation, shift and scale, or keep them."
+        ),
     ] = Pose.similarity,
     faces: Faces = None,
     run: Annotated[
-        Path | None, typer.Option("--run", help="Lay pictures and figures into this run's folder.")
+        Path | None, typer.Option("--run", help="Add the pictures and figures to this run.")
     ] = None,
     plugin: Plugins = [],  # noqa: B006
     timeout: Timeout = 600.0,
-    force: Annotated[bool, typer.Option("--force", help="Write over the surfaces read.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the input files.")] = False,
     as_json: Json = False,
 ) -> None:
     """Morph surfaces into each other through conformal maps (Section 6).
 
-    The first landmark goes to the centre of the disk, the others are registered by (34), and the
-    first surface's vertices are carried onto all others. Without --landmarks those are taken that
-    the surfaces have by name, as the generated faces do; with none at all, curvature aligns them.
+    The first landmark goes to the centre of the disk, the others are registered
+    by Eq. 34, and the first surface's vertices are carried onto all others. By
+    default, the named landmarks that all surfaces have are used, such as those of
+    the generated faces. Without any landmarks, curvature aligns the surfaces.
     """
     from cembench.core.outputs import refuse_inputs
     from cembench.drawing.camera import viewpoints
@@ -126,7 +130,7 @@ def morph(
     if run is not None:
         run_folder.check(run)
     if len(surfaces) < 2:
-        raise ParameterError("a morph needs two surfaces or more; name at least one other.")
+        raise ParameterError("a morph needs two surfaces or more; name at least one more.")
     registry = registry_with(plugin)
     meshes, known = [], []
     for name in surfaces:
@@ -211,7 +215,7 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
-    """The figures in words."""
+    """Print the figures."""
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     for row in figures["registrations"]:
         out.print(f"\n{row['surface']}", style="bold")
@@ -225,7 +229,7 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
             if row["landmark_error_share"] is None
             else f"{row['landmark_error_share']:.2e} of the surface's size",
             "Dirichlet energy": f"{row['dirichlet_energy']:.4f}",
-            "dilatation": "beyond numbers: a triangle nearly without area"
+            "dilatation": "not finite: a triangle has almost no area"
             if row["dilatation_max"] is None
             else f"{row['dilatation_mean']:.2f} in the mean, {row['dilatation_max']:.1f} at most",
             "folded triangles": f"{row['flipped_triangles']}",
@@ -242,7 +246,7 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     )
 
 
-#: The verb with the examples that its help shows.
+#: The command with the examples in its help.
 VERBS = (
     (
         morph,

@@ -1,7 +1,7 @@
-"""The options that several verbs share, each with its range.
+"""Options that several commands share, each with its range.
 
-What is outside a range is refused before anything is read: the upper bounds are far above what any
-machine can do, and keep sums, clocks and the system's own limits from overflowing.
+Values outside a range are refused before anything is read. The upper bounds are far above what any
+machine can do; they keep sums, clocks and system limits from overflowing.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from cembench.core.errors import ParameterError
 from cembench.results.looks import LOOKS, USUAL_PRECISION
 from cembench.results.paper.profiles import Profile
 
-#: A process that has loaded the libraries holds more than a hundred MiB before any call.
+#: A process needs more than a hundred MiB to load the libraries.
 LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
 LONGEST = 10_000_000.0
 MOST_FACES = 1_000_000_000
 
 
 def finite(value: float) -> float:
-    """Refuse NaN, which is neither below nor above a bound."""
+    """Raise on NaN, which passes any comparison with a bound."""
     if math.isnan(value):
-        raise typer.BadParameter("nan is not a number; write one within the range.")
+        raise typer.BadParameter("nan is not allowed; write a number within the range.")
     return value
 
 
@@ -36,28 +36,38 @@ Plugins = Annotated[
 ]
 Parameters = Annotated[
     list[str],
-    typer.Option("-p", "--parameter", metavar="NAME=VALUE", help="Set a parameter. Repeatable."),
+    typer.Option(
+        "-p",
+        "--parameter",
+        metavar="NAME=VALUE",
+        help="Set a parameter of the algorithm. Repeatable.",
+    ),
 ]
 Threads = Annotated[int, typer.Option(min=1, max=1024, help="Threads of the numerical libraries.")]
 Timeout = Annotated[
     float,
-    typer.Option(min=0.1, max=LONGEST, callback=finite, help="Seconds that a call may take."),
+    typer.Option(min=0.1, max=LONGEST, callback=finite, help="Time limit of a call, in seconds."),
 ]
 Memory = Annotated[
     str | None,
     typer.Option(
         metavar="SIZE",
-        help="Memory limit of a process, from 256MiB on, as 4GiB; default: 90 % of what is free.",
+        help="Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).",
     ),
 ]
-#: Each surface has bounds of its own within these.
+#: Each surface has its own, narrower bounds.
 Faces = Annotated[
-    int | None, typer.Option(min=1, max=MOST_FACES, help="Triangles of generated surfaces.")
+    int | None,
+    typer.Option(min=1, max=MOST_FACES, help="Number of triangles of generated surfaces."),
 ]
 Repeats = Annotated[
     int,
     typer.Option(
-        "--rounds", "--repeats", min=1, max=10_000, help="Rounds; fewer than 6 give no interval."
+        "--rounds",
+        "--repeats",
+        min=1,
+        max=10_000,
+        help="Number of rounds; fewer than 6 give no interval.",
     ),
 ]
 FixedRounds = Annotated[
@@ -67,27 +77,32 @@ FixedRounds = Annotated[
         "--repeats",
         min=1,
         max=10_000,
-        help="A fixed number of rounds, instead of --precision; fewer than 6 give no interval.",
+        help="Fixed number of rounds, instead of --precision; fewer than 6 give no interval.",
     ),
 ]
 Precision = Annotated[
     str | None,
     typer.Option(
         metavar="SHARE",
-        help="Measure until 95 % intervals reach so far to either side, as 5% (the default), "
-        "or 0.05.",
+        help="Measure until the half-width of the 95 % intervals is at most this share, e.g. 5% "
+        "or 0.05 (default: 5%).",
     ),
 ]
 MostRounds = Annotated[
     int,
-    typer.Option("--max-rounds", min=LOOKS[1], max=LOOKS[-1], help="At most, with --precision."),
+    typer.Option(
+        "--max-rounds",
+        min=LOOKS[1],
+        max=LOOKS[-1],
+        help="Maximum number of rounds with --precision.",
+    ),
 ]
 Budget = Annotated[
     str | None,
     typer.Option(
         metavar="TIME",
-        help="After that, as 30m, only the first 7 rounds are finished; default: 150s for `quick`, "
-        "1h for `standard`, 4h for `paper`, else 30m.",
+        help="Time after which only the first 7 rounds of each cell are completed, e.g. 30m "
+        "(default: 150s for `quick`, 1h for `standard`, 4h for `paper`, else 30m).",
     ),
 ]
 RepeatBusy = Annotated[
@@ -95,7 +110,7 @@ RepeatBusy = Annotated[
     typer.Option(
         min=0,
         max=10,
-        help="Run a process again, up to so often, beside which the machine was busy.",
+        help="Repeat a process up to N times if the machine was busy with other work.",
     ),
 ]
 Jobs = Annotated[
@@ -103,15 +118,15 @@ Jobs = Annotated[
     typer.Option(
         min=1,
         max=256,
-        help="Checks that run side by side; timed rounds never do. Default: 1, and for --set as "
-        "many as there are cores.",
+        help="Number of checks run in parallel; timed rounds always run alone (default: 1; with "
+        "--set, the number of cores).",
     ),
 ]
 Seed = Annotated[
     int, typer.Option(min=0, max=2**63 - 1, help="Seed of the random order within a round.")
 ]
 Repair = Annotated[
-    bool, typer.Option("--repair", help="Mend the mesh files first, as `cembench repair` does.")
+    bool, typer.Option("--repair", help="Repair the mesh files first, like `cembench repair`.")
 ]
 Weld = Annotated[
     float,
@@ -120,7 +135,7 @@ Weld = Annotated[
         min=0.0,
         max=1e60,
         callback=finite,
-        help="Weld vertices at most this far apart, in the file's units; 0: equal ones.",
+        help="Weld vertices up to this distance apart, in the file's units; 0: equal ones only.",
     ),
 ]
 FillHoles = Annotated[
@@ -129,16 +144,16 @@ FillHoles = Annotated[
         metavar="N",
         min=0,
         max=MOST_FACES,
-        help="Fill holes of at most N edges; the longest loop stays.",
+        help="Fill holes of at most N edges; the longest boundary loop stays open.",
     ),
 ]
 Verify = Annotated[
     bool,
-    typer.Option("--verify", help="Recompute the figures of all maps, not only of a sample."),
+    typer.Option("--verify", help="Recompute the figures of all maps, not just of a sample."),
 ]
 
 
-#: Seconds after which no cell goes on that has had its first look.
+#: Seconds after which a cell gets no rounds beyond the first look at its intervals.
 USUAL_BUDGETS = {Profile.quick: 150.0, Profile.standard: 3600.0, Profile.paper: 4 * 3600.0}
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
@@ -149,7 +164,7 @@ def precision_share(given: str) -> float:
     Raises
     ------
     ParameterError
-        It is not a share, or outside the range.
+        The text is not a share, or is outside the range.
 
     """
     text = given.strip()
@@ -159,18 +174,19 @@ def precision_share(given: str) -> float:
         number = math.nan
     if not 0.001 <= number <= 0.5:
         raise ParameterError(
-            f"--precision {given!r} is not allowed; write a share from 0.1% to 50%, as 5% or 0.05."
+            f"--precision {given!r} is not allowed; write a share from 0.1% to 50%, e.g. 5% or "
+            "0.05."
         )
     return number
 
 
 def budget_seconds(given: str | None, profile: Profile | None) -> float:
-    """Return the seconds that ``--budget`` names; those of the profile where it is not given.
+    """Return the seconds that ``--budget`` names, or the profile's budget if it is not given.
 
     Raises
     ------
     ParameterError
-        It is not a time, or outside the range.
+        The text is not a time, or is outside the range.
 
     """
     from cembench.running.local import USUAL_BUDGET
@@ -184,13 +200,13 @@ def budget_seconds(given: str | None, profile: Profile | None) -> float:
         seconds = math.nan
     if not 0 <= seconds <= LONGEST:
         raise ParameterError(
-            f"--budget {given!r} is not a time; write a number with a unit, as 90s, 30m or 2h."
+            f"--budget {given!r} is not a time; write a number with a unit, e.g. 90s, 30m or 2h."
         )
     return seconds
 
 
 def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, float | None]:
-    """Return the number of rounds and the precision of a cell: one of both, 5 % by default.
+    """Return the number of rounds and the precision of a cell; by default a precision of 5 %.
 
     Raises
     ------
@@ -200,8 +216,8 @@ def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, 
     """
     if rounds is not None and precision is not None:
         raise ParameterError(
-            "--rounds fixes the number of rounds, and --precision goes on until a figure is "
-            "precise: give one of both."
+            "--rounds fixes the number of rounds, and --precision chooses it: give only one of "
+            "them."
         )
     if rounds is not None:
         return rounds, None
@@ -209,17 +225,17 @@ def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, 
 
 
 def usual_jobs() -> int:
-    """Return how many checks run side by side where nothing is timed: one a core."""
+    """Return the number of checks that run in parallel by default: one per core."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory_bytes(given: str | None) -> int:
-    """Return the bytes that ``--memory`` names; 90 % of what is free where it is not given.
+    """Return the bytes that ``--memory`` names, or 90 % of the free memory if it is not given.
 
     Raises
     ------
     ParameterError
-        It is not a size, or outside the range.
+        The text is not a size, or is outside the range.
 
     """
     import psutil
@@ -231,7 +247,7 @@ def memory_bytes(given: str | None) -> int:
         size: int = TypeAdapter(ByteSize).validate_python(given)
     except (ValidationError, OverflowError):
         raise ParameterError(
-            f"--memory {given!r} is not a size; write a number with a unit, as 4GiB or 500MB."
+            f"--memory {given!r} is not a size; write a number with a unit, e.g. 4GiB or 500MB."
         ) from None
     if not LEAST_MEMORY <= size <= MOST_MEMORY:
         raise ParameterError(
@@ -242,26 +258,28 @@ def memory_bytes(given: str | None) -> int:
 
 
 class Solves(StrEnum):
-    """Keep a factor while its matrix stands, or factor at every solve like MATLAB's backslash."""
+    """Reuse a factorisation while its matrix is unchanged, or factor at every solve."""
 
     reuse = "reuse"
     backslash = "backslash"
 
 
 class Backend(StrEnum):
-    """The library that factors."""
+    """The libraries that factor matrices."""
 
     cvxopt = "cvxopt"
     superlu = "superlu"
     pardiso = "pardiso"
 
 
-SolvesOption = Annotated[Solves, typer.Option(help="Keep factors, or factor at every solve.")]
+SolvesOption = Annotated[
+    Solves, typer.Option(help="Reuse factorisations, or factor at every solve.")
+]
 BackendOption = Annotated[Backend, typer.Option(help="The library that factors matrices.")]
 
 
 def installed_backend(backend: Backend) -> str:
-    """Return the name of a library that factors; it must be installed."""
+    """Return the name of the chosen library; raise if it is not installed."""
     from cembench.linear_algebra.cholesky import linear_algebra
 
     with linear_algebra(backend=backend.value):

@@ -1,4 +1,4 @@
-"""The verb that measures libraries and programs of others beside our algorithms: peers."""
+"""The command `peers`: compare our algorithms with libraries and programs by others."""
 
 from __future__ import annotations
 
@@ -17,26 +17,30 @@ if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry
     from cembench.results.records import Record
 
-#: What is mapped where the user names nothing, in so many triangles.
+#: Default surfaces, and their number of triangles.
 USUAL = ("hemi-ellipsoid", "catenoid-sheet", "cylinder-sheet", "cone", "cowboy-hat", "nefertiti")
 FACES = 5000
-#: Ours to the disk that stand beside; of other targets it is all of them.
+#: Our algorithms for disks in the comparison; of other targets, all are included.
 DISKS = ("cem", "direct-cem", "harmonic-circle")
 
 
 def peers(
     *,
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006 - typer copies defaults
-    mesh_dir: Annotated[list[Path], typer.Option("--mesh-dir", help="A folder's files.")] = [],  # noqa: B006
+    mesh_dir: Annotated[
+        list[Path], typer.Option("--mesh-dir", help="All mesh files in a folder.")
+    ] = [],  # noqa: B006
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
     ] = [],  # noqa: B006
     faces: Annotated[
-        int, typer.Option(min=24, max=MOST_FACES, help="Triangles of generated surfaces.")
+        int, typer.Option(min=24, max=MOST_FACES, help="Number of triangles of generated surfaces.")
     ] = FACES,
     algorithms: Annotated[
         list[str],
-        typer.Option("-a", "--algorithms", help="Comma-separated, peers among them; default: all."),
+        typer.Option(
+            "-a", "--algorithms", help="Algorithms and peers, comma-separated (default: all)."
+        ),
     ] = [],  # noqa: B006
     plugin: Plugins = [],  # noqa: B006
     command: Command = None,
@@ -45,15 +49,16 @@ def peers(
     timeout: Timeout = 120.0,
     memory: Memory = None,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
+        Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
     ] = Path("results/peers"),
     as_json: Json = False,
 ) -> None:
-    """Measure the libraries and programs of others that are here, beside ours, and report.
+    """Compare our algorithms with installed libraries and programs by others, and report.
 
-    Those that are not on this machine are named with what brings them. One round each, so that it
-    takes minutes; --repeats 6 has the rounds that intervals need. A peer that maps badly, or fails,
-    is a result: the exit code is 1 only where one of ours does.
+    Peers that are not installed are listed with how to install them. Each cell
+    gets one round, which takes minutes; --repeats 6 gives intervals. A peer that
+    fails or maps badly is a result: the exit code is 1 only if one of our
+    algorithms fails.
     """
     from cembench.commands.progress import LiveProgress, PlainProgress
     from cembench.commands.report import make_report
@@ -100,7 +105,7 @@ def peers(
 
 
 def _usual(registry: Registry) -> list[Algorithm]:
-    """Return ours that stand beside the peers, and the peers."""
+    """Return our algorithms in the comparison, and the peers."""
     targets = {peer.target for peer in registry.peers.values()} - {"disk"}
     ours = [registry.algorithms[name] for name in DISKS if name in registry.algorithms]
     ours += [a for a in registry.algorithms.values() if a.target in targets]
@@ -112,10 +117,10 @@ def _show(records: Sequence[Record], lacking: dict[str, str]) -> None:
 
     out.print(peers_table(records))
     for name, why in lacking.items():
-        out.print(f"{name}: not here: {why}.", style="dim", markup=False, soft_wrap=True)
+        out.print(f"{name} is not available: {why}.", style="dim", markup=False, soft_wrap=True)
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         peers,

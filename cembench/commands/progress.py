@@ -1,4 +1,4 @@
-"""How far is a run? A live table on a terminal; a line at a time where there is none."""
+"""Progress of a run: a live table on a terminal, one line at a time elsewhere."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from cembench.results.records import Record
 from cembench.running.local import Step, Watcher
 from cembench.running.plan import Task
 
-#: Cells that the live table shows.
+#: Number of cells in the live table.
 _SHOWN = 12
 
 
 class Remaining:
-    """How many seconds are left? Each cell's next process is taken to last as its last one did."""
+    """Estimate of the seconds left: each cell's next process takes as long as its last one."""
 
     def __init__(self) -> None:
         self.processes = 0
@@ -31,27 +31,27 @@ class Remaining:
         self._last: dict[str, float] = {}
 
     def expect(self, processes: int) -> None:
-        """So many processes are to be run."""
+        """Set the number of processes that will be run."""
         self.processes = processes
 
     def expect_more(self, cell: str, processes: int) -> None:
-        """A cell goes on for so many processes that were not expected."""
+        """Add processes to a cell that needs more rounds."""
         self.processes += processes
         self._left[cell] = self._left.get(cell, 0) + processes
 
     def ended(self, cell: str, left: int, seconds: float) -> None:
-        """A process of a cell has taken so long; so many of it are left."""
+        """Record the seconds of a cell's process, and how many processes it has left."""
         self.done += 1
         self._left[cell] = left
         self._last[cell] = seconds
 
     def finished(self, cell: str) -> None:
-        """No more processes are run for this cell, whatever was expected."""
+        """Drop the processes still expected for this cell."""
         self.processes -= self._left.pop(cell, 0)
 
     @property
     def seconds(self) -> float | None:
-        """Of what is left; None before the first process has ended."""
+        """The estimated seconds left; None before the first process has ended."""
         if not self._last:
             return None
         known = sum(self._left.get(cell, 0) * last for cell, last in self._last.items())
@@ -60,7 +60,7 @@ class Remaining:
 
 
 class PlainProgress(Watcher):
-    """A line for each round that begins and for each cell that is finished."""
+    """Prints a line for each round that begins and each cell that is finished."""
 
     def __init__(self, console: Console, cells: int) -> None:
         self.console = console
@@ -73,33 +73,33 @@ class PlainProgress(Watcher):
         return self
 
     def __exit__(self, *error: Any) -> None:
-        """Nothing is left on the screen that would have to go."""
+        """Do nothing: there is no display to close."""
 
     def waits(self) -> None:
-        """Say so."""
-        self._say("another run measures into this folder; waiting for it to end")
+        """Print that the run waits for another one."""
+        self._say("another run is writing to this folder; waiting for it to end")
 
     def begins(self, processes: int) -> None:
-        """Know how much there is to do."""
+        """Store the number of processes."""
         self.remaining.expect(processes)
 
     def goes_on(self, task: Task, rounds: int) -> None:
-        """Expect more."""
+        """Add the processes of further rounds."""
         self.remaining.expect_more(task.cell.label, rounds)
 
     def starts(self, task: Task, step: Step) -> None:
-        """A line where a new round begins."""
+        """Print a line if a new round begins."""
         if step != self._step:
             self._step = step
             left = self.remaining.seconds
             self._say(str(step) + ("" if left is None else f", about {duration(left)} left"))
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
-        """Learn how long such a process takes."""
+        """Update the estimate of the time left."""
         self.remaining.ended(task.cell.label, rounds_left(step), seconds)
 
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
-        """A line for the cell."""
+        """Print a line for the cell."""
         self.remaining.finished(task.cell.label)
         self.finished_cells += 1
         how = "kept" if kept else record.outcome.status
@@ -112,7 +112,7 @@ class PlainProgress(Watcher):
 
 
 class LiveProgress(PlainProgress):
-    """A table of the cells that are in work, and a bar with the time that is left."""
+    """Shows a table of the cells in work, and a bar with the time left."""
 
     def __init__(self, console: Console, cells: int) -> None:
         super().__init__(console, cells)
@@ -134,7 +134,7 @@ class LiveProgress(PlainProgress):
         self._show(task, Text(str(step), style="bold"))
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
-        """Show that the step is done."""
+        """Mark the step as done."""
         super().ends(task, step, seconds)
         self._show(task, Text(f"{step} done", style="dim"))
 
@@ -173,12 +173,12 @@ class LiveProgress(PlainProgress):
 
 
 def rounds_left(step: Step) -> int:
-    """How many processes does a cell need after this step, as far as that is known?"""
+    """Return the number of processes a cell needs after this step, as far as known."""
     return step.rounds - (step.round or 0)
 
 
 def duration(seconds: float) -> str:
-    """Seconds as a person says them."""
+    """Return seconds in a readable form, such as "3 min"."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     if seconds < 90 * 60:

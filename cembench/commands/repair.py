@@ -1,4 +1,4 @@
-"""The verb `repair`: a file of triangles or polygons becomes an oriented manifold."""
+"""The command `repair`: turn triangles or polygons into an oriented manifold."""
 
 from __future__ import annotations
 
@@ -14,35 +14,38 @@ from cembench.commands.options import FillHoles, Weld
 
 
 class Keep(StrEnum):
-    """Which connected components are kept."""
+    """The connected components to keep."""
 
     largest = "largest"
     all = "all"
 
 
 def repair(
-    mesh: Annotated[Path, typer.Argument(help="Surface: OBJ, OFF, PLY, STL or MAT.")],
+    mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="The mended surface: OBJ, OFF, PLY or STL.")
+        Path,
+        typer.Option("-o", "--output", help="File for the repaired surface: OBJ, OFF, PLY or STL."),
     ],
     weld: Weld = 0.0,
     fill_holes: FillHoles = 0,
     components: Annotated[
         Keep,
-        typer.Option(help="Keep the component with most triangles, or write a file for each."),
+        typer.Option(help="Keep the component with the most triangles, or write a file for each."),
     ] = Keep.largest,
     force: Annotated[
-        bool, typer.Option("--force", help="Write over the input, or OUT_1, OUT_2 that are there.")
+        bool,
+        typer.Option("--force", help="Overwrite the input, or existing files OUT_1, OUT_2, ..."),
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Mend a surface, say what was done, and write it.
+    """Repair a surface, print what was done, and write it.
 
-    In this order: faces with missing vertices dropped, polygons cut into triangles, coincident
-    vertices welded, degenerate and duplicate triangles mended or dropped, non-manifold edges and
-    vertices split, triangles oriented alike, components chosen, ears dropped, holes filled,
-    isolated vertices removed. docs/repair.md tells how.
+    Steps, in order: faces with missing vertices dropped, polygons cut into
+    triangles, coincident vertices welded, degenerate and duplicate triangles
+    fixed or dropped, non-manifold edges and vertices split, triangles oriented
+    consistently, components chosen, ears dropped, holes filled, isolated vertices
+    removed. docs/repair.md describes each step.
     """
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.mesh.files import check_writable_format, write_mesh
@@ -51,7 +54,7 @@ def repair(
 
     check_writable_format(output, with_uv=False)
     refuse_inputs(output, [mesh], force=force)
-    with err.status("mending", spinner="line"):
+    with err.status("repairing", spinner="line"):
         found = mended(mesh, weld=weld, fill_holes=fill_holes, components=components.value)
     files = [output]
     if len(found.meshes) > 1:
@@ -84,14 +87,14 @@ def repair(
 
 
 def print_steps(steps: Mapping[str, int]) -> None:
-    """Print how often each step of a repair was taken."""
+    """Print how often each step of a repair was applied."""
     from cembench.mesh.repair import TITLES, Step
 
     for step, count in steps.items():
         out.print(f"{count:>9,}  {TITLES[Step(step)]}", style="" if count else "dim")
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         repair,

@@ -1,4 +1,4 @@
-"""The verb that writes reports, and what `reproduce` shares with it."""
+"""The command `report`, and the parts it shares with `reproduce`."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ if TYPE_CHECKING:
 
 Output = Annotated[
     Path | None,
-    typer.Option("-o", "--output", help="The report's folder; default: RUN/report."),
+    typer.Option("-o", "--output", help="The report's folder (default: RUN/report)."),
 ]
 
 
 def report(
     run: Run = DEFAULT_RUN, *, output: Output = None, verify: Verify = False, as_json: Json = False
 ) -> None:
-    """Write the paper's tables, figures and claims as a run measured them.
+    """Write a report of a run: the paper's tables, figures and claims, as measured.
 
-    The folder holds index.html (one file that works offline), report.md, report.tex, and every
-    table, figure and its data as files of their own. The four tables are shown here.
+    The folder holds index.html (one file that works offline), report.md,
+    report.tex, and each table, figure and its data as separate files. The four
+    tables are printed here too.
     """
     written, folder = make_report(run, output, verify=verify)
     if as_json:
@@ -39,7 +40,7 @@ def report(
 def make_report(
     run: Path, output: Path | None, command: str = "", *, verify: bool = False
 ) -> tuple[Report, Path]:
-    """Write a report, telling how far it is on standard error; the report and its folder."""
+    """Write a report with progress on standard error; return the report and its folder."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from cembench.report.write_report import write_report
@@ -65,7 +66,7 @@ def make_report(
 
 
 def show_report(report: Report, folder: Path) -> None:
-    """Print the paper's tables, what became of its claims, and where the report is."""
+    """Print the paper's tables, the verdicts on its claims, and the report's path."""
     from cembench.report.render.terminal_report import paper_tables
 
     out.print(paper_tables(report))
@@ -76,7 +77,7 @@ def show_report(report: Report, folder: Path) -> None:
 
 
 def summary(report: Report, folder: Path) -> dict[str, Any]:
-    """What a report holds, as JSON tells it."""
+    """Return a report's contents for JSON output."""
     from cembench.report.document import Claim, Gap, figures_of, sections_of, tables_of
 
     items = [item for _, section in sections_of(report) for item in section.items]
@@ -94,7 +95,7 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
     }
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         report,

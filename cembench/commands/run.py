@@ -1,4 +1,4 @@
-"""The verbs that look at finished runs: status, show, compare, merge, export."""
+"""The commands on existing runs: status, show, compare, merge and export."""
 
 from __future__ import annotations
 
@@ -24,9 +24,10 @@ DEFAULT_RUN = Path("results/run")
 
 
 def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = False) -> None:
-    """How far is a run, what did not end ok, and what was changed since it was measured?
+    """Show a run's progress, the cells that did not end ok, and files that were changed.
 
-    The exit code is 1 if a record or a map no longer agrees with what was written down of it.
+    The exit code is 1 if a record or a map no longer agrees with its recorded
+    figures.
     """
     from cembench.results.store import Store
     from cembench.results.verify import Depth, Kind
@@ -76,7 +77,7 @@ def _show_status(
     for state, count in sorted(about["states"].items(), key=lambda item: -item[1]):
         out.print(f"{count:>6}  {state}", style=status_style(state) if state == "ok" else "")
     if others:
-        out.print(f"{len(others):>6}  recorded besides, not asked for last")
+        out.print(f"{len(others):>6}  other records, not part of the last request")
     for cell, state in cells:
         if state.name not in ("ok", "waiting"):
             line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {state}"
@@ -86,21 +87,21 @@ def _show_status(
             note(f"{finding['record']}: {finding['detail']}")
 
 
-#: Whether a run is writing to the folder, in words; None where the lock cannot be opened.
+#: Messages on whether a run is writing to the folder; None: the lock cannot be opened.
 _MEASURING = {
     True: "a run is writing to this folder",
     False: "no run is writing to this folder",
-    None: "whether a run is writing to this folder cannot be told: it is read-only",
+    None: "the folder is read-only, so it is unknown whether a run is writing to it",
 }
 
 
 def show(
-    cell: Annotated[str, typer.Argument(help="The beginning of a key, or MESH/ALGORITHM.")],
+    cell: Annotated[str, typer.Argument(help="The start of a cell's key, or MESH/ALGORITHM.")],
     *,
     run: Annotated[Path, typer.Option("--run", help="The run's folder.")] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """All that is recorded of a cell."""
+    """Show everything that is recorded of a cell."""
     from cembench.results.record_rows import row
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records, verify_map
@@ -135,11 +136,12 @@ def _show_records(found: list[Record]) -> None:
 
 
 def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = False) -> None:
-    """What became faster or slower from one run to another?
+    """Show which cells became faster or slower from one run to another.
 
-    A rank-sum test at the 5 % level of the seconds over those of the reference kernel, which every
-    round times: so the machine's drift from one run to the other is taken out, as far as the kernel
-    feels it. To tell two algorithms apart, measure both in one run.
+    Seconds are divided by those of a reference kernel, which every round times;
+    this removes the machine's drift between the runs, as far as it affects the
+    kernel. The test is a rank-sum test at the 5 % level. To compare two
+    algorithms, measure both in one run.
     """
     from dataclasses import asdict
 
@@ -181,7 +183,7 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
     else:
         out.print(changes_table(changes))
     if differences:
-        warn("the runs were not measured under the same conditions; their seconds do not compare")
+        warn("the runs were measured under different conditions; their seconds are not comparable")
         for difference in differences:
             warn(difference)
 
@@ -189,16 +191,17 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
 def merge(
     runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
     *,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Where they come together.")],
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the merged run.")],
     force: Annotated[
-        bool, typer.Option("--force", help="Also if the output is one of the runs.")
+        bool, typer.Option("--force", help="Allow the output to be one of the runs.")
     ] = False,
     verify: Verify = False,
     as_json: Json = False,
 ) -> None:
-    """Bring the records of several runs together in one folder.
+    """Merge the records of several runs into one folder.
 
-    Of a cell that several hold, one that ended ok counts first, and then the later one.
+    If several runs hold a cell, a record that ended ok is preferred, then the
+    later one.
     """
     from cembench.results.store import Store
     from cembench.results.store import merge as merged
@@ -218,20 +221,20 @@ def merge(
     else:
         out.print(f"{count} cells in {output}", soft_wrap=True)
     if len(machines) > 1:
-        warn(f"measured in {len(machines)} environments; only ratios of one sitting compare")
+        warn(f"measured in {len(machines)} environments; compare only ratios from the same run")
 
 
 def export(
     run: Run = DEFAULT_RUN,
     *,
-    form: Annotated[Format, typer.Option("--format", help="What to write.")] = Format.csv,
+    form: Annotated[Format, typer.Option("--format", help="File format.")] = Format.csv,
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="The file; default: RUN/rows.FORMAT.")
+        Path | None, typer.Option("-o", "--output", help="Output file (default: RUN/rows.FORMAT).")
     ] = None,
     verify: Verify = False,
     as_json: Json = False,
 ) -> None:
-    """Write all records of a run as one table, a row a cell."""
+    """Write all records of a run as one table, one row per cell."""
     from cembench.report.export import export_rows
     from cembench.results.record_rows import rows
     from cembench.results.run_folder import is_own
@@ -240,7 +243,7 @@ def export(
 
     path = output or run / f"rows.{form.value}"
     if is_own(run, path):
-        raise ParameterError(f"-o {path} is a part of the run itself; name another file.")
+        raise ParameterError(f"-o {path} is one of the run's own files; name another file.")
     found = rows(sound_records(Store(run), Depth.everything if verify else Depth.records))
     export_rows(found, path, form)
     if as_json:
@@ -251,7 +254,7 @@ def export(
 
 @dataclass(frozen=True)
 class CellState:
-    """How far a cell is: a status, "waiting", "in work" or "damaged", and more in words."""
+    """State of a cell: a status, "waiting", "in work" or "damaged", and a remark."""
 
     name: str
     detail: str = ""
@@ -281,7 +284,7 @@ def _chosen(records: list[Record], wanted: str) -> list[Record]:
     return found
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (status, "Example:  cembench status results/run"),
     (show, "Examples:  cembench show face/cem  ·  cembench show 3fa9 --run results/mine"),

@@ -1,4 +1,4 @@
-"""Runs over sets of surfaces: what `run --set` reads, says and keeps."""
+"""Runs over sets of surfaces: what `run --set` reads, prints and stores."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from cembench.workflows.providers import Provided
     from cembench.workflows.sets import Gathered
 
-#: So many surfaces that cannot be measured are named on the terminal.
+#: Maximum number of surfaces named on the terminal that cannot be measured.
 NAMED = 5
 
 
 def gather(
     sets: Sequence[str], registry: Registry, chosen: Sequence[Algorithm], limit: int | None
 ) -> Gathered:
-    """Fetch and read the surfaces of the sets, and tell what cannot be measured.
+    """Fetch and read the surfaces of the sets, and print which cannot be measured.
 
     Raises
     ------
     ParameterError
-        There is no such set, or it gives no surface that can be measured.
+        A set is unknown, or none of its surfaces can be measured.
 
     """
     from cembench.commands.fetch import bars
@@ -44,7 +44,7 @@ def gather(
         note(f"{one.name} is left out: {_in_one_line(one.error)}")
     more = len(found.refused) - NAMED
     if more > 0:
-        note(f"{more} more are left out; the report names them")
+        note(f"{more} more are left out; the report lists them")
     if not found.surfaces:
         raise ParameterError(
             f"--set {', '.join(sets)} gives no surface that the chosen algorithms take; "
@@ -60,7 +60,7 @@ def _in_one_line(error: str) -> str:
 
 
 def lay_into(run: Path, found: Gathered, sets: Sequence[str]) -> None:
-    """Keep beside a run's cells what its sets gave, for the report."""
+    """Store in a run's folder which surfaces its sets gave, for the report."""
     from cembench.results.exhibits import write_exhibit
     from cembench.workflows.sets import exhibit_of
 

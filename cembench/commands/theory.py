@@ -1,4 +1,4 @@
-"""The verb that puts Section 4 of the paper to the test on a surface."""
+"""The command `theory`: test Section 4 of the paper on a surface."""
 
 from __future__ import annotations
 
@@ -18,23 +18,27 @@ if TYPE_CHECKING:
 def theory(
     meshes: Annotated[
         list[str],
-        typer.Argument(metavar="MESH...", help="Surface: a file, or a name of `list surfaces`."),
+        typer.Argument(metavar="MESH...", help="Mesh file, or a name from `list surfaces`."),
     ],
     *,
     iterations: Annotated[
-        int, typer.Option(min=20, max=1_000_000, help="Of the bare iterations (23) and (30).")
+        int,
+        typer.Option(
+            min=20, max=1_000_000, help="Iterations of (23) and (30), run without a stopping rule."
+        ),
     ] = 200,
     faces: Faces = None,
     run: Annotated[
-        Path, typer.Option("--run", "-o", "--output", help="The run that gets the exhibits.")
+        Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
     ] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """What of the paper's Section 4 holds on a surface, and to which digit?
+    """Test the statements of the paper's Section 4 on a surface.
 
-    Premises (Definition 1, signs of the weights), Theorem 2, Corollary 1, Remark 2, Theorem 3 and
-    Remark 3; spectrum of K, speed of the iteration. A statement that fails although all premises
-    hold makes the exit code 1. docs/theory.md explains the figures.
+    Tested are the premises (Definition 1, signs of the weights), Theorem 2,
+    Corollary 1, Remark 2, Theorem 3 and Remark 3; the spectrum of K and the speed
+    of the iteration are shown too. The exit code is 1 if a statement fails
+    although all premises hold. docs/theory.md explains the figures.
     """
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry
@@ -110,7 +114,7 @@ def _show_certificate(found: dict[str, Any]) -> None:
     out.print(grid([*words("four boundary points"), *figures("modulus", "off by")], rows, gap=2))
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         theory,

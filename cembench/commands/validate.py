@@ -1,4 +1,4 @@
-"""The verb that judges a solver: validate."""
+"""The command `validate`: judge a solver."""
 
 from __future__ import annotations
 
@@ -42,23 +42,36 @@ def validate(
     command: Command = None,
     program: Settings = [],  # noqa: B006 - typer copies defaults
     against: Annotated[
-        Names, typer.Option(help="Baselines; default: cem, or the usual one of the target.")
+        Names,
+        typer.Option(
+            help="Baselines, comma-separated (default: cem, or the usual one for the target)."
+        ),
     ] = [],  # noqa: B006 - typer copies defaults
-    profile: Annotated[Profile | None, typer.Option(help="Compare on these stand-ins.")] = None,
-    surfaces: Annotated[Names, typer.Option(help="Compare on these; see `list surfaces`.")] = [],  # noqa: B006
+    profile: Annotated[
+        Profile | None, typer.Option(help="Compare on the stand-ins of this profile.")
+    ] = None,
+    surfaces: Annotated[
+        Names, typer.Option(help="Compare on these surfaces (see `list surfaces`).")
+    ] = [],  # noqa: B006
     mesh: Annotated[list[Path], typer.Option(help="Compare on this file. Repeatable.")] = [],  # noqa: B006
-    mesh_dir: Annotated[list[Path], typer.Option(help="Compare on a folder's files.")] = [],  # noqa: B006
+    mesh_dir: Annotated[
+        list[Path], typer.Option(help="Compare on all mesh files in a folder.")
+    ] = [],  # noqa: B006
     faces: Annotated[
         int | None,
         typer.Option(
-            min=24, max=MOST_FACES, help="Triangles of a named surface; unnamed ones have 5,000."
+            min=24,
+            max=MOST_FACES,
+            help="Number of triangles of the --surfaces; the default surfaces have 5,000.",
         ),
     ] = None,
     repeats: Repeats = DEFAULT_ROUNDS,
     up_to: Annotated[
         int,
         typer.Option(
-            min=0, max=MOST_FACES, help="Triangles up to which growth is measured; 0: not."
+            min=0,
+            max=MOST_FACES,
+            help="Triangles of the largest mesh in the scaling stage; 0: skip it.",
         ),
     ] = 30_000,
     parameter: Parameters = [],  # noqa: B006
@@ -66,26 +79,27 @@ def validate(
         list[Requirement],
         typer.Option(
             metavar="WHAT",
-            help="Exit with 1 unless also: faster, not-slower, better, not-worse, no-folds. "
-            "Repeatable.",
+            help="Exit with 1 unless the solver also is: faster, not-slower, better, not-worse, "
+            "no-folds. Repeatable.",
         ),
     ] = [],  # noqa: B006
     checks_only: Annotated[
-        bool, typer.Option("--checks-only", help="Contract and correctness, no timing.")
+        bool,
+        typer.Option("--checks-only", help="Check contract and correctness only, without timing."),
     ] = False,
     timeout: Timeout = 120.0,
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Keep JSON, HTML and the runs in this folder."),
+        typer.Option("-o", "--output", help="Write JSON, HTML and the runs to this folder."),
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Is this solver right, and is it better and faster than what there is?
+    """Check whether a solver is correct, and compare its quality and speed with baselines.
 
-    Four stages, each reached only if the ones before found no fault: the contract, correctness on
-    surfaces whose map is known, quality and speed beside a baseline, growth of the seconds.
-    Exit code 0: valid, and what was required holds; 1: not; 2: wrong usage.
-    docs/write_a_solver.md shows it at work.
+    There are four stages, each run only if the ones before found no fault: the
+    contract, correctness on surfaces with a known map, quality and speed against
+    a baseline, and growth of time with size. Exit code 0: valid, and --require is
+    met; 1: not; 2: wrong usage. docs/write_a_solver.md has an example.
     """
     from cembench.core import extras, folders
     from cembench.running.local import Options
@@ -146,22 +160,20 @@ def _chosen(
     folders: list[Path],
     faces: int | None,
 ) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
-    """The surfaces that the user names, none for the usual ones; and what they stand for."""
+    """Return the surfaces the user names (none: the default ones), and their roles in the paper."""
     from cembench.results.paper.profiles import surfaces_of
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     files = [*files, *(file for folder in folders for file in mesh_files(folder))]
     names = [*(surfaces_of(profile, registry) if profile else []), *split(surfaces)]
     found, standing = gather_surfaces(registry, [algorithm], files, names, faces)
-    plan_cells(
-        [algorithm], found, {}, MeasurementSettings()
-    )  # complains now of what it could not run on later
+    plan_cells([algorithm], found, {}, MeasurementSettings())  # fail now, not after the checks
     return found, standing
 
 
 @contextmanager
 def _folder(output: Path | None) -> Iterator[Path]:
-    """Where the runs go: the user's folder, or one that is gone in the end."""
+    """Yield the folder for the runs: the user's, or a temporary one."""
     from cembench.core import folders
 
     if output is not None:
@@ -173,7 +185,7 @@ def _folder(output: Path | None) -> Iterator[Path]:
 
 
 def _telling() -> ValidationHooks:
-    """A line for each stage, and the progress of what is timed."""
+    """Return hooks that print a line for each stage and the progress of timing."""
     from cembench.commands.progress import LiveProgress, PlainProgress
     from cembench.validation.examine import ValidationHooks
 
@@ -184,14 +196,14 @@ def _telling() -> ValidationHooks:
 
 
 def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:
-    """The data, and what is said of it."""
+    """Return the validation as data for JSON output."""
     from cembench.validation.verdict import sentence
 
     said = {"valid": found.valid, "passed": found.passed, "verdict": sentence(found)}
     return said | found.model_dump(mode="json") | written
 
 
-#: Each verb with the examples that its help shows.
+#: Each command with the examples in its help.
 VERBS = (
     (
         validate,

@@ -1,10 +1,10 @@
-"""What a report holds, whatever it is rendered to.
+"""The contents of a report, independent of its output format.
 
-A number is made once, as a :class:`Value` with its origin and the record it was read from;
-Markdown, LaTeX, CSV, HTML and the terminal only print it. Figures are files beside their data.
+A number is made once, as a :class:`Value` with its origin and the record it was read from.
+Markdown, LaTeX, CSV, HTML and the terminal only print it. Figures are files with their data.
 
-What lies in a report's folder, whoever writes it: :func:`csv_of` and :func:`tex_of` say where a
-table is, a figure's paths are its own, and ``records.csv`` holds every record as a row.
+Files in a report's folder: :func:`csv_of` and :func:`tex_of` give the paths of a table, a figure
+holds its own paths, and ``records.csv`` has every record as a row.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any, Literal, TypeAlias
 
-#: Where a figure comes from; a table never puts two of these into one column without a mark.
+#: Origin of a number; a table never mixes two origins in a column without a mark.
 Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
 
-#: What a reader is told of an origin, and the mark behind a number of it.
+#: Description of each origin, and the mark after its numbers.
 ORIGINS: Mapping[Origin, tuple[str, str]] = {
     "printed": ("printed in the paper", "ᵖ"),
     "model": ("measured here on the paper's own model", "ᵐ"),
@@ -26,7 +26,7 @@ ORIGINS: Mapping[Origin, tuple[str, str]] = {
     "derived": ("computed from other figures of this report", ""),
 }
 
-#: Does a claim of the paper hold in this run?
+#: Verdict on a claim of the paper.
 Verdict = Literal[
     "holds", "holds in part", "does not hold here", "not tested here", "too few rounds"
 ]
@@ -39,15 +39,15 @@ class Value:
     Parameters
     ----------
     text : str
-        As it is printed, in every form of the report.
+        The text printed in every form of the report.
     number : float or None
-        The same with full precision, by which a column is sorted; None for words and gaps.
+        The same with full precision, for sorting; None for words and gaps.
     origin : Origin
-        Where the number comes from.
+        Origin of the number.
     record : str
-        Key of the record that it was read from; empty for printed and derived ones.
+        Key of its record; empty for printed and derived numbers.
     why : str
-        Why there is no number, or what is to be known of it (a misprint, an unstable time).
+        Why there is no number, or a remark on it (a misprint, an unstable time).
 
     """
 
@@ -60,7 +60,7 @@ class Value:
 
 @dataclass(frozen=True)
 class Column:
-    """A column; neighbours of equal `group` stand under one heading.
+    """A column; neighbours with the same `group` share a heading.
 
     In a table of the paper, `group` is the algorithm and `title` is "printed" or "here".
     """
@@ -73,20 +73,20 @@ class Column:
 
 @dataclass(frozen=True)
 class Table:
-    """A table; `name` is its file name and anchor, `rows` are as long as `columns`."""
+    """A table; `name` is its file name and anchor, and each row has an entry per column."""
 
     name: str
     title: str
     columns: tuple[Column, ...]
     rows: tuple[tuple[Value, ...], ...]
     caption: str = ""
-    #: Below the table: how many surfaces an aggregate runs over, misprints, causes of gaps.
+    #: Notes below the table: numbers of surfaces in aggregates, misprints, causes of gaps.
     notes: tuple[str, ...] = ()
-    #: The one among the notes that names surfaces which the run lacks; empty where it lacks none.
+    #: The note on surfaces missing in the run; empty if there are none.
     absent: str = ""
-    #: Those among the notes that tell where a cause holds, by the cause, as `Value.why` has it.
+    #: The notes that list the places of a cause, by the cause (`Value.why`).
     places: Mapping[str, str] = field(default_factory=dict)
-    #: Rows at the end that hold aggregates; sorting leaves them where they are.
+    #: Number of aggregate rows at the end, which are not sorted.
     footer_rows: int = 0
 
 
@@ -97,15 +97,15 @@ class Figure:
     Parameters
     ----------
     files : tuple of PurePosixPath
-        The same figure in each form it has: PNG, SVG, PDF; the first one is shown.
+        The figure in each of its formats (PNG, SVG, PDF); the first one is shown.
     data : PurePosixPath or None
-        The CSV that it was drawn from.
+        The CSV file with its data.
     plot : mapping or None
-        The same as a Plotly figure in JSON, for forms that can be zoomed; None for pictures.
+        The same as a Plotly figure in JSON, for interactive forms; None for pictures.
     alternative : str
-        What a reader who cannot see it should know.
+        Text for readers who cannot see it.
     paper : str
-        The paper's figure that it regenerates, as "Figure 8"; empty for others.
+        The paper's figure that it reproduces, e.g. "Figure 8"; empty for others.
 
     """
 
@@ -121,9 +121,9 @@ class Figure:
 
 @dataclass(frozen=True)
 class Gallery:
-    """Figures that are looked at side by side: one surface, a picture for every algorithm.
+    """Figures shown side by side: one surface, with a picture for every algorithm.
 
-    `scene` is the same to be turned, for forms that can (:mod:`cembench.drawing.view_scene`).
+    `scene` is an interactive 3-D version (:mod:`cembench.drawing.view_scene`).
     """
 
     name: str
@@ -135,20 +135,20 @@ class Gallery:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper's text, put to the test.
+    """A claim of the paper's text with its test.
 
     Parameters
     ----------
     name : str
         Anchor.
     sentence, place : str
-        The paper's words, and where they stand.
+        The paper's words and their place.
     test : str
-        How it is tested here.
+        How the claim is tested here.
     figures : str
-        What came out, with n.
+        Result of the test, with n.
     remark : str
-        What is to be known of the verdict: on what it was tested, and on what not.
+        Remarks on the verdict, such as the surfaces it was tested on.
 
     """
 
@@ -163,7 +163,7 @@ class Claim:
 
 @dataclass(frozen=True)
 class Gap:
-    """Something that has a place in the report but is not there; `command` would make it."""
+    """A missing item of the report; `command` would make it."""
 
     title: str
     why: str
@@ -182,7 +182,7 @@ Item: TypeAlias = "Table | Figure | Gallery | Claim | Gap | Text"
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the report; `page` gives it a page of its own where a form has pages."""
+    """A part of the report; with `page`, it has its own page in forms with pages."""
 
     name: str
     title: str
@@ -193,7 +193,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Finding:
-    """A figure that a run found, and what it is of."""
+    """A key figure of a run, with its description."""
 
     number: str
     words: str
@@ -201,9 +201,9 @@ class Finding:
 
 @dataclass(frozen=True)
 class Findings:
-    """What a run found, for the head of its report.
+    """The key findings of a run, for the head of its report.
 
-    `picture` and `plot` are figures that stand in the report too.
+    `picture` and `plot` also occur in the report.
     """
 
     sentence: str
@@ -216,48 +216,48 @@ class Findings:
 class Report:
     """A whole report.
 
-    `command` is the one that makes it again; `facts` are what stands at its head (machine, date,
-    versions, cells by status) as pairs of words.
+    `command` makes the report again; `facts` are shown at its head (machine, date, versions, cells
+    by status), as pairs of texts.
     """
 
     title: str
     command: str
     facts: tuple[tuple[str, str], ...]
     sections: tuple[Section, ...]
-    #: Records by key, as rows (cembench.results.record_rows), to which the values link.
+    #: Records by key, as rows (cembench.results.record_rows), that the values link to.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
 
 
 def missing(why: str, text: str = "-") -> Value:
-    """A gap in a table; `why` says why there is no number."""
+    """Return a gap in a table; `why` says why there is no number."""
     return Value(text, why=why)
 
 
 def words(text: str) -> Value:
-    """An entry that is no number."""
+    """Return an entry that is not a number."""
     return Value(text)
 
 
 def marked(value: Value, column: Column) -> str:
-    """The text with the mark of its origin; none where the column's heading says "printed"."""
+    """Return the text with the mark of its origin, unless the heading says "printed"."""
     mark = ORIGINS[value.origin][1] if value.origin else ""
     says = value.origin == "printed" and column.title.startswith("printed")
     return value.text if says or value.number is None else value.text + mark
 
 
 def csv_of(table: Table) -> PurePosixPath:
-    """Where is a table's CSV, relative to the report's folder?"""
+    """Return the path of a table's CSV, relative to the report's folder."""
     return PurePosixPath("tables", f"{table.name}.csv")
 
 
 def tex_of(table: Table) -> PurePosixPath:
-    """Where is a table's LaTeX, relative to the report's folder?"""
+    """Return the path of a table's LaTeX, relative to the report's folder."""
     return PurePosixPath("tables", f"{table.name}.tex")
 
 
 def sections_of(report: Report) -> Iterator[tuple[int, Section]]:
-    """All sections in the order of reading, each with its depth from 1."""
+    """Yield all sections in reading order, each with its depth from 1."""
 
     def below(depth: int, sections: tuple[Section, ...]) -> Iterator[tuple[int, Section]]:
         for section in sections:
@@ -268,19 +268,19 @@ def sections_of(report: Report) -> Iterator[tuple[int, Section]]:
 
 
 def tables_of(report: Report) -> Iterator[Table]:
-    """All tables in the order of reading."""
+    """Yield all tables in reading order."""
     for _, section in sections_of(report):
         yield from (item for item in section.items if isinstance(item, Table))
 
 
 def galleries_of(report: Report) -> Iterator[Gallery]:
-    """All galleries in the order of reading."""
+    """Yield all galleries in reading order."""
     for _, section in sections_of(report):
         yield from (item for item in section.items if isinstance(item, Gallery))
 
 
 def figures_of(report: Report) -> Iterator[Figure]:
-    """All figures in the order of reading, also those of galleries."""
+    """Yield all figures in reading order, including those of galleries."""
     for _, section in sections_of(report):
         for item in section.items:
             if isinstance(item, Figure):

@@ -1,4 +1,4 @@
-"""A run as one file, for whatever reads tables: CSV, Parquet or JSON."""
+"""Export a run as one table: CSV, Parquet or JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cembench.core.extras import Extra, require
 
 
 class Format(StrEnum):
-    """What a run can be exported as."""
+    """Export formats."""
 
     csv = "csv"
     parquet = "parquet"
@@ -25,17 +25,17 @@ Rows = Sequence[dict[str, Any]]
 
 
 def export_rows(rows: Rows, path: Path, form: Format) -> None:
-    """Write rows of :func:`cembench.results.record_rows.rows` to a file, whole or not at all.
+    """Write the rows of :func:`cembench.results.record_rows.rows` to a file.
 
-    In CSV lists and dictionaries are JSON in a cell. In Parquet lists are lists, and dictionaries,
-    whose keys differ from row to row, are JSON.
+    In CSV, lists and dictionaries are written as JSON. In Parquet, lists stay lists; dictionaries,
+    whose keys differ from row to row, are written as JSON. No partial file is left.
 
     Raises
     ------
     MissingExtra
-        Parquet without pyarrow.
+        Parquet is requested, but pyarrow is not installed.
     RecordError
-        The place cannot be written to.
+        The file cannot be written.
 
     """
     exporters: dict[Format, Callable[[Rows, Any], None]] = {

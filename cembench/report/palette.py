@@ -1,7 +1,7 @@
-"""One colour, marker and dash for each algorithm, the same in every plot of every report.
+"""The colour, marker and dash of each algorithm, the same in every plot of every report.
 
-The colours are those of Okabe and Ito, which stay apart for the colour-blind; markers and dashes
-keep them apart in print without colour.
+The colours are those of Okabe and Ito, which the colour-blind can distinguish; markers and dashes
+distinguish them in print without colour.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SeriesStyle:
-    """A colour; a marker and a dash, each in the words of matplotlib and of Plotly."""
+    """A colour, and a marker and a dash, each as named by matplotlib and by Plotly."""
 
     colour: str
     marker: tuple[str, str] = ("o", "circle")
@@ -38,10 +38,10 @@ _MORE = tuple(
         ("#a0405f", ("*", "star"), ("-", "solid")),
     )
 )
-#: What is not an algorithm: bounds, fits, the paper's own figures.
+#: Style of series that are not algorithms: bounds, fits, the paper's own figures.
 PLAIN = SeriesStyle("#6b7683", ("o", "circle"), (":", "dot"))
-#: Phases of a measured call and other parts of a whole, and what is left over: paler than the
-#: colours of algorithms, and none of them, since both stand in one legend.
+#: Colours for the phases of a call and for the remainder: paler than those of algorithms and
+#: different from them, because both occur in one legend.
 PARTS = (
     "#77aadd",
     "#ee8866",
@@ -60,6 +60,6 @@ REST = "#b3b9c0"
 
 
 def looks(names: Sequence[str]) -> dict[str, SeriesStyle]:
-    """A look for each name: the usual one for algorithms that are known, others in turn."""
+    """Return a style for each name: fixed for known algorithms, others in turn."""
     others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
     return _KNOWN | {name: _MORE[k % len(_MORE)] for k, name in enumerate(others)}

@@ -1,4 +1,4 @@
-"""Pictures as parts of a page that travels alone: small enough to send, and no file beside it."""
+"""Embed pictures in a self-contained page that is small enough to send."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from scipy import ndimage
 
 from cembench.core.errors import RenderError
 
-#: Pixels of all pictures of a page together: at 0.13 bytes each (small pictures of meshes and
-#: checkerboards; large and smooth ones take half) about 2.5 MB, and a third more as text.
+#: Maximum pixels of all pictures of a page together: at 0.13 bytes each (for small pictures of
+#: meshes and checkerboards; large, smooth ones take half) about 2.5 MB, and a third more as text.
 PIXELS = 12_000_000
-#: Pixels along the longer side of one picture, and what a thumbnail has.
+#: Pixels along the longer side of a picture, and of a thumbnail.
 LONGEST, THUMBNAIL = 1600, 360
-#: Quality of WebP at which a checkerboard's edges are still clean.
+#: WebP quality at which the edges of a checkerboard are still clean.
 QUALITY = 76
-#: A pixel whose channels are all as bright as this is the white that a picture stands on.
+#: A pixel with all channels at least this bright is white background.
 WHITE = 234
-#: What is smaller than this share of a picture and lies alone on its ground is JPEG's doing.
+#: Isolated spots below this share of a picture are JPEG artefacts.
 SPECK = 2e-4
-#: Bytes up to which a vector graphic is embedded as it is; one of many marks outgrows its pixels.
+#: Maximum bytes of an embedded vector graphic; one with many marks is larger than its pixels.
 VECTOR_BYTES = 55_000
-#: CSS pixels of the units that an SVG's size is given in.
+#: CSS pixels per unit of an SVG's size.
 _SVG_UNITS = {"pt": 4 / 3, "px": 1.0, "": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54}
 
 
 @dataclass(frozen=True)
 class Embedded:
-    """A picture as a data URI, with the width and height it asks for, in pixels."""
+    """A picture as a data URI, with its width and height in pixels."""
 
     uri: str
     width: int
@@ -42,14 +42,14 @@ class Embedded:
 
 
 def data_uri(content: bytes, media_type: str) -> str:
-    """Content as an address that holds it."""
+    """Return content as a data URI."""
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
 def pixel_cap(sizes: Sequence[tuple[int, int]], budget: int = PIXELS) -> float:
-    """How many pixels may each picture keep, so that all together keep within the budget?
+    """Return the maximum pixels per picture that keeps all together within the budget.
 
-    Small pictures keep all they have; what they leave is shared equally by the others.
+    Small pictures keep all their pixels; the rest of the budget is shared equally by the others.
     """
     areas = sorted(width * height for width, height in sizes)
     left = float(budget)
@@ -62,7 +62,7 @@ def pixel_cap(sizes: Sequence[tuple[int, int]], budget: int = PIXELS) -> float:
 
 
 def size_of(path: Path) -> tuple[int, int]:
-    """Width and height of a picture's file in pixels."""
+    """Return the width and height of a picture file in pixels."""
     try:
         with Image.open(path) as picture:
             return picture.size
@@ -71,12 +71,12 @@ def size_of(path: Path) -> tuple[int, int]:
 
 
 def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool) -> Embedded:
-    """A PNG or JPEG as WebP of at most `cap` pixels; `exact` for plots, whose lines stay clean.
+    """Return a PNG or JPEG as WebP of at most `cap` pixels; `exact` keeps the lines of plots clean.
 
     Raises
     ------
     RenderError
-        The file is not there, or is no picture.
+        The file does not exist, or is not a picture.
 
     """
     try:
@@ -96,9 +96,9 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
 
 
 def on_any_ground(picture: Image.Image) -> Image.Image:
-    """Make the white that a picture stands on transparent, so that it stands on a dark page too.
+    """Make the white background of a picture transparent, for dark pages.
 
-    White inside, which no way over white joins with the rim, stays.
+    White areas that are not connected to the border stay white.
     """
     pixels = np.asarray(picture)
     white = pixels.min(axis=2) >= WHITE
@@ -114,7 +114,7 @@ def on_any_ground(picture: Image.Image) -> Image.Image:
 
 
 def embed_vector(path: Path) -> Embedded | None:
-    """An SVG as it is; None if it is too large for that or does not say its size."""
+    """Return an SVG unchanged; None if it is too large or does not state its size."""
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -136,7 +136,7 @@ def _svg_side(head: str, side: str) -> float | None:
 
 
 def unreadable(path: Path, error: OSError) -> RenderError:
-    """What to say of a file that a report names and that cannot be read."""
+    """Return the error for an unreadable file of a report."""
     return RenderError(
         f"The report names {path}, which cannot be read: {error.strerror or error}. "
         "Its figures are written before its pages; write the whole report again."

@@ -1,8 +1,8 @@
-"""A plot as data, drawn by several hands.
+"""Plots as data, drawn by matplotlib and by Plotly.
 
-A :class:`Plot` holds what is to be seen and nothing of how; :func:`write_plot` draws it with
-matplotlib (PNG, SVG, PDF), lays its data beside it (CSV), and describes it for Plotly, all from
-the same values. The same plot gives the same bytes.
+A :class:`Plot` holds the contents of a plot, independent of the renderer. :func:`write_plot` draws
+it with matplotlib (PNG, SVG, PDF), writes its data (CSV), and describes it for Plotly, all from the
+same values. The same plot gives the same bytes.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from cembench.core.atomic import write_bytes, write_text
 from cembench.report.document import Figure
 from cembench.report.palette import PLAIN, SeriesStyle
 
-#: How a series is drawn: points joined or not, a staircase, bars side by side or on one another.
+#: How a series is drawn: points, joined points, a staircase, or bars side by side or stacked.
 Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
 
 
 @dataclass(frozen=True)
 class PlotSeries:
-    """Values of one thing; `x` are numbers or names, `words` what is told of each point.
+    """A series of values; `x` are numbers or names, `words` the tooltip of each point.
 
-    What is stacked stands on names.
+    Stacked series have names as `x`.
     """
 
     name: str
@@ -44,12 +44,12 @@ class PlotSeries:
     kind: Kind
     look: SeriesStyle = PLAIN
     words: Sequence[str] = ()
-    #: Shown in the legend; one of several series of one name is enough.
+    #: Whether it is in the legend; one of several series with the same name is enough.
     named: bool = True
 
 
 class Point(NamedTuple):
-    """A point with what is told of it."""
+    """A point with its tooltip."""
 
     x: float
     y: float
@@ -59,14 +59,14 @@ class Point(NamedTuple):
 def through(
     name: str, points: Sequence[Point], kind: Kind, look: SeriesStyle = PLAIN
 ) -> PlotSeries:
-    """A series of points that have words."""
+    """Return a series of points with their tooltips."""
     x, y = [p.x for p in points], [p.y for p in points]
     return PlotSeries(name, x, y, kind, look, [p.words for p in points])
 
 
 @dataclass(frozen=True)
 class Axis:
-    """Words with the unit, and the scale."""
+    """An axis: its label with unit, and its scale."""
 
     title: str
     log: bool = False
@@ -97,16 +97,16 @@ class Plot:
     columns: int = 2
 
 
-#: Inches of a panel; dots an inch of the PNG.
+#: Size of a panel in inches; resolution of the PNG in dots per inch.
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
-#: A logarithmic axis over less than this factor has ticks at 2 and 5 too.
+#: A logarithmic axis that spans less than this factor has ticks at 2 and 5 too.
 DECADES = 300
-#: From here on a tick of a logarithmic axis is written as a power of ten.
+#: From here on, ticks of a logarithmic axis are written as powers of ten.
 LARGE = 10_000_000
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
-#: The most steps between ticks on an axis of whole numbers.
+#: Maximum number of ticks on an axis of integers.
 TICKS = 8
-#: The same bytes at any time: identifiers from a fixed salt, no date. Words in SVG stay words.
+#: Reproducible output: fixed salt for identifiers, no date. Text in SVG stays text.
 _STYLE: Any = {
     "svg.hashsalt": "cembench",
     "svg.fonttype": "none",
@@ -129,7 +129,7 @@ _NO_DATE = {
 
 
 def write_plot(plot: Plot, folder: Path) -> Figure:
-    """Draw a plot into ``folder/figures``; the report's figure, with its files and its data."""
+    """Draw a plot into ``folder/figures``; return the report's figure with its files and data."""
     place = folder / "figures"
     files = []
     for form, content in _drawn(plot).items():
@@ -149,7 +149,7 @@ def write_plot(plot: Plot, folder: Path) -> Figure:
 
 
 def data_of(plot: Plot) -> str:
-    """The plotted values as CSV: a line a point."""
+    """Return the plotted values as CSV, one line per point."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["panel", "series", "x", "y", "about"])
@@ -166,7 +166,7 @@ def _plain(value: Any) -> Any:
 
 
 def _drawn(plot: Plot) -> dict[str, bytes]:
-    """The files' contents by form, PNG first."""
+    """Return the contents of the files by format, PNG first."""
     columns = min(plot.columns, len(plot.panels))
     rows = -(-len(plot.panels) // columns)
     tall = max((_names_room(panel) for panel in plot.panels), default=0.0)
@@ -179,7 +179,7 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
         for k, panel in enumerate(plot.panels):
             _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
         _draw_legend(canvas)
-        canvas.draw_without_rendering()  # arranges the parts, once for all forms
+        canvas.draw_without_rendering()  # lays out the parts, once for all formats
         canvas.set_layout_engine("none")
         contents = {}
         for form in ("png", "svg", "pdf"):
@@ -190,7 +190,7 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
 
 
 def _with_few_colours(png: bytes) -> bytes:
-    """The same picture with a table of colours: less than half as large."""
+    """Return the same picture with a colour palette, less than half as large."""
     buffer = io.BytesIO()
     with Image.open(io.BytesIO(png)) as picture:
         few = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
@@ -199,7 +199,7 @@ def _with_few_colours(png: bytes) -> bytes:
 
 
 def _names_room(panel: PlotPanel) -> float:
-    """Inches for names that stand upright below the axis."""
+    """Return the inches needed for vertical names below the axis."""
     names = [x for series in panel.series for x in series.x if isinstance(x, str)]
     return min(0.055 * max(map(len, names), default=0), 1.3) if len(set(names)) > 4 else 0.0
 
@@ -260,7 +260,7 @@ def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
 
 
 def _tick(value: float) -> str:
-    """A power of ten, or 2 or 5 times one, as a person writes it."""
+    """Return a readable label for a power of ten, or 2 or 5 times one."""
     if value >= LARGE:
         exponent = int(np.log10(value) + 1e-9)
         factor = round(value / 10.0**exponent)
@@ -287,7 +287,7 @@ def _draw_legend(canvas: Canvas) -> None:
 
 
 def plotly_of(plot: Plot) -> dict[str, Any]:
-    """The same as a Plotly figure: ``data`` and ``layout``, values that JSON can hold."""
+    """Return the plot as a Plotly figure: ``data`` and ``layout``, ready for JSON."""
     columns = min(plot.columns, len(plot.panels))
     rows = -(-len(plot.panels) // columns)
     data: list[dict[str, Any]] = []
@@ -339,7 +339,7 @@ def _plotly_axis(axis: Axis) -> dict[str, Any]:
 
 
 def _counts(panel: PlotPanel) -> bool:
-    """Whether a panel is over whole numbers, as of iterations: nothing is at one half."""
+    """Whether a panel's x are integers, such as iterations, which need no ticks at halves."""
     return not panel.x.log and all(isinstance(x, int) for s in panel.series for x in s.x)
 
 

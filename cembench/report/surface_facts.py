@@ -1,7 +1,7 @@
-"""What is known of a registered surface: its counts, how hard it is to flatten, and how it looks.
+"""Facts of a registered surface: counts, difficulty of flattening, and a thumbnail.
 
-A surface that is kept on disk once it has been made has its facts and a thumbnail beside it, so
-that they are there at once the next time.
+For a surface that is kept on disk, its facts and a thumbnail are stored with it,
+so that they are available at once the next time.
 """
 
 from __future__ import annotations
@@ -28,21 +28,21 @@ from cembench.results.records import MeshFacts
 from cembench.running.plan import generate_surface, mesh_facts, paper_roles
 from cembench.running.sources import code_hash
 
-#: Whose map tells how unevenly a surface is scaled when it is flattened.
+#: The algorithm whose map measures how unevenly a surface is scaled.
 MAPPED_BY = "cem"
-#: How far a stand-in's counts may be from its row's (relative).
+#: Tolerance of a stand-in's counts, relative to its row.
 FACES_OFF, BOUNDARY_OFF = 0.01, 0.10
 
 
 class SurfaceFacts(BaseModel):
-    """A surface at its own size, and a conformal map of it to the disk."""
+    """Facts of a surface at its own size, and of its conformal map to the disk."""
 
     mesh: MeshFacts
     mesh_hash: str
-    #: Source of the algorithm that made the map: of another one the facts are not these.
+    #: Hash of the algorithm that made the map; facts by another version are not used.
     code_hash: str
     iterations: int | None
-    #: Of the map (cembench.conformal.metrics).
+    #: Metrics of the map (cembench.conformal.metrics).
     metrics: dict[str, float | int]
     #: See :func:`factor_spans`.
     conformal_factor_span: float
@@ -52,7 +52,7 @@ class SurfaceFacts(BaseModel):
 
 
 def kept_facts(registry: Registry, surface: Surface) -> SurfaceFacts | None:
-    """What was found of this surface before? None: nothing, or nothing that still holds."""
+    """Return the stored facts of this surface; None if there are none or they are out of date."""
     if surface.kept is None:
         return None
     place = _place(surface)
@@ -60,23 +60,23 @@ def kept_facts(registry: Registry, surface: Surface) -> SurfaceFacts | None:
         return None
     try:
         facts = read_model(place, SurfaceFacts)
-    except (RecordError, OSError):  # damaged, of another version or another user: found anew
+    except (RecordError, OSError):  # damaged, or from another version or user: compute again
         return None
     held = facts.code_hash == code_hash(_mapper(registry)) and Path(facts.thumbnail).is_file()
     return facts if held else None
 
 
 def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
-    """Make a surface, map it, draw it, and keep what was found beside it.
+    """Make a surface, map it, draw it, and store its facts.
 
     Raises
     ------
     RegistryError
-        A surface that is not kept on disk.
+        The surface is not kept on disk.
     RecordError
-        The place where it is kept cannot be written to.
+        The cache cannot be written.
     MeshError, AlgorithmFailed, RenderError
-        It cannot be made, mapped, or drawn.
+        The surface cannot be made, mapped, or drawn.
 
     """
     if surface.kept is None:
@@ -106,9 +106,9 @@ def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
 
 
 def factor_spans(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, float]:
-    """How unevenly does a map scale lengths: largest over smallest factor of a triangle?
+    """Return how unevenly a map scales lengths: the largest over the smallest factor.
 
-    The factor is the root of image area over surface area, a ratio of lengths.
+    The factor of a triangle is the square root of image area over surface area, a ratio of lengths.
     `conformal_factor_span` is the ratio of the extremes, `conformal_factor_span_99_8` that of the
     99.9 and 0.1 percentiles over the triangles.
     """
@@ -124,7 +124,7 @@ def factor_spans(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, fl
 
 
 def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
-    """How near does a surface come to its row of the paper's Table 2? None: it has no row.
+    """Return how well a surface matches its row of the paper's Table 2; None without a row.
 
     Deviations are relative to the row's counts; a disk with V vertices and F triangles has
     2 V - F - 2 vertices on its boundary.
@@ -153,7 +153,7 @@ def _place(surface: Surface) -> Path:
 
 
 def _check_writable(folder: Path) -> None:
-    """Raise before minutes are spent on what could not be kept."""
+    """Raise if the cache cannot be written, before minutes of work."""
     reason = "" if os.access(folder, os.W_OK) or not folder.exists() else "no permission"
     try:
         folder.mkdir(parents=True, exist_ok=True)

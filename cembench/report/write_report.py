@@ -1,4 +1,4 @@
-"""A run becomes a folder: every form of its report, with figures and data.
+"""Write a run's report in all its forms, with figures and data.
 
 ::
 
@@ -8,7 +8,7 @@
     tables/*.csv tables/*.tex
     figures/                   plots as PNG, SVG, PDF and their data as CSV; pictures as JPEG
     records.csv                every record as a row
-    contents.json              which of the folder's files are the report's, with their hashes
+    contents.json              the report's own files with their hashes
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ def write_report(
 ) -> Report:
     """Write the report of a run in all its forms.
 
-    Everything is made in a folder of its own and moved when it is complete; files of an earlier
-    report that this one does not have are removed, unless somebody has changed them; other files
-    are left alone.
+    Everything is made in a separate folder and moved when it is complete. Files of an earlier
+    report that this one does not have are removed, unless they were changed; other files are left
+    alone.
 
     Raises
     ------
     MissingExtra
-        What only reports need is not installed.
+        A package for reports is not installed.
     RecordError
-        The folder `run` holds no run, or no record; `folder` holds other files than a report's,
-        or such as were changed since; it cannot be written to.
+        The folder `run` holds no run, or no record; `folder` holds files that are not a report's
+        or were changed since, or cannot be written.
 
     """
     require(Extra.REPORT, "a report")

@@ -1,12 +1,12 @@
-"""Which of two algorithms is faster, by how much, and how sure is that?
+"""Compare the speed of two algorithms, with an interval and a verdict.
 
-Compared are ratios of times taken in one round, each in a fresh process, in random order: what
-slows the machine for a while slows both. Had both the same cost, either would be the slower one of
-a round by the same amount with the same chance, so the logarithm of the ratio scatters evenly about
-0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact under any noise:
-"faster" is said wrongly in at most 5 % of all comparisons, also where the rounds went on until the
-interval was narrow (:mod:`cembench.results.looks`). Of many comparisons in one table see
-:mod:`cembench.results.many`; of two runs :mod:`cembench.results.runs_compared`.
+The ratios compared are of times from the same round, each in a fresh process, in random order:
+whatever slows the machine for a while slows both. If both had the same cost, either would be the
+slower one of a round by the same amount with the same probability. The logarithm of the ratio is
+then symmetric about 0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact
+under any noise: "faster" is wrong in at most 5 % of all comparisons, even if rounds continued until
+the interval was narrow (:mod:`cembench.results.looks`). For many comparisons in one table see
+:mod:`cembench.results.many`; for two runs :mod:`cembench.results.runs_compared`.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from cembench.results.records import Cell, Record, Round
 from cembench.results.signed_rank import centre_interval
 from cembench.results.student import paired_p
 
-#: "undecided": the interval holds 1. "too few rounds": there is none. "not side by side": no round
-#: of one sitting measured both.
+#: "undecided": the interval contains 1. "too few rounds": there is no interval. "not side by side":
+#: no round of one sitting measured both.
 Verdict = Literal["faster", "slower", "undecided", "too few rounds", "not side by side"]
 
-#: A cell whose interval is wider than this share of its figure gets a warning: what reaches the
-#: usual precision to either side is not.
+#: A cell whose interval is wider than this share of its figure gets a warning; a cell that reaches
+#: the default precision does not.
 UNSTABLE_WIDTH = 2 * USUAL_PRECISION
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Seconds of one record over those of a reference.
+    """Ratio of a record's seconds to those of a reference.
 
     `speedup` is Eq. 33 of the paper, t / t_reference - 1: how much faster the reference is.
-    `verdict` is said of the record, not of the reference.
+    `verdict` is about the record, not the reference.
     """
 
     ratio: float
     interval: Interval | None
     verdict: Verdict
     rounds: int
-    #: The probability of a difference as clear as this by chance (:mod:`cembench.results.student`),
-    #: looking paid for: what many comparisons are corrected by. 1 without an interval.
+    #: p-value of the difference (:mod:`cembench.results.student`), corrected for the looks taken;
+    #: corrections for many comparisons use it. 1 without an interval.
     p: float = 1.0
 
     @property
     def speedup(self) -> float:
-        """Eq. 33: 0 for equal times, 1 where the reference takes half the time."""
+        """Eq. 33: 0 for equal times, 1 if the reference takes half the time."""
         return self.ratio - 1
 
     @property
@@ -61,9 +61,9 @@ class Comparison:
 
 
 def ratio_interval(ratios: Sequence[float], share: float = 1.0) -> Interval | None:
-    """Return where the centre of positive figures lies, on their logarithms, with their median.
+    """Return the interval of the centre of positive figures, computed on their logarithms.
 
-    `share` is the part of the 5 % that this interval may miss; None where there are too few.
+    `share` is the part of the 5 % error that this interval may use; None for too few figures.
     """
     found = centre_interval([log(ratio) for ratio in ratios], ERROR * share)
     if found is None:
@@ -73,7 +73,7 @@ def ratio_interval(ratios: Sequence[float], share: float = 1.0) -> Interval | No
 
 
 def seconds_interval(record: Record) -> Interval | None:
-    """Where does the centre of the cell's rounds lie, with 95 %? None below six rounds."""
+    """Return the 95 % interval of a cell's seconds; None below six rounds."""
     return interval_of_rounds(record.cell, record.outcome.rounds)
 
 
@@ -83,22 +83,22 @@ def interval_of_rounds(cell: Cell, rounds: Sequence[Round]) -> Interval | None:
 
 
 def is_unstable(record: Record) -> bool:
-    """Is the interval of the cell's figure wider than :data:`UNSTABLE_WIDTH` of it?"""
+    """Whether the interval is wider than :data:`UNSTABLE_WIDTH` times the cell's figure."""
     interval, figure = seconds_interval(record), record.outcome.median_seconds
     return bool(interval and figure and interval.high - interval.low > UNSTABLE_WIDTH * figure)
 
 
 def paired_ratios(record: Record, reference: Record) -> list[float]:
-    """The ratio of both times in each round that measured both in one sitting.
+    """Return the ratio of both times for each round that measured both in one sitting.
 
-    Of an external program that is its solve time: what its process costs besides stands beside it,
-    and is never compared with seconds of a call. None where a round has no such time.
+    For an external program the solve time is used; the cost of its process is shown separately and
+    never compared with the seconds of a call. Empty if a round has no such time.
     """
     return ratios_of_rounds(record.outcome.rounds, reference.outcome.rounds)
 
 
 def ratios_of_rounds(ours: Sequence[Round], theirs: Sequence[Round]) -> list[float]:
-    """As :func:`paired_ratios`, of rounds that are not in a record yet."""
+    """As :func:`paired_ratios`, for rounds that are not in a record yet."""
     times = [(a.solve_seconds, b.solve_seconds) for a, b in _pairs(ours, theirs)]
     ratios = [a / b for a, b in times if a is not None and b is not None]
     return ratios if len(ratios) == len(times) else []
@@ -109,9 +109,9 @@ def _pairs(ours: Sequence[Round], theirs: Sequence[Round]) -> list[tuple[Round, 
 
 
 def compare(record: Record, reference: Record) -> Comparison | None:
-    """Is the record's algorithm faster than the reference's, on the same surface in the same run?
+    """Compare a record with the reference on the same surface in the same run.
 
-    None where one of them has no times, or an external program no solve time.
+    None if one of them has no times, or an external program has no solve time.
     """
     ours, theirs = record.outcome.solve_seconds, reference.outcome.solve_seconds
     if ours is None or theirs is None:
@@ -123,9 +123,9 @@ def compare(record: Record, reference: Record) -> Comparison | None:
 
 
 def compare_cpu(record: Record, reference: Record) -> Comparison | None:
-    """As :func:`compare`, of the CPU seconds; None where a round of one has none, or shows none.
+    """As :func:`compare`, for CPU seconds; None if a round of either has none, or shows zero.
 
-    The CPU's time of an external program is not only of its solving, so it is not compared.
+    CPU seconds of an external program include more than solving, so they are not compared.
     """
     if record.is_program or reference.is_program:
         return None
@@ -138,9 +138,9 @@ def compare_cpu(record: Record, reference: Record) -> Comparison | None:
 
 
 def compare_ratios(ratios: Sequence[float], share: float = 1.0) -> Comparison:
-    """What do the ratios of paired rounds say? `share` as in :func:`ratio_interval`.
+    """Return the comparison from the ratios of paired rounds; `share` as in :func:`ratio_interval`.
 
-    The median is taken of logarithms: swapping the two algorithms inverts it.
+    The median is taken over logarithms, so swapping the two algorithms inverts it.
     """
     interval = ratio_interval(ratios, share)
     p = 1.0 if interval is None else min(1.0, paired_p([log(r) for r in ratios]) / share)
@@ -152,7 +152,7 @@ def _middle(ratios: Sequence[float]) -> float:
 
 
 def verdict_of(interval: Interval | None) -> Verdict:
-    """What does the interval of a ratio say of the numerator?"""
+    """Return the verdict on the numerator from the interval of a ratio."""
     if interval is None:
         return "too few rounds"
     if 1 in interval:
@@ -161,10 +161,10 @@ def verdict_of(interval: Interval | None) -> Verdict:
 
 
 def references(records: Iterable[Record], algorithm: str) -> dict[str, Record]:
-    """The records of the algorithm that others are compared with, by :func:`circumstances`."""
+    """Return the records of the reference algorithm, by :func:`circumstances`."""
     return {circumstances(r.cell): r for r in records if r.cell.algorithm == algorithm}
 
 
 def circumstances(cell: Cell) -> str:
-    """What two cells must share for their times to be comparable."""
+    """Return a text that two cells share if their times are comparable."""
     return f"{cell.mesh_hash} {cell.solves} {cell.backend} {cell.threads}"

@@ -1,7 +1,7 @@
-"""What else belongs to a run: pictures and tables that are no cell of it.
+"""Exhibits: pictures and tables of a run that are not cells.
 
-The steps of Koebe's method, a morph, an experiment on the theory: a verb makes them and lays them
-into the run's folder, ``exhibits/NAME/``, and the report shows what lies there.
+Examples are the steps of Koebe's method, a morph, or a test of the theory. A command writes them to
+``exhibits/NAME/`` in the run's folder, and the report shows them.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class ExhibitPicture(BaseModel):
 
     file: str
     caption: str
-    #: What a reader who cannot see it should know.
+    #: Text for readers who cannot see the picture.
     alternative: str = ""
 
 
 class ExhibitTable(BaseModel):
-    """A table of an exhibit; None is a gap."""
+    """A table of an exhibit; None is an empty cell."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -46,16 +46,16 @@ class ExhibitTable(BaseModel):
     @model_validator(mode="after")
     def _rows_fit(self) -> Self:
         if any(len(row) != len(self.columns) for row in self.rows):
-            raise ValueError(f"a row has not {len(self.columns)} values, as there are columns")
+            raise ValueError(f"a row does not have {len(self.columns)} values, one for each column")
         return self
 
 
 class Exhibit(BaseModel):
-    """Something that a report shows in a section of its own.
+    """Pictures and tables that a report shows in their own section.
 
-    `figure` is the paper's figure that it regenerates ("Figure 7"), if any; `origin` says on what
-    it was made; `command` makes it again; `facts` are figures by name, as the verb's ``--json``
-    gives them.
+    `figure` is the paper's figure that it reproduces ("Figure 7"), if any; `origin` names the
+    surface; `command` makes it again; `facts` are figures by name, as the command's ``--json``
+    prints them.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -72,7 +72,7 @@ class Exhibit(BaseModel):
 
 
 def exhibit_folder(run: Path, name: str) -> Path:
-    """Where the files of an exhibit lie; made if need be, and the run's folder too.
+    """Return the folder of an exhibit; it and the run's folder are made if necessary.
 
     Raises
     ------
@@ -90,36 +90,38 @@ def exhibit_folder(run: Path, name: str) -> Path:
 
 
 def place_of(run: Path, name: str, file: str = "") -> Path:
-    """Where an exhibit of this name, or a file of it, would lie; never outside the run."""
+    """Return the path of an exhibit or of one of its files; never outside the run."""
     folder = run / FOLDER / file_name(name)
     return folder / file_name(file) if file else folder
 
 
 def write_exhibit(run: Path, exhibit: Exhibit) -> Path:
-    """Describe an exhibit whose pictures already lie in its folder; where is the description?
+    """Write the description of an exhibit whose pictures are in its folder; return its path.
 
     Raises
     ------
     RecordError
-        A picture that it names is not there.
+        A picture that it names does not exist.
 
     """
     folder = exhibit_folder(run, exhibit.name)
     for picture in exhibit.pictures:
         if not (folder / picture.file).is_file():
-            raise RecordError(f"exhibit {exhibit.name!r}: there is no {folder / picture.file}.")
+            raise RecordError(
+                f"exhibit {exhibit.name!r}: there is no picture {folder / picture.file}."
+            )
     path = folder / _DESCRIPTION
     write_model(path, exhibit)
     return path
 
 
 def read_exhibits(run: Path) -> list[Exhibit]:
-    """The exhibits of a run, by name; none for a run without any.
+    """Return the exhibits of a run, sorted by name.
 
     Raises
     ------
     RecordError
-        A description that cannot be read.
+        A description cannot be read.
 
     """
     described = [folder / _DESCRIPTION for folder in files_in(run / FOLDER, "*")]

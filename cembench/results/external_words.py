@@ -1,4 +1,4 @@
-"""What stands beside the seconds of an external program, in words."""
+"""Words for the seconds of external programs in tables."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def mark_of(record: Record) -> str:
 
 
 def marks_explained(records: list[Record]) -> list[str]:
-    """Return what the marks in a table of these records mean, a line each."""
+    """Return one line for each mark used in a table of these records."""
     marks = {mark_of(record) for record in records}
     lines = []
     if PROGRAM_MARK in marks:
@@ -33,12 +33,12 @@ def marks_explained(records: list[Record]) -> list[str]:
 
 
 def solve_words(record: Record) -> str:
-    """Return where the solve time of a program is from."""
+    """Return the origin of a program's solve time."""
     return "by its own word" if record.outcome.own_seconds is not None else "wall less start"
 
 
 def seconds_words(record: Record) -> str:
-    """Return the time columns of an external program in one line; "" for anything else."""
+    """Return the times of an external program in one line; "" for anything else."""
     outcome = record.outcome
     if not record.is_program or outcome.median_seconds is None:
         return ""

@@ -1,9 +1,9 @@
-"""How sure is a median? An interval from the order of the values alone.
+"""Confidence interval of a median, from the order of the values alone.
 
 For independent values, k of the n lie below their common median with the probability of k heads in
-n tosses. So the j-th smallest and the j-th largest enclose it with a probability that holds exactly
-whatever the distribution: no normality, no variance, no resampling. Six values are the fewest for
-which that reaches 95 % (smallest to largest: 1 - 2/2^6 = 96.9 %).
+n tosses. So the j-th smallest and the j-th largest enclose it with a probability that is exact for
+any distribution: no normality, no variance, no resampling. Six values are the fewest that reach
+95 % (smallest to largest: 1 - 2/2^6 = 96.9 %).
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 
-#: The probability with which an interval encloses the median, at least.
+#: Minimum probability that an interval encloses the median.
 LEVEL = 0.95
-#: With which it may miss.
+#: Probability that it misses.
 ERROR = 0.05
 
 
 @dataclass(frozen=True)
 class Interval:
-    """From `low` to `high`, both included."""
+    """An interval from `low` to `high`, both included."""
 
     low: float
     high: float
@@ -30,10 +30,10 @@ class Interval:
 
 
 def median_interval(values: Sequence[float], level: float = LEVEL) -> Interval | None:
-    """Between which two of the values does the median lie, with probability `level` or more?
+    """Return the narrowest interval that holds the median with probability `level` or more.
 
-    The narrowest such pair, as far from the smallest as from the largest; None where even the
-    smallest and the largest do not reach the level, that is, with fewer than six values at 95 %.
+    Its ends are values at equal ranks from both ends; None if even the smallest and the largest do
+    not reach the level, that is, for fewer than six values at 95 %.
     """
     n = len(values)
     cut, outside = -1, 0.0

@@ -1,11 +1,11 @@
-"""Statements that are made together: how sure are they all, and what do they say of surfaces?
+"""Statistics over many comparisons and over surfaces.
 
-Each answers a question of its own:
+Each function answers a different question:
 
-- :func:`corrected`: is *any* of these verdicts wrong? With at most 5 % (Holm).
-- :func:`sign_test`: does one win on more surfaces than chance would let it? Over surfaces.
-- :func:`average_interval`: how far would an average be from this on other surfaces of this kind,
-  and in other rounds? Over both.
+- :func:`corrected`: verdicts of which *any* is wrong with probability at most 5 % (Holm).
+- :func:`sign_test`: whether one algorithm wins on more surfaces than chance allows.
+- :func:`average_interval`: how much an average would vary on other surfaces of this kind and in
+  other rounds.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from numpy.typing import NDArray
 from cembench.results.comparison import Comparison
 from cembench.results.intervals import ERROR, LEVEL, Interval
 
-#: How often an average is drawn anew.
+#: Number of bootstrap draws of an average.
 DRAWS = 2000
-#: The fewest surfaces that an average gets an interval for: of fewer, nothing can be drawn.
+#: Minimum number of surfaces for an interval of an average.
 FEWEST_SURFACES = 6
 
 
 def holm(chances: Sequence[float]) -> list[float]:
-    """Return each p-value corrected for all of them: at most 5 % for those that can be claimed.
+    """Return p-values corrected for their number by Holm's method.
 
-    With the m of them in order, the k-th smallest (from 0) is multiplied by m - k, and none is
-    smaller than the one before (S. Holm, 1979). Holds however the p-values depend on each other.
+    With m values in order, the k-th smallest (from 0) is multiplied by m - k, and none is smaller
+    than the one before (S. Holm, 1979). It is valid for any dependence between the p-values.
 
     Examples
     --------
@@ -47,10 +47,10 @@ def holm(chances: Sequence[float]) -> list[float]:
 
 
 def corrected(found: Sequence[Comparison]) -> list[Comparison]:
-    """Return comparisons that stand together with verdicts of which none is wrong, with 95 %.
+    """Return comparisons with verdicts that are all correct with probability 95 %.
 
-    A verdict stays where its own interval shows it, exactly, and where it also is clear enough for
-    one of so many (:mod:`cembench.results.student`). The intervals stay single ones: each holds its
+    A verdict is kept if its own exact interval shows it, and if its p-value is also significant
+    among so many (:mod:`cembench.results.student`). The intervals stay single ones: each holds its
     ratio with 95 %, not all of them at once.
     """
     tested = [one.p for one in found if one.interval is not None]
@@ -66,9 +66,9 @@ def corrected(found: Sequence[Comparison]) -> list[Comparison]:
 
 
 def sign_test(wins: int, losses: int) -> float:
-    """Return the probability that k of n, or fewer or more, are as uneven as this by chance.
+    """Return the two-sided p-value of the exact sign test.
 
-    Two-sided, exact; ties are not counted. 1 for none.
+    Ties are not counted; 1 without wins and losses.
     """
     n, fewer = wins + losses, min(wins, losses)
     return min(1.0, 2 * sum(comb(n, k) for k in range(fewer + 1)) / 2**n)
@@ -81,22 +81,22 @@ def average_interval(
     seed: int = 0,
     level: float = LEVEL,
 ) -> Interval | None:
-    """Return where an average over surfaces lies, as surfaces and rounds vary.
+    """Return a bootstrap interval of an average over surfaces and rounds.
 
-    A hierarchical bootstrap: surfaces are drawn with replacement, and rounds within each; the
-    figure of a surface is the median of its rounds. Approximate, and too narrow for few surfaces:
-    None below :data:`FEWEST_SURFACES`.
+    The bootstrap is hierarchical: surfaces are drawn with replacement, and rounds within each; the
+    figure of a surface is the median of its rounds. It is approximate, and too narrow for few
+    surfaces: None below :data:`FEWEST_SURFACES`.
 
     Parameters
     ----------
     surfaces : sequence of sequences
-        The ratio of each round, by surface.
+        The ratios of the rounds, one sequence per surface.
     average : function of an array (draws, surfaces)
         The average along the last axis, (draws,).
     seed : int
-        Of what is drawn; the same seed gives the same interval.
+        Seed of the draws; the same seed gives the same interval.
     level : float
-        With which probability.
+        Probability that the interval covers the average.
 
     """
     if len(surfaces) < FEWEST_SURFACES:

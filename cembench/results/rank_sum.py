@@ -1,7 +1,7 @@
-"""By how much do two samples differ, that are no pairs? Exact, from ranks alone.
+"""Difference of two unpaired samples: exact test and interval from ranks.
 
-Wilcoxon's (Mann and Whitney's) rank-sum test, and the interval that belongs to it: between two of
-the differences of each value of the one with each of the other.
+The Wilcoxon (Mann-Whitney) rank-sum test, and its interval, whose ends are two of the differences
+between values of the two samples.
 
 Source: M. Hollander, D. A. Wolfe, Nonparametric Statistical Methods, 2nd ed., sections 4.1 and 4.3.
 """
@@ -20,9 +20,9 @@ from cembench.results.intervals import ERROR, Interval
 
 @lru_cache(maxsize=64)
 def null_distribution(n: int, m: int) -> NDArray[np.float64]:
-    """Return P(U <= k) for k = 0, ..., n m: how many pairs have the first sample's value larger."""
+    """Return P(U <= k), k = 0, ..., n m; U counts pairs with the first sample's value larger."""
     size = n * m + 1
-    counts = [1] + [0] * (size - 1)  # whole numbers, as floats would cancel
+    counts = [1] + [0] * (size - 1)  # integers, because floats would suffer cancellation
     for i in range(1, n + 1):
         for k in range(size - 1, m + i - 1, -1):
             counts[k] -= counts[k - m - i]
@@ -35,7 +35,7 @@ def null_distribution(n: int, m: int) -> NDArray[np.float64]:
 def shift_interval(
     ours: Sequence[float], theirs: Sequence[float], error: float = ERROR
 ) -> Interval | None:
-    """Return where the shift of the first sample against the second lies; None for too few."""
+    """Return the interval of the shift between two samples; None for too few values."""
     if not ours or not theirs:
         return None
     chances = null_distribution(len(ours), len(theirs))
@@ -47,7 +47,7 @@ def shift_interval(
 
 
 def p_value(ours: Sequence[float], theirs: Sequence[float]) -> float:
-    """Return the two-sided probability of samples as far apart as these, were they alike."""
+    """Return the two-sided p-value of the rank-sum test."""
     if not ours or not theirs:
         return 1.0
     differences = _differences(ours, theirs)

@@ -1,4 +1,4 @@
-"""Records as flat rows: the one place where a table's columns come from."""
+"""Records as flat rows, the source of all table columns."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from cembench.results.comparison import (
 from cembench.results.many import corrected
 from cembench.results.records import Record
 
-#: Whose times the others' are compared with, as in the paper's Table 2.
+#: Default reference algorithm for speedups, as in the paper's Table 2.
 REFERENCE = "cem"
 
 
 def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str, Any]]:
-    """All records of a run as flat rows, each compared with the reference on its surface.
+    """Return all records of a run as flat rows, each compared with the reference on its surface.
 
-    `verdict` is of each comparison alone, `verdict_corrected` of all of these rows together (Holm),
-    and `p` is corrected likewise.
+    `verdict` is for each comparison alone; `verdict_corrected` is corrected for all rows (Holm),
+    and so is `p`.
     """
     compared = against_reference(records, reference)
     together = iter(corrected([found for _, found in compared if found is not None]))
@@ -40,7 +40,7 @@ def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str
 def against_reference(
     records: Sequence[Record], reference: str = REFERENCE
 ) -> list[tuple[Record | None, Comparison | None]]:
-    """For each record its reference and the comparison; None where there is none."""
+    """Return the reference and the comparison for each record; None if there is none."""
     known = references(records, reference)
     told: list[tuple[Record | None, Comparison | None]] = []
     for record in records:
@@ -56,7 +56,7 @@ def _compared(
     together: Comparison | None,
     cpu: Comparison | None,
 ) -> dict[str, Any]:
-    """Speedup of the reference over this record's algorithm (Eq. 33), and the verdict on this."""
+    """Return the columns of the speedup of the reference (Eq. 33) and its verdicts."""
     interval = found.speedup_interval if found else None
     cpu_interval = cpu.interval if cpu else None
     return {
@@ -74,7 +74,7 @@ def _compared(
 
 
 def row(record: Record) -> dict[str, Any]:
-    """One record as one flat row; the metrics stand under their own names.
+    """Return a record as a flat row; metrics are under their own names.
 
     `seconds_raw` holds the figure of each round, `seconds_calls` every timed call by round.
     """

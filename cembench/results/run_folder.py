@@ -1,7 +1,7 @@
-"""The folder of a run: how it is known, what in it is the run's own, and where files pass through.
+"""The folder of a run: its marker, its own names, and its scratch folder.
 
-A run writes to these names alone, and deletes nothing but what stands below them under names that
-it gave: see :mod:`cembench.results.store`.
+A run writes only to these names, and deletes only files under names that it gave itself; see
+:mod:`cembench.results.store`.
 """
 
 from __future__ import annotations
@@ -19,30 +19,30 @@ from cembench.core.atomic import clear_drafts, is_draft
 from cembench.core.errors import RecordError
 from cembench.results.records import Cell, Record
 
-#: The folders of a run.
+#: Folders of a run.
 FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits")
-#: The files of a run besides its marker.
+#: Files of a run, without its marker.
 PLAN, LOCK = "plan.json", "lock"
-#: The cells of a plan.
+#: Adapter for the cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 
 _RECORD = re.compile(r".*--[0-9a-f]{12}\.json")
 
 
 def check(folder: Path) -> None:
-    """Raise :class:`RecordError` where a run must not write to a folder; nothing is changed."""
+    """Raise :class:`RecordError` if a run must not write to a folder; nothing is changed."""
     folders.check(folder, "run", is_older_run)
     _check_names(folder)
 
 
 def claim(folder: Path) -> folders.Marker:
-    """Return the marker of a run's folder, which it gets if it is new or of an older version."""
+    """Return the marker of a run's folder; write it if the folder is new or of an older version."""
     check(folder)
     return folders.claim(folder, "run", is_older_run)
 
 
 def is_own(folder: Path, path: Path) -> bool:
-    """Whether a path is one that a run in this folder keeps for itself."""
+    """Whether a path belongs to the run in this folder."""
     try:
         inside = path.resolve().relative_to(folder.resolve())
     except ValueError:
@@ -52,9 +52,9 @@ def is_own(folder: Path, path: Path) -> bool:
 
 
 def empty_scratch(folder: Path) -> Path:
-    """Return an empty folder for what passes between processes; what a kill left is cleared.
+    """Return an empty folder for files exchanged between processes; leftovers are removed.
 
-    Only one run at a time may call this. The name is one that only the marker knows.
+    Only one run at a time may call this. The folder's name contains the marker's random token.
     """
     scratch = folder / f"scratch-{claim(folder).token}"
     if scratch.is_dir() and not scratch.is_symlink():
@@ -70,7 +70,7 @@ def empty_scratch(folder: Path) -> Path:
 def is_older_run(folder: Path) -> bool:
     """Whether a folder is a run from before runs had markers.
 
-    It has a record, a plan or an exhibit of ours, and nothing of another form where those lie.
+    Such a folder has a record, a plan or an exhibit, and no files of other formats among them.
     """
     if any(folders.is_link_or_not_folder(folder / name) for name in FOLDERS):
         return False
@@ -89,7 +89,7 @@ def is_older_run(folder: Path) -> bool:
 
 
 def _exhibit(content: bytes) -> None:
-    """Raise ValueError where this does not describe an exhibit."""
+    """Raise ValueError if this does not describe an exhibit."""
     found = json.loads(content)
     if not isinstance(found, dict) or not {"name", "title", "command", "origin"} <= set(found):
         raise ValueError("not an exhibit")
@@ -104,7 +104,7 @@ def _holds(path: Path, parse: Callable[[bytes], object]) -> bool:
 
 
 def _check_names(folder: Path) -> None:
-    """Raise where a name of ours leads elsewhere, or is that of something else."""
+    """Raise if one of the run's names is a symbolic link or something of another kind."""
     lock, plan = folder / LOCK, folder / PLAN
     wrong = [folder / name for name in FOLDERS if folders.is_link_or_not_folder(folder / name)]
     if (lock.exists() or lock.is_symlink()) and not folders.is_empty_file(lock):

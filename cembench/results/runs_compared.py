@@ -1,9 +1,9 @@
-"""What became faster or slower from one run to another?
+"""Compare the seconds of two runs cell by cell.
 
-Rounds of two runs are no pairs, and the machine may have drifted between them. So every round also
-times a reference kernel that never changes (:mod:`cembench.running.kernel`), and what is compared
-are a cell's seconds over the kernel's of the same round, by the rank-sum test at the 5 % level.
-Where a run has no such times, seconds are compared, and the drift is not in the interval.
+Rounds of two runs are not paired, and the machine may have drifted between them. So every round
+also times a reference kernel that never changes (:mod:`cembench.running.kernel`). The seconds of a
+cell are divided by the kernel's in the same round, and compared by the rank-sum test at the 5 %
+level. If a run has no kernel times, plain seconds are compared; the interval then ignores drift.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from cembench.results.student import unpaired_p
 
 @dataclass(frozen=True)
 class Change:
-    """One cell in two runs; the comparison says what the second is, measured against the first."""
+    """One cell in two runs; the comparison is of the second run relative to the first."""
 
     before: Record
     after: Record
     comparison: Comparison
-    #: Seconds of the kernel in the second run over those in the first, by which the comparison is
-    #: corrected; None where one of the runs has none.
+    #: Kernel seconds in the second run over those in the first, used to correct the comparison;
+    #: None if one of the runs has none.
     drift: float | None = None
 
 
 def compare_runs(before: Sequence[Record], after: Sequence[Record]) -> list[Change]:
-    """Compare cell by cell, those of the same algorithm, parameters, surface and circumstances.
+    """Compare the cells with the same algorithm, parameters, surface and circumstances.
 
-    The code may differ, that is what is asked about.
+    The code may differ; that is the purpose of the comparison.
     """
     earlier = {_same(record): record for record in before}
     pairs = [(earlier.get(_same(record)), record) for record in after]
@@ -65,12 +65,12 @@ def _change(before: Record, after: Record) -> Change:
 
 
 def _logs(rounds: Sequence[Round], *, corrected: bool) -> list[float]:
-    """Return the logarithms of the seconds, over those of the kernel where that is asked for."""
+    """Return the logarithms of the seconds, divided by the kernel's if `corrected`."""
     return [log(r.seconds) - (log(r.kernel_seconds or 1.0) if corrected else 0.0) for r in rounds]
 
 
 def _drift(before: Sequence[Round], after: Sequence[Round]) -> float | None:
-    """Return the kernel's seconds after over before; None where a round has none."""
+    """Return the ratio of the kernel's seconds, after over before; None if a round has none."""
     old, new = (
         [r.kernel_seconds for r in rounds if r.kernel_seconds] for rounds in (before, after)
     )
@@ -85,7 +85,7 @@ def _same(record: Record) -> str:
 
 
 def machine_differences(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
-    """Which facts of two environments differ that make their seconds incomparable?"""
+    """Return the differences of two environments that make their seconds incomparable."""
     return [
         f"{name}: {before.get(name)} / {after.get(name)}"
         for name in ("cpu", "cores", "memory_bytes", "platform", "python", "libraries", "blas")

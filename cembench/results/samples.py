@@ -1,9 +1,9 @@
-"""What was measured so far of a cell that is not finished: a journal, a line for each process.
+"""The journal of an unfinished cell, with one line per process.
 
-A line is handed to the system when a process has ended: no kill takes it back. (A power cut can:
-flushing the disk would cost more than all other book-keeping.) One that a kill cut short is not
-there for a reader, and is cut off before the next is written. Journals are kept by environment:
-rounds of two machines, or of two commits, never come together in one record.
+A line is handed to the system when a process has ended, so it survives a kill. (It may not survive
+a power cut: flushing the disk would cost more than all other book-keeping.) A line that a kill cut
+short is ignored by readers and removed before the next is written. Journals are kept by
+environment: rounds of two machines, or of two commits, are never mixed in one record.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from cembench.results.records import Outcome, Round
 
 
 class Entry(BaseModel):
-    """A line of a journal: the outcome of the check, or a round with its number from 0."""
+    """A line of a journal: the outcome of the check, or a round with its number (from 0)."""
 
     check: Outcome | None = None
     number: int | None = None
@@ -31,30 +31,30 @@ class Entry(BaseModel):
 
 @dataclass(frozen=True)
 class Samples:
-    """The journal of one cell in one environment, a ``.jsonl``; the map is an ``.npz`` beside."""
+    """The journal of one cell in one environment, a ``.jsonl`` file with the map as ``.npz``."""
 
     journal: Path
 
     def save_check(self, outcome: Outcome, uv: NDArray[np.complex128] | None) -> None:
-        """Keep what the checked call came to: the map first, so that it is there with it."""
+        """Save the outcome of the checked call, after its map, so that the map is always there."""
         if uv is not None:
             write(self._map, lambda file: np.savez(file, uv=uv))
         self._append(Entry(check=outcome))
 
     def check(self) -> Outcome | None:
-        """What the checked call came to; None where there was none yet."""
+        """Return the outcome of the checked call; None if there was none yet."""
         return next((entry.check for entry in self._entries() if entry.check), None)
 
     def uv(self) -> NDArray[np.complex128] | None:
-        """The map of the checked call (n,)."""
+        """Return the map of the checked call, complex128 (n,)."""
         return read_map(self._map)
 
     def save_round(self, number: int, measured: Round) -> None:
-        """Keep one round; rounds are numbered from 0."""
+        """Save one round; rounds are numbered from 0."""
         self._append(Entry(number=number, round=measured))
 
     def rounds(self) -> dict[int, Round]:
-        """The rounds that are there, by number, in order."""
+        """Return the saved rounds by number, in order."""
         found = {e.number: e.round for e in self._entries() if e.number is not None and e.round}
         return {number: found[number] for number in sorted(found)}
 
@@ -89,7 +89,7 @@ def _whole_lines(text: bytes) -> bytes:
 
 
 def read_map(path: Path) -> NDArray[np.complex128] | None:
-    """A map (n,) that was kept as ``uv`` in an archive; None where there is none."""
+    """Return the map ``uv`` (n,) of an NPZ file; None if there is no file."""
     if not is_there(path):
         return None
     uv = read_arrays(path, ["uv"])["uv"]

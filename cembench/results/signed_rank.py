@@ -1,10 +1,10 @@
-"""How sure is the centre of values that scatter evenly to both sides? Exact, from ranks alone.
+"""Centre of symmetric values: exact signed-rank test and interval.
 
-Wilcoxon's signed-rank test, and the interval that belongs to it: between two of the Walsh averages
-(the means of all pairs of values). Where the values scatter evenly about their centre, the chance
-that it lies outside is known whatever the distribution is. Logarithms of ratios of two equal
-algorithms do so by construction, as the order within a round is random. For n normal values the
-interval is about as narrow as Student's, half as wide as from the smallest to the largest of 20.
+Wilcoxon's signed-rank test, and its interval, whose ends are two of the Walsh averages (the means
+of all pairs of values). If the values are symmetric about their centre, the probability that the
+interval misses it is known for any distribution. Logarithms of time ratios of two equally fast
+algorithms are symmetric by construction, as the order within a round is random. For normal values
+the interval is about as narrow as Student's, and for 20 values half as wide as their range.
 
 Source: M. Hollander, D. A. Wolfe, Nonparametric Statistical Methods, 2nd ed., sections 3.1 and 3.3.
 """
@@ -22,7 +22,7 @@ from cembench.results.intervals import ERROR, Interval
 
 @lru_cache(maxsize=256)
 def null_distribution(n: int) -> NDArray[np.float64]:
-    """Return P(T <= k) for k = 0, ..., n (n+1)/2, T being the sum of ranks with a positive sign."""
+    """Return P(T <= k), k = 0, ..., n (n+1)/2; T is the sum of ranks with a positive sign."""
     chances = np.zeros(n * (n + 1) // 2 + 1)
     chances[0] = 1.0
     for rank in range(1, n + 1):
@@ -33,22 +33,22 @@ def null_distribution(n: int) -> NDArray[np.float64]:
 
 
 def cut(n: int, error: float = ERROR) -> int:
-    """Return how many Walsh averages are left out on either side; -1 where there is no interval."""
-    # Sums of halves are exact here, so equality with a level counts as reached.
+    """Return the number of Walsh averages left out on either side; -1 if there is no interval."""
+    # Sums of powers of 1/2 are exact, so a probability equal to the level counts as reached.
     return int(np.searchsorted(null_distribution(n), error / 2, side="right")) - 1
 
 
 def walsh_averages(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the means of all pairs of values (..., n), each with itself too, in order."""
+    """Return the sorted means of all pairs of values (..., n), including each with itself."""
     i, j = np.triu_indices(values.shape[-1])
     averages: NDArray[np.float64] = np.sort((values[..., i] + values[..., j]) / 2, axis=-1)
     return averages
 
 
 def centre_interval(values: Sequence[float], error: float = ERROR) -> Interval | None:
-    """Return where the centre lies, missed with a probability of at most `error`.
+    """Return the interval of the centre, which misses with a probability of at most `error`.
 
-    None where even the smallest and the largest value miss it more often: 2 / 2^n > error.
+    None for too few values: if even the smallest and the largest miss more often, 2 / 2^n > error.
 
     Examples
     --------
@@ -64,9 +64,9 @@ def centre_interval(values: Sequence[float], error: float = ERROR) -> Interval |
 
 
 def p_value(values: Sequence[float]) -> float:
-    """Return the two-sided probability of values as uneven about 0 as these, were 0 the centre.
+    """Return the two-sided p-value of the signed-rank test for centre 0.
 
-    It is at most `error` exactly where :func:`centre_interval` does not hold 0; ties with 0 count
+    It is at most `error` exactly if :func:`centre_interval` does not contain 0; ties with 0 count
     against a difference. 1 for no values.
     """
     averages = walsh_averages(np.asarray(values, dtype=float))

@@ -1,22 +1,22 @@
-"""A run on disk: one JSON record a cell, its map beside it, and the machine it was measured on.
+"""A run on disk: one JSON record per cell, its map, and the machine it was measured on.
 
 ::
 
     RUN/records/<mesh>--<algorithm>--<key>.json
     RUN/maps/<mesh>--<algorithm>--<key>.npz       uv, complex128 (n,)
-    RUN/meshes/<hash>.npz                         V, F and name: what the maps are maps of
+    RUN/meshes/<hash>.npz                         V, F and name of each surface
     RUN/environments/<id>.json
-    RUN/plan.json                                 the cells that were last asked for
-    RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
-        <id>.jsonl  <id>.npz                      a line for each process that has ended, the map
-    RUN/lock                                      held by the run that measures
-    RUN/cembench.json                             says that the folder is a run
-    RUN/scratch-<token>/                          what passes between processes, while it measures
+    RUN/plan.json                                 the cells of the last request
+    RUN/samples/<mesh>--<algorithm>--<key>/       the journal of an unfinished cell:
+        <id>.jsonl  <id>.npz                      one line per finished process, and the map
+    RUN/lock                                      held while a run is writing
+    RUN/cembench.json                             marker of the folder
+    RUN/scratch-<token>/                          files exchanged between processes
 
-The names of meshes and algorithms are cut and cleaned where no file can have them. Every file but
-the journals is written to a draft, flushed to disk and renamed: it is whole or not there.
-A cell's samples become its record when the last is there; the record is written before they are
-deleted, so that whatever moment a run is killed at, each finished process is known exactly once.
+Names of meshes and algorithms are shortened and cleaned for use in file names. Every file except
+the journals is written to a draft, flushed to disk and renamed, so it is complete or absent. When
+a cell is complete, its record is written before its samples are deleted, so each finished process
+is kept exactly once, whenever a run is killed.
 """
 
 from __future__ import annotations
@@ -58,18 +58,18 @@ from cembench.results.samples import Samples, read_map
 
 
 class Store:
-    """The records under one folder, which is made when the first is saved."""
+    """The records in one folder, which is made when the first is saved."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     def find(self, cell: Cell) -> Record | None:
-        """Return what was recorded of this cell, if anything, under whatever name its mesh had.
+        """Return the record of this cell under any name of its mesh; None if there is none.
 
         Raises
         ------
         RecordError
-            The record is damaged, or was changed since: a run would go on from it, and sign it.
+            The record is damaged or was changed; a run must not resume from it.
 
         """
         path = self._found(self._record_path(cell), cell)
@@ -84,9 +84,9 @@ class Store:
         return record
 
     def rename(self, record: Record, cell: Cell, *, keep: bool) -> Record:
-        """Record the same under the name that the cell's mesh has now; with `keep` also as it was.
+        """Save the record under the mesh's current name; with `keep`, under the old one too.
 
-        `cell` has the record's key: nothing but the name differs.
+        `cell` has the record's key; only the name differs.
         """
         renamed = record.model_copy(update={"cell": cell})
         environment = self.environments().get(record.environment, {"id": record.environment})
@@ -94,13 +94,13 @@ class Store:
         if not keep:
             for path_of in (self._record_path, self._map_path):
                 before, now = path_of(record.cell), path_of(cell)
-                # Where capital letters do not count, both names may be of one file.
+                # On a case-insensitive file system both names may be the same file.
                 if before.exists() and not (now.exists() and now.samefile(before)):
                     before.unlink()
         return renamed
 
     def records(self) -> list[Record]:
-        """All records, by name of their files.
+        """Return all records, sorted by file name.
 
         Raises
         ------
@@ -112,7 +112,7 @@ class Store:
         return self.finished()
 
     def check_is_run(self) -> None:
-        """Raise :class:`RecordError` where the folder holds no run."""
+        """Raise :class:`RecordError` if the folder holds no run."""
         self.check_is_there()
         if not is_there(self.folder / "records"):
             raise RecordError(
@@ -121,7 +121,7 @@ class Store:
             )
 
     def check_is_there(self) -> None:
-        """Raise :class:`RecordError` where there is no such folder."""
+        """Raise :class:`RecordError` if there is no such folder."""
         if not self.folder.is_dir():
             raise RecordError(
                 f"{self.folder} holds no run: there is no such folder. Make one with "
@@ -129,17 +129,17 @@ class Store:
             )
 
     def finished(self) -> list[Record]:
-        """As :meth:`records`, but none where no cell is finished yet."""
+        """As :meth:`records`, but empty if no cell is finished yet."""
         return [read_record(path) for path in self.record_files()]
 
     def record_files(self) -> list[Path]:
-        """Return the files of all records, by name."""
+        """Return the files of all records, sorted by name."""
         return files_in(self.folder / "records", "*.json")
 
     def save(
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
     ) -> None:
-        """Write the environment, the map and last the record, so that a record finds its map."""
+        """Write the environment, the map and then the record, so a record always has its map."""
         about = self.folder / "environments" / f"{file_name(record.environment)}.json"
         if not about.exists():
             write_text(about, json.dumps(environment, indent=2))
@@ -156,24 +156,24 @@ class Store:
         self.forget_samples(record.cell)
 
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
-        """The recorded map (n,), or None where there is none."""
+        """Return the recorded map, complex128 (n,); None if there is none."""
         path = self._found(self._map_path(cell), cell)
         return None if path is None else read_map(path)
 
     def save_mesh(self, mesh: TriangleMesh) -> None:
-        """Keep a surface, once: with its map, every metric can be computed again."""
+        """Save a surface once, so that metrics can be recomputed from its maps."""
         path = self._mesh_path(mesh.hash)
         if not path.exists():
             name = np.array(mesh.name)
             write(path, lambda file: np.savez(file, V=mesh.V, F=mesh.F, name=name))
 
     def mesh(self, cell: Cell) -> TriangleMesh | None:
-        """The surface that a cell was measured on, or None where it was not kept.
+        """Return the surface of a cell; None if it was not saved.
 
         Raises
         ------
         RecordError
-            The file is damaged, or holds another surface.
+            The file is damaged, or holds a different surface.
 
         """
         path = self.mesh_file(cell)
@@ -188,35 +188,35 @@ class Store:
             raise damaged(path, "a surface", "a coordinate or a corner is out of range")
         mesh = TriangleMesh.trusted(V, F.astype(np.int64), str(data["name"]))
         if mesh.hash != cell.mesh_hash:
-            raise RecordError(f"{path} holds another surface than its name says; delete it.")
+            raise RecordError(f"{path} does not hold the surface that its name says; delete it.")
         return mesh
 
     def samples(self, cell: Cell, environment: str) -> Samples:
-        """What was measured so far of a cell in this environment, and goes on to be."""
+        """Return the journal of an unfinished cell in this environment."""
         journal = f"{file_name(environment)}.jsonl"
         return Samples(self.folder / "samples" / cell.label / journal)
 
     def rounds_done(self, cell: Cell) -> int | None:
-        """How many rounds of an unfinished cell are kept? None where it was not begun."""
+        """Return the number of saved rounds of an unfinished cell; None if it was not begun."""
         journals = files_in(self.folder / "samples" / cell.label, "*.jsonl")
         return max((len(Samples(journal).rounds()) for journal in journals), default=None)
 
     def forget_samples(self, cell: Cell) -> None:
-        """Delete what is kept of an unfinished cell."""
+        """Delete the journals of an unfinished cell."""
         shutil.rmtree(self.folder / "samples" / cell.label, ignore_errors=True)
 
     def save_plan(self, cells: Sequence[Cell]) -> None:
-        """Keep which cells were asked for, in order."""
+        """Save which cells were requested, in order."""
         text = run_folder.CELLS.dump_json(list(cells), indent=1)
         write_bytes(self.folder / run_folder.PLAN, text)
 
     def plan(self) -> list[Cell]:
-        """The cells that were last asked for; none where no plan was kept."""
+        """Return the cells of the last request; empty if no plan was saved."""
         path = self.folder / run_folder.PLAN
         return read_json(path, run_folder.CELLS, "a plan") if is_there(path) else []
 
     def environments(self) -> dict[str, dict[str, Any]]:
-        """What is known of the machines, by id."""
+        """Return the facts of the machines, by id."""
         paths = files_in(self.folder / "environments", "*.json")
         return {
             path.stem: read_model(path, Environment).model_dump(exclude_unset=True)
@@ -225,16 +225,16 @@ class Store:
 
     @contextmanager
     def locked(self, waiting: Callable[[], None] = lambda: None) -> Iterator[Path]:
-        """Be the only one who measures into this folder; gives a folder for temporary files.
+        """Hold the lock of this folder; yields a folder for temporary files.
 
-        Two runs at a time would slow each other and be wrong about both. So the second waits, after
-        calling `waiting`, and then finds done what the first did. The system frees the lock of a
-        run that is killed; what that left half-written is cleared away here.
+        Two runs at the same time would slow each other and spoil both timings. So the second
+        waits, after calling `waiting`, and then finds the work of the first. The system frees the
+        lock of a killed run; its half-written files are removed here.
 
         Raises
         ------
         RecordError
-            A folder that is not a run and not empty: nothing is changed in it. One that cannot be
+            The folder is neither a run nor empty (nothing is changed in it), or it cannot be
             written to.
 
         """
@@ -262,9 +262,9 @@ class Store:
             lock.release()
 
     def is_locked(self) -> bool | None:
-        """Whether somebody is measuring into this folder now; None if it is read-only for us."""
+        """Whether a run is writing to this folder now; None if it is read-only."""
         if not is_empty_file(lock_path(self.folder)):
-            return False  # opening it would empty it
+            return False  # opening it for writing would empty it
         try:
             with self._lock().acquire(timeout=0):
                 return False
@@ -277,24 +277,24 @@ class Store:
         return FileLock(lock_path(self.folder))
 
     def _found(self, path: Path, cell: Cell) -> Path | None:
-        """A file of a cell: the one with its name, else one of the same key; None: there is none.
+        """Return a cell's file by its name or else by its key; None if there is none.
 
-        A mesh may have been renamed, and names that no file can have were once kept as they are.
+        A mesh may have been renamed, and older versions did not clean names.
         """
         if path.exists():
             return path
         return min(path.parent.glob(f"*--{cell.key[:12]}{path.suffix}"), default=None)
 
     def record_file(self, record: Record) -> Path:
-        """Return where a record lies."""
+        """Return the path of a record."""
         return self._record_path(record.cell)
 
     def map_file(self, cell: Cell) -> Path:
-        """Return where a cell's map lies, if one was kept."""
+        """Return the path of a cell's map, if it was saved."""
         return self._map_path(cell)
 
     def mesh_file(self, cell: Cell) -> Path:
-        """Return where a cell's surface lies, if it was kept."""
+        """Return the path of a cell's surface, if it was saved."""
         return self._mesh_path(cell.mesh_hash)
 
     def _record_path(self, cell: Cell) -> Path:
@@ -308,10 +308,10 @@ class Store:
 
 
 def merge(runs: Iterable[Store], into: Store) -> int:
-    """Bring the records of several runs together; how many are there then?
+    """Merge the records of several runs; return the number of records in the result.
 
-    Of a cell that several runs hold, one that ended ok counts before one that did not, and then
-    the later one. All runs are read before anything is written.
+    If several runs hold a cell, a record that ended ok is preferred, then the later one. All runs
+    are read before anything is written.
     """
     found = [(run, run.records()) for run in runs]
     best: dict[str, tuple[tuple[bool, str], Store, Record]] = {}
@@ -332,12 +332,12 @@ def merge(runs: Iterable[Store], into: Store) -> int:
 
 
 def lock_path(folder: Path) -> Path:
-    """The file whose lock a run holds while it measures."""
+    """Return the file that a run locks while it is writing."""
     return folder / run_folder.LOCK
 
 
 def read_record(path: Path) -> Record:
-    """Return the record that a file holds; :class:`RecordError` says what is wrong with it."""
+    """Return the record in a file; raise :class:`RecordError` if it is not valid."""
     record = read_model(path, Record)
     if record.schema_version != SCHEMA_VERSION:
         raise RecordError(

@@ -1,10 +1,10 @@
-"""How unlikely is a difference, far beyond what ranks can tell?
+"""p-values from Student's t, for differences beyond the resolution of ranks.
 
-Of n rounds, signs and ranks alone exclude nothing with more certainty than 2 / 2^n, however large a
-difference is: too little for the first of a hundred statements. Student's t tells more, for noise
-that is about normal on logarithms. It has one degree of freedom less here than for normal values:
-that pays for noise with flatter tails, as a steady drift makes it; for heavier tails it errs on the
-safe side as it is. `benchmarks/precision.py` simulates what that comes to.
+With n rounds, signs and ranks alone give no p-value below 2 / 2^n, however large the difference is:
+too large for one of a hundred statements. Student's t has no such limit, for noise that is roughly
+normal on logarithms. One degree of freedom is taken off, which covers noise with flatter tails,
+such as from a steady drift; for heavier tails the test is conservative anyway.
+`benchmarks/precision.py` simulates the resulting error rates.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from statistics import mean, variance
 
 
 def paired_p(logs: Sequence[float]) -> float:
-    """Return the two-sided probability of values as far from 0 as these; 1 for fewer than three."""
+    """Return the two-sided p-value of Student's t for mean 0; 1 for fewer than three values."""
     if len(logs) < 3:
         return 1.0
     return _two_sided(mean(logs), sqrt(variance(logs) / len(logs)), len(logs) - 2)
 
 
 def unpaired_p(ours: Sequence[float], theirs: Sequence[float]) -> float:
-    """Return the same of two samples as far apart as these, their scatter being different."""
+    """Return the two-sided p-value of two samples with unequal variances."""
     fewest = min(len(ours), len(theirs))
     if fewest < 3:
         return 1.0

@@ -1,9 +1,9 @@
-"""Whether a run's records still say what was measured, and their maps still give their figures.
+"""Verify that a run's records and maps were not changed and agree with each other.
 
-Whoever measured wrote hashes down: a record's digest of itself, the cell's key in the file's name,
-SHA-256 of map and mesh. A figure can also be computed again from the map. Every record is compared
-with its digest, its name and its own status; maps of all records (``--verify``) or of a sample,
-since a large one takes seconds. The sample is the same as long as the records are.
+A run stores hashes: a record's digest of itself, the cell's key in the file name, and SHA-256 of
+map and mesh. Figures can also be recomputed from the map. Every record is compared with its digest,
+its name and its own status. Maps are verified for all records (``--verify``) or for a sample,
+because a large map takes seconds. The same records give the same sample.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ from cembench.core.loading import read_bytes
 from cembench.results.records import Record, is_as_written
 from cembench.results.store import Store, read_record
 
-#: A sample's maps have this many triangles together at most; one map is always in it.
+#: Maximum total triangles of a sample's maps; the sample has at least one map.
 SAMPLE_TRIANGLES = 200_000
-#: Errors of rounding, relative to the size of what is added up.
+#: Rounding errors, relative to the size of the terms.
 ROUNDING = 1e-9
-#: How many disagreements an error names.
+#: Number of disagreements listed in an error.
 _NAMED = 10
 
 
 class Depth(StrEnum):
-    """How much is verified."""
+    """Depths of verification."""
 
     records = "records"
     sample = "sample"
@@ -43,7 +43,7 @@ class Depth(StrEnum):
 
 
 class Kind(StrEnum):
-    """What a finding is about."""
+    """Kinds of findings."""
 
     damaged = "damaged"
     file_name = "file name"
@@ -52,7 +52,7 @@ class Kind(StrEnum):
     map = "map"
     mesh = "mesh"
     metrics = "metrics"
-    #: Nothing disagrees, but nothing can be compared either.
+    #: Nothing disagrees, but something cannot be compared.
     not_signed = "not signed"
     not_kept = "not kept"
 
@@ -62,7 +62,7 @@ _ONLY_REMARKS = (Kind.not_signed, Kind.not_kept)
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that does not agree, or cannot be compared, and the file in which it was found."""
+    """A disagreement, or something that cannot be compared, in a file."""
 
     file: Path
     kind: Kind
@@ -70,7 +70,7 @@ class Finding:
 
     @property
     def disagrees(self) -> bool:
-        """Whether something is wrong, rather than merely not comparable."""
+        """Whether something is wrong, rather than just not comparable."""
         return self.kind not in _ONLY_REMARKS
 
     def __str__(self) -> str:
@@ -79,19 +79,19 @@ class Finding:
 
 @dataclass(frozen=True)
 class Verified:
-    """The records that could be read, and what was found."""
+    """The records that could be read, and the findings."""
 
     records: tuple[Record, ...]
     findings: tuple[Finding, ...]
 
     @property
     def disagreements(self) -> tuple[Finding, ...]:
-        """The findings that say that something is wrong."""
+        """The findings that show a disagreement."""
         return tuple(finding for finding in self.findings if finding.disagrees)
 
 
 def verify(store: Store, depth: Depth) -> Verified:
-    """Read all records of a run and compare them with what was written down beside them."""
+    """Read all records of a run and compare them with their hashes and maps."""
     records: dict[Path, Record] = {}
     findings: list[Finding] = []
     for file in store.record_files():
@@ -112,7 +112,7 @@ def sound_records(store: Store, depth: Depth) -> list[Record]:
     Raises
     ------
     RecordError
-        There is no run, or something in it does not agree.
+        There is no run, or its contents disagree.
 
     """
     store.check_is_run()
@@ -126,7 +126,7 @@ def _refusal(store: Store, found: Sequence[Finding]) -> str:
     named = "\n".join(f"  {finding}" for finding in found[:_NAMED])
     more = f"\n  and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
     return (
-        f"{store.folder} cannot be used: its records or maps are not what was measured.\n"
+        f"{store.folder} cannot be used: its records or maps were changed after measuring.\n"
         f"{named}{more}\nDelete these files and run again, or restore them. "
         f"`cembench status {store.folder} --verify` compares everything."
     )
@@ -141,12 +141,14 @@ def verify_record(file: Path, record: Record) -> Iterator[Finding]:
         yield Finding(file, Kind.digest, "was changed after it was written: its digest differs")
     if not file.stem.endswith(f"--{record.cell.key[:12]}"):
         yield Finding(
-            file, Kind.file_name, f"its content has the key {record.cell.key[:12]}, not its name's"
+            file,
+            Kind.file_name,
+            f"its content has the key {record.cell.key[:12]}, which is not the key in its name",
         )
     outcome = record.outcome
     folds = outcome.metrics.get("flipped_triangles")
     if outcome.status == "ok" and folds:
-        yield Finding(file, Kind.status, f"its status is ok although {folds} triangles are folded")
+        yield Finding(file, Kind.status, f"its status is ok, but {folds} triangles are folded")
 
 
 def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
@@ -161,12 +163,10 @@ def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
     if uv is None or mesh is None:
         if outcome.metrics:
             missing = kept if uv is None else surface
-            yield Finding(
-                file, Kind.not_kept, f"cannot be computed again: there is no {missing.name}"
-            )
+            yield Finding(file, Kind.not_kept, f"cannot be recomputed: there is no {missing.name}")
         return
     if outcome.uv_hash is not None and outcome.uv_hash != hashlib.sha256(uv.tobytes()).hexdigest():
-        yield Finding(file, Kind.map, f"{kept.name} holds another map than was measured")
+        yield Finding(file, Kind.map, f"{kept.name} does not hold the map that was measured")
         return
     counts = (mesh.n, mesh.m, sum(len(loop) for loop in mesh.loops))
     facts = record.mesh
@@ -175,7 +175,7 @@ def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
         yield Finding(
             file,
             Kind.mesh,
-            f"tells of {written} vertices, triangles and boundary vertices; {surface.name} has "
+            f"records {written} vertices, triangles and boundary vertices; {surface.name} has "
             f"{counts}",
         )
     atlas = record.target == "atlas"
@@ -186,30 +186,33 @@ def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
     figures = atlas_metrics(mesh, uv.reshape(-1, 3)) if atlas else all_metrics(mesh, uv)
     differing = different_metrics(outcome.metrics, figures)
     if differing:
-        yield Finding(file, Kind.metrics, f"the map gives other figures: {'; '.join(differing)}")
+        yield Finding(
+            file, Kind.metrics, f"the map gives different figures: {'; '.join(differing)}"
+        )
 
 
 def different_metrics(
     recorded: Mapping[str, float | None], computed: Mapping[str, float]
 ) -> list[str]:
-    """Return in words which figures differ by more than rounding; null stands for infinity."""
+    """Return a text for each figure that differs by more than rounding; null means infinity."""
     size = abs(computed["dirichlet_energy"]) + abs(computed["image_area"])
     worst = computed["dilatation_max"]
     bounds = {
         "dirichlet_energy": ROUNDING * size,
         "image_area": ROUNDING * size,
-        "conformal_energy": ROUNDING * size,  # a small difference of those two
+        "conformal_energy": ROUNDING * size,  # a small difference of two large terms
         "angle_error_mean_deg": ROUNDING * 180,
         "angle_error_sd_deg": ROUNDING * 180,
         "flipped_triangles": 0.0,
-        # From 1 - |mu|, of which a dilatation of 1e8 leaves eight digits.
+        # Computed from 1 - |mu|, which keeps eight digits at a dilatation of 1e8.
         "dilatation_mean": ROUNDING * worst * worst,
         "dilatation_max": ROUNDING * worst * worst,
         "boundary_circularity": ROUNDING,
         "beltrami_area_mean": ROUNDING,
         "beltrami_max": ROUNDING,
         "common_gauge_energy": ROUNDING * size,
-        "area_distortion_mean": ROUNDING * worst,  # of areas, which slivers have few digits of
+        "area_distortion_mean": ROUNDING
+        * worst,  # from areas, which have few correct digits for slivers
         "area_distortion_sd": ROUNDING * worst,
         "overlap_share": ROUNDING,
     }
@@ -226,7 +229,7 @@ def different_metrics(
 
 
 def _chosen(records: Mapping[Path, Record], depth: Depth) -> list[tuple[Path, Record]]:
-    """Return whose maps are verified."""
+    """Return the records whose maps are verified."""
     if depth is Depth.records:
         return []
     if depth is Depth.everything:

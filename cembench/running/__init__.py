@@ -1,1 +1,1 @@
-"""From a plan of cells to records: each cell is measured in a process of its own."""
+"""Measure the cells of a plan, each in its own process, and return records."""

@@ -1,4 +1,4 @@
-"""On what machine, with what libraries and limits, was something measured?"""
+"""Description of the machine, the libraries and the limits of a measurement."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-#: Variables that set the number of threads; they must be set before a numerical library loads.
+#: Variables that set the number of threads; set them before numerical libraries are loaded.
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
     "OPENBLAS_NUM_THREADS",
@@ -23,12 +23,12 @@ _LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pypardiso", "pydantic")
 
 
 def with_threads(count: int) -> dict[str, str]:
-    """The environment of a process whose numerical libraries use this many threads."""
+    """Return an environment in which numerical libraries use this many threads."""
     return os.environ | dict.fromkeys(THREAD_VARIABLES, str(count))
 
 
 def describe_environment() -> dict[str, Any]:
-    """Everything that a figure may depend on; values that JSON can hold, "id" hashing the rest."""
+    """Return everything that a figure may depend on, as JSON values; "id" is a hash of the rest."""
     import psutil
     from threadpoolctl import threadpool_info
 
@@ -70,7 +70,7 @@ def _cpu_model() -> str:
 
 
 def _git_state() -> dict[str, Any] | None:
-    """Commit and dirtiness of the checkout that cembench runs from; None for an installed one."""
+    """Return commit and state of cembench's git checkout; None if it is installed."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return None

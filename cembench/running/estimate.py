@@ -1,9 +1,9 @@
-"""How long will a run take, and how much memory? Said before it starts, from what is known.
+"""Estimate the seconds and the memory of a run before it starts.
 
-A call's seconds are taken from an earlier record of the same cell; else from a power law in the
-number of triangles through the algorithm's records; else, roughly, from what the built-in
-algorithms usually take (:mod:`cembench.running.usual_seconds`); of any other algorithm from the
-slowest of the paper's, which an unknown one seldom exceeds.
+The seconds of a call are taken from an earlier record of the same cell, or else from a power law in
+the number of triangles through the algorithm's records. Without records, the usual seconds of
+built-in algorithms are used (:mod:`cembench.running.usual_seconds`), and for other algorithms those
+of the paper's slowest one, which they seldom exceed.
 """
 
 from __future__ import annotations
@@ -22,23 +22,23 @@ from cembench.running.usual_seconds import FACES, USUAL
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
-#: Seconds to start a process, load the libraries and read the mesh.
+#: Seconds to start a process, load libraries and read the mesh.
 START_SECONDS = 0.5
-#: The same of a process that is forked from one that has loaded them, and to end it.
+#: The same for a process forked from one with the libraries loaded, including its end.
 FORK_SECONDS = 0.1
-#: Times as long as a call takes a process that times: the warm-up, and one call or more; a long
-#: call is made once.
+#: Duration of a timing process in calls: the warm-up, and one call or more; a long call is made
+#: once.
 CALLS_A_ROUND = 2.5
-#: Seconds of the check beside its call: metrics, by triangle.
+#: Seconds per triangle of a check besides its call: computing metrics.
 CHECK_SECONDS_A_FACE = 2e-6
-#: Bytes of an empty process, and by triangle, where nothing is recorded.
+#: Bytes of an empty process, and per triangle, if nothing is recorded.
 ROUGH_BYTES = 150e6
 ROUGH_BYTES_A_FACE = 2500.0
-#: Rounds that a cell takes until it is precise, on a machine with little else to do.
+#: Typical rounds until a cell is precise, on a quiet machine.
 USUAL_ROUNDS = 20
-#: What stands for an algorithm of which nothing is known.
+#: Substitute for an unknown algorithm.
 SLOWEST = "qiem"
-#: Growth with the number of triangles where records of one size only are there.
+#: Exponent of growth if there are records of only one size.
 _USUAL_EXPONENT = 1.2
 
 
@@ -50,24 +50,24 @@ class PowerLaw:
     exponent: float
 
     def at(self, faces: float) -> float:
-        """The value for so many triangles."""
+        """Return the value for this number of triangles."""
         return self.factor * faces**self.exponent
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """Of one cell: seconds of one call and of all its processes, bytes of the largest of them."""
+    """Estimate for a cell: seconds of a call and of all processes, and peak bytes."""
 
     call_seconds: float
     seconds: float
     memory_bytes: float
     basis: Basis
-    #: Of the seconds, those that are spent whatever the budget is: until the first look.
+    #: The seconds up to the first look, which are spent whatever the budget is.
     least_seconds: float = 0.0
 
 
 def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
-    """What will this cell cost, judging by these records?"""
+    """Return the estimated cost of a cell, based on these records."""
     known = [
         (float(r.mesh.faces), r.outcome.median_seconds, r.outcome.peak_memory_bytes, r.cell)
         for r in records
@@ -96,7 +96,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
 
 
 def planned_seconds(costs: Sequence[Estimate], budget: float | None) -> float:
-    """Return the seconds of all cells: more rounds than the first are taken within the budget."""
+    """Return the seconds of all cells, with further rounds only within the budget."""
     everything = sum(cost.seconds for cost in costs)
     if budget is None:
         return everything
@@ -104,12 +104,12 @@ def planned_seconds(costs: Sequence[Estimate], budget: float | None) -> float:
 
 
 def _bytes_at(faces: float, size: float, peak: float) -> float:
-    """In proportion to the triangles beyond those of an empty process, and never below a record."""
+    """Return bytes, proportional to the triangles above an empty process, at least a record's."""
     return peak + max(0.0, peak - ROUGH_BYTES) * max(0.0, faces / size - 1)
 
 
 def fit_power_law(points: Sequence[tuple[float, float]]) -> PowerLaw:
-    """The least-squares line through the logarithms of (faces, seconds)."""
+    """Return the power law fitted to the logarithms of (faces, seconds) by least squares."""
     x = [log(size) for size, _ in points]
     y = [log(seconds) for _, seconds in points]
     spread = sum((a - mean(x)) ** 2 for a in x)
@@ -122,7 +122,7 @@ def fit_power_law(points: Sequence[tuple[float, float]]) -> PowerLaw:
 
 
 def _usual_law(cell: Cell) -> PowerLaw:
-    """The law of a built-in algorithm, and of the paper's slowest for one that is none."""
+    """Return the power law of a built-in algorithm, or of the paper's slowest for others."""
     laws = USUAL.get(cell.algorithm, USUAL[SLOWEST])
     seconds, exponent = laws[cell.solves != "reuse"]
     return PowerLaw(seconds / FACES**exponent, exponent)

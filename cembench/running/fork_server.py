@@ -1,9 +1,9 @@
-"""Processes that start at once: forked from one that has loaded the libraries and nothing else.
+"""Start processes quickly by forking a server that has only loaded the libraries.
 
-Loading them takes longer than most calls. A server loads them with its threads pinned, and waits;
-the processes of a round are forked from it, one after the other. It never sees a mesh, an algorithm
-or a plug-in, so what it hands down is what a fresh interpreter holds before its first job. Used on
-Linux and with one thread: a pool of threads does not survive a fork.
+Loading the libraries takes longer than most calls. A server loads them with a fixed number of
+threads and waits; the processes of a round are forked from it, one after the other. It never sees a
+mesh, an algorithm or a plug-in, so a forked process has the state of a fresh interpreter before its
+first job. Used on Linux with one thread only, because thread pools do not survive a fork.
 """
 
 from __future__ import annotations
@@ -26,26 +26,26 @@ from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.running import worker
 from cembench.running.process import MARK, Start, die_with_parent
 
-#: What stands in the server's environment where a forked process writes its mark, as long as that.
+#: Placeholder in the server's environment, as long as the mark that a forked process writes there.
 _NO_MARK = "0" * 32
 
 
 class ServerGoneError(Exception):
-    """The server has ended, or was ended."""
+    """The server has ended or was killed."""
 
 
 def can_fork(threads: int) -> bool:
-    """Are processes with so many threads forked here, rather than started?"""
+    """Whether processes with this many threads can be forked on this system."""
     return threads == 1 and sys.platform == "linux" and hasattr(os, "pidfd_open")
 
 
 class ForkServer:
-    """The server, seen from the process that starts it; it ends with that, or when closed.
+    """Client of the server in the process that starts it; the server ends with it or on close.
 
     Raises
     ------
     ServerGoneError
-        It could not load the libraries, or one of them starts threads.
+        The server could not load the libraries, or one of them starts threads.
 
     """
 
@@ -68,7 +68,7 @@ class ForkServer:
             raise
 
     def forking(self, job_file: Path) -> Start:
-        """What starts, for `run_limited`, a process that does the job in this file."""
+        """Return a function for `run_limited` that forks a process for the job in this file."""
 
         def start(mark: str, log: Path) -> _Forked:
             pid = self.ask({"job": str(job_file), "log": str(log), "mark": mark})
@@ -78,7 +78,7 @@ class ForkServer:
         return start
 
     def ask(self, request: object) -> int | None:
-        """What does it answer? Raises :class:`ServerGoneError`."""
+        """Return the server's answer; raise :class:`ServerGoneError` if it is gone."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(json.dumps(request).encode() + b"\n")
@@ -95,7 +95,7 @@ class ForkServer:
         return number
 
     def close(self) -> None:
-        """End it."""
+        """End the server."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
@@ -105,7 +105,7 @@ class ForkServer:
 
 @dataclass
 class _Forked:
-    """A child of the server, as `subprocess.Popen` would show one of ours."""
+    """A child of the server, with the interface of `subprocess.Popen`."""
 
     server: ForkServer
     pid: int
@@ -128,13 +128,13 @@ class _Forked:
             try:
                 self.code = self.server.ask(what)
             except ServerGoneError:
-                self.code = -signal.SIGKILL  # its children are ended with it
+                self.code = -signal.SIGKILL  # its children are killed with it
         return self.code
 
 
 @dataclass(frozen=True)
 class _ForkRequest:
-    """What a forked process is to do, and how it is to be known."""
+    """The job of a forked process, and its mark."""
 
     job: str
     log: str
@@ -142,7 +142,7 @@ class _ForkRequest:
 
 
 def _serve() -> _ForkRequest:
-    """Answer the requests on standard input, a line each; returns in every forked process."""
+    """Answer requests on standard input, one per line; return in every forked process."""
     requests = os.fdopen(0, "rb", buffering=0, closefd=False)
     child = 0
     _say(None)
@@ -155,7 +155,7 @@ def _serve() -> _ForkRequest:
         child = os.fork()
         if not child:
             return _ForkRequest(**request)
-        with suppress(OSError):  # the child did it, or has ended
+        with suppress(OSError):  # already done by the child, or the child has ended
             os.setpgid(child, child)
         _say(child)
     os._exit(0)
@@ -166,7 +166,7 @@ def _say(number: int | None) -> None:
 
 
 def _become(order: _ForkRequest) -> None:
-    """Be in a group of our own, be marked, have no input, and write to the log."""
+    """Join a new process group, set the mark, close the input, and write to the log."""
     os.setpgid(0, 0)
     for file, way, targets in (
         (os.devnull, os.O_RDONLY, (0,)),
@@ -176,7 +176,7 @@ def _become(order: _ForkRequest) -> None:
         for target in targets:
             os.dup2(opened, target)
         os.close(opened)
-    # Over the old one, where the system reads the environment of a process.
+    # Overwrites the placeholder where the system reads the environment of a process.
     getenv = ctypes.CDLL(None).getenv
     getenv.restype = ctypes.c_void_p
     ctypes.memmove(getenv(MARK.encode()), order.mark.encode(), len(_NO_MARK))
@@ -185,18 +185,18 @@ def _become(order: _ForkRequest) -> None:
 
 
 def _load(backend: str) -> None:
-    """Load what every process needs, and see that nothing has begun to run beside us."""
+    """Load what every process needs, and check that no library has started threads."""
     worker.load_libraries()
     with linear_algebra(backend=backend):
         """Entering it loads the library."""
     if len(list(Path("/proc/self/task").iterdir())) > 1:
         sys.exit("a library has started a thread")
     gc.collect()
-    gc.freeze()  # what is loaded stays: no process has to look through it
+    gc.freeze()  # loaded objects are permanent: processes need not scan them for garbage
 
 
 def _main(parent: int, backend: str) -> None:
-    """Load, serve, and in each forked process do its job."""
+    """Load the libraries, serve requests, and run the job in each forked process."""
     die_with_parent(parent)
     _load(backend)
     order = _serve()

@@ -1,15 +1,15 @@
 """Judge a map: whether it keeps the promises of its target.
 
 A map whose image triangles all have positive area takes each value as often as the boundaries'
-images wind round it. So it is injective where no triangle is folded and the boundaries' images are
-polygons that neither cross themselves nor each other; both are decided exactly for the given
+images wind around it. So it is injective if no triangle is folded and the boundaries' images are
+polygons that cross neither themselves nor each other. Both are decided exactly for the given
 doubles.
 
-Boundary vertices can lie closer together on the circle than doubles can tell apart. Angles that
-differ by no more than rounding (:data:`~cembench.conformal.planar.ANGLE_ROUNDING`) therefore count
-as in order. Nothing is lost by that: where two neighbours fall into one point, the triangle at
-their edge has no area and counts as folded, and where they change places by a rounding error,
-either that triangle is folded or the polygon crosses itself.
+Boundary vertices can be closer together on the circle than doubles can resolve. Angles that differ
+by no more than rounding (:data:`~cembench.conformal.planar.ANGLE_ROUNDING`) therefore count as
+ordered. Nothing is lost by that: if two neighbours coincide, the triangle at their edge has no area
+and counts as folded; if a rounding error swaps them, either that triangle is folded or the polygon
+crosses itself.
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from cembench.results.records import Fault, FaultKind
 
 Complex = NDArray[np.complex128]
 
-#: How far from the unit circle a boundary vertex of a disk may lie.
+#: Tolerance of a disk's boundary vertices from the unit circle.
 CIRCLE_TOLERANCE = 1e-9
-#: How far from a circle, relative to its radius, a hole's image may be and still be called one.
+#: Tolerance for a hole's image to count as a circle, relative to its radius.
 CIRCULAR = 1e-3
 
 
 class Promise(BaseModel):
-    """What of an algorithm its maps are judged by: data, for a process that never imports it."""
+    """The properties by which an algorithm's maps are judged, without importing the algorithm."""
 
     model_config = ConfigDict(frozen=True)
 
     target: Target = "disk"
-    #: How far from the unit circle the boundary of a disk may lie.
+    #: Tolerance of a disk's boundary from the unit circle.
     circle: float = CIRCLE_TOLERANCE
-    #: Another shape of the same triangles has the same map.
+    #: Whether the map depends only on the triangles, not on the shape.
     combinatorial: bool = False
-    #: Every call is a process of its own.
+    #: Whether every call is a separate process.
     is_program: bool = False
 
     @classmethod
     def of(cls, algorithm: Algorithm) -> Promise:
-        """Return what this algorithm promises."""
+        """Return the promise of this algorithm."""
         others = algorithm.program or algorithm.library
         return cls(
             target=algorithm.target,
@@ -64,8 +64,8 @@ class Promise(BaseModel):
 def faults(promised: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> list[Fault]:
     """Return the promises that this map breaks; none for a valid one.
 
-    A boundary that is in the wrong place comes before folds, one that is only out of order after
-    them: it is what folded the triangles beside it.
+    A misplaced boundary is listed before folds. A boundary that is only out of order is listed
+    after them, because it comes with folded triangles next to it.
     """
     promise = promised if isinstance(promised, Promise) else Promise.of(promised)
     if promise.target == "atlas":
@@ -92,9 +92,9 @@ def faults(promised: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> li
 
 
 def judged_atlas(mesh: TriangleMesh, corners: Complex) -> list[Fault]:
-    """Return the promises that an atlas breaks: that no triangle is folded, of any island.
+    """Return the promises that an atlas breaks: no island may have a folded triangle.
 
-    Islands may be mirrored, as packing does to them, but not all.
+    Packing may mirror islands, but not all of them may be mirrored.
     """
     figures = AtlasFigures(cut_map(mesh, corners))
     folded = int(figures.folds.sum())
@@ -110,7 +110,7 @@ def judged_atlas(mesh: TriangleMesh, corners: Complex) -> list[Fault]:
 
 
 def broken_premises(mesh: TriangleMesh) -> list[str]:
-    """Return what to say of a mesh that breaks a premise of the paper; nothing of another."""
+    """Return a remark if a mesh breaks a premise of the paper, else nothing."""
     broken = definition_1_notices(mesh.F, mesh.n, mesh.loops) if mesh.loops else ()
     return (
         [f"the mesh breaks a premise of the paper: {'; '.join(map(str, broken))}"] if broken else []
@@ -118,10 +118,10 @@ def broken_premises(mesh: TriangleMesh) -> list[str]:
 
 
 def remarks(algorithm: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> list[Notice]:
-    """Return what a reader should know of a map without faults.
+    """Return remarks on a map without faults.
 
-    That a free boundary overlaps itself, which its target does not rule out; and that holes are not
-    circles: how circular they are is a metric like the energy, not a promise.
+    These are that a free boundary overlaps itself, which its target allows, and that holes are not
+    circles: their circularity is a metric like the energy, not a promise.
     """
     if algorithm.target == "free boundary":
         found = _crossings(mesh, uv)
@@ -143,7 +143,7 @@ def _outer(mesh: TriangleMesh, uv: Complex) -> NDArray[np.int64]:
 def _of_the_circle(
     mesh: TriangleMesh, uv: Complex, tolerance: float
 ) -> tuple[list[Fault], list[Fault]]:
-    """Whether the outer boundary lies on the unit circle and goes round it once; and in order."""
+    """Return faults of position and winding on the unit circle, and faults of order."""
     z = uv[_outer(mesh, uv)]
     name = "boundary" if len(mesh.loops) == 1 else "outer boundary"
     found, order = [], []
@@ -152,7 +152,7 @@ def _of_the_circle(
         told = f"the {name} lies off the unit circle by up to {off:.2g}"
         found.append(_fault(FaultKind.OFF_CIRCLE, told))
     around, winding, backward = turns(z)
-    if around != 1 and winding not in (0, 1):  # 0: all points may lie on half of the circle
+    if around != 1 and winding not in (0, 1):  # 0: all points may be on one half of the circle
         told = f"the {name} goes round the circle {winding} times, not once counter-clockwise"
         found.append(_fault(FaultKind.WINDING, told))
     elif around != 1:
@@ -167,12 +167,12 @@ def _crossings(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
         return []
     one, other = (f"boundary {int(mesh.loops[k].min())}" for k in crossing)
     whom = "itself" if one == other else other
-    told = f"{one} crosses {whom} (boundaries are called by their smallest vertex)"
+    told = f"{one} crosses {whom} (a boundary is named by its smallest vertex)"
     return [_fault(FaultKind.BOUNDARIES_CROSS, told)]
 
 
 def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
-    """Holes that run counter-clockwise, like the outer boundary: the surface lies inside them."""
+    """Return faults of holes that run counter-clockwise, with the surface inside them."""
     outer = _outer(mesh, uv)
     turned = [k for k in mesh.loops if k is not outer and polygon_area(uv[k]) >= 0]
     return [
@@ -190,13 +190,13 @@ def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[Notice]:
     off = [circle.circularity for circle in circles if not circle.circularity <= CIRCULAR]
     if off:
         told.append(
-            f"{len(off)} of {len(circles)} holes are no circles: off by up to {max(off):.2g} of "
+            f"{len(off)} of {len(circles)} holes are not circles: off by up to {max(off):.2g} of "
             "the radius"
         )
-    # Three vertices always lie on a circle, but not always on one inside the disk.
+    # Three vertices are always on a circle, but not always on one inside the disk.
     out = [c for c in circles if c.circularity <= CIRCULAR < abs(c.centre) + c.radius - 1]
     if out:
-        told.append(f"the circles of {len(out)} of {len(circles)} holes reach out of the disk")
+        told.append(f"the circles of {len(out)} of {len(circles)} holes reach outside the disk")
     if any(
         abs(one.centre - other.centre) < (one.radius + other.radius) * (1 - CIRCULAR)
         for one, other in combinations(circles, 2)

@@ -1,8 +1,9 @@
-"""Judge what calls returned, in a process that never imports the algorithm.
+"""Judge the maps that calls returned, in a process that never imports the algorithm.
 
-The first call's map of the surface as it is is the map of record: its promises are judged and its
-metrics computed. Timed calls get the surface moved (:mod:`cembench.running.motion`), each another
-way; their maps have to keep the promises too, and to be the map of just that surface.
+The map of the first call, on the original surface, is the recorded one: its promises are judged and
+its metrics computed. Each timed call gets the surface in a different motion
+(:mod:`cembench.running.motion`); its map must keep the promises too, and must be the map of that
+moved surface.
 """
 
 from __future__ import annotations
@@ -35,50 +36,50 @@ from cembench.running.returned import hash_of, outcome_of_error
 
 Complex = NDArray[np.complex128]
 
-#: How far E_C of a timed call's map may be from that of the checked one, relative to its area: two
-#: maps of a solver that draws random numbers differ by less, one that stops earlier by more.
+#: Tolerance of E_C between timed and checked maps, relative to the area: maps of a randomised
+#: solver differ by less, maps of one that stops earlier by more.
 SAME_ENERGY = 1e-6
-#: Two maps are the same, to rounding, if no vertex is farther off, relative to the image's size;
-#: and nearly the same, as those of two motions are.
+#: Largest distance of a vertex, relative to the image's size, between maps that are equal to
+#: rounding, and between maps of two motions.
 SAME_MAP, NEARLY_THE_SAME = 1e-8, 1e-4
-#: At most so many entries of a map are kept to compare another with.
+#: Maximum number of entries of a map that are kept for comparisons.
 SAMPLED = 4096
 
 
 class Checked(BaseModel):
-    """What a timed call's map is compared with: bits and E_C over area of the checked map."""
+    """Hash and relative energy of the checked map, for comparison with timed calls."""
 
     uv_hash: str | None = None
-    #: None: only the promises of the target are judged.
+    #: E_C over area; None: only the promises of the target are judged.
     relative_energy: float | None = None
 
     @classmethod
     def of(cls, outcome: Outcome) -> Checked:
-        """Return what there is to compare with a checked call."""
+        """Return the comparison data of a checked call."""
         return cls(uv_hash=outcome.uv_hash, relative_energy=outcome.relative_energy)
 
 
 class JudgedCalls(BaseModel):
-    """What is found of a process's maps."""
+    """The result of judging a process's maps."""
 
-    #: Of the first bad one.
+    #: Faults of the first invalid map.
     faults: tuple[Fault, ...] = ()
-    #: Valid maps, but not of the surface that was given.
+    #: Faults of valid maps that are not maps of the given surface.
     kept: tuple[Fault, ...] = ()
-    #: The motion of a map that is far from the checked one, and of which nobody knows yet whether
-    #: it is the right one: a fresh process's call can tell.
+    #: The motion of a map far from the checked one; a call in a fresh process must show whether it
+    #: is right.
     doubtful: str | None = None
-    #: Whether what could be compared was the same to rounding; None: nothing could.
+    #: Whether all compared maps agree to rounding; None if none could be compared.
     repeated: bool | None = None
 
 
 def sample(uv: Complex) -> Complex:
-    """Return at most :data:`SAMPLED` entries of a map, spread over it."""
+    """Return at most :data:`SAMPLED` entries of a map, evenly spaced."""
     return np.array(uv[:: max(1, -(-len(uv) // SAMPLED))])
 
 
 def judged_check(promise: Promise, mesh: TriangleMesh, called: Outcome, uv: Complex) -> Outcome:
-    """Return the outcome of the checked call: what is known of the call, and of its map."""
+    """Return the outcome of the checked call, with the judgement of its map."""
     try:
         about, more = _judged(promise, mesh, uv, called.extras)
     except MemoryError as error:
@@ -101,10 +102,10 @@ def judged_calls(
     *,
     repeats: bool | None = None,
 ) -> JudgedCalls:
-    """Judge the maps of a process: each with what to call it, its motion, and its values.
+    """Judge the maps of a process, each given with its name, motion and values.
 
-    `known` holds samples of maps of other processes, by motion; that of :data:`UNMOVED` is the
-    checked one. `repeats` says whether fresh processes are known to repeat themselves.
+    `known` holds samples of maps from other processes by motion; that of :data:`UNMOVED` is the
+    checked one. `repeats` says whether fresh processes are known to give the same map.
     """
     seen = {checked.uv_hash: UNMOVED}
     repeated, kept, doubtful = None, [], None
@@ -112,8 +113,8 @@ def judged_calls(
         bits = hash_of(uv)
         if seen.setdefault(bits, motion) != motion and not promise.combinatorial:
             told = (
-                f"{name} returned, bit by bit, the map of the surface in another shape: one that "
-                "was kept, or made without a look at the coordinates (declare that with "
+                f"{name} returned, bit by bit, the map of the surface in another shape: the map "
+                "was kept from another call, or does not depend on the coordinates (then declare "
                 "combinatorial=True)"
             )
             return JudgedCalls(kept=(Fault(kind=FaultKind.KEPT_RESULT, detail=told),))
@@ -133,9 +134,9 @@ def judged_calls(
                 wrong = []
             elif apart > SAME_MAP and not wrong and repeats and not promise.is_program:
                 told = (
-                    f"maps of the same surface by a fresh process and by one that had been called "
-                    f"before differ by {apart:.2g}, those by fresh ones do not: something is kept "
-                    "from call to call"
+                    f"maps of the same surface differ by {apart:.2g} between a fresh process and "
+                    "one with earlier calls, but not between fresh ones: something is kept from "
+                    "call to call"
                 )
                 kept.append(Fault(kind=FaultKind.KEPT_RESULT, detail=told))
         elif only_energy:
@@ -149,7 +150,7 @@ def judged_calls(
 
 
 def _apart(uv: Complex, other: Complex) -> float:
-    """How far is a map from another's sample, relative to its size?"""
+    """Return the distance of a map from another's sample, relative to its size."""
     mine = sample(uv)
     if mine.shape != other.shape:
         return math.inf
@@ -176,7 +177,7 @@ def _other_energy(
 def _judged(
     promise: Promise, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
-    """Return what an outcome says of a map, and the faults."""
+    """Return the fields of an outcome for a map, and the faults."""
     with _unruffled():
         problems = faults(promise, mesh, uv)
         if promise.target == "atlas":
@@ -198,7 +199,7 @@ def _judged(
 
 @contextmanager
 def _unruffled() -> Iterator[None]:
-    """Let no warning be an error: the algorithm may have made it one, for NumPy or for Python."""
+    """Ignore warnings, which the algorithm may have turned into errors in NumPy or Python."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield

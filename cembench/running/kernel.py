@@ -1,7 +1,7 @@
-"""The reference kernel: fixed work that every round times, so that two runs can be compared.
+"""The reference kernel: fixed work, timed in every round, that makes two runs comparable.
 
-A sparse factorisation by SciPy, of a Laplacian on a square grid: nothing of it is cembench's, so no
-change of cembench's makes it faster. What slows the machine slows it too.
+It is a sparse factorisation by SciPy of a Laplacian on a square grid. It uses no code of cembench,
+so no change of cembench makes it faster; whatever slows the machine slows it too.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-#: Points on a side of the grid, and how often it is factored each time.
+#: Points along a side of the grid, and number of factorisations per measurement.
 SIDE, TIMES = 70, 3
 
 
@@ -26,7 +26,7 @@ def _laplacian() -> Any:
 
 
 def kernel_seconds() -> float:
-    """Return the wall-clock seconds of one factorisation, the median of a few, in this process."""
+    """Return the wall-clock seconds of a factorisation in this process, the median of a few."""
     matrix = _laplacian()
     return median(_timed(matrix) for _ in range(TIMES))
 

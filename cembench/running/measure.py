@@ -1,9 +1,9 @@
 """Measure one algorithm on one surface in this process.
 
-Timed is the call alone, from the arrays V and F in memory to uv: the boundary loops, the Laplacian,
-ordering, factorisation and iterations, and nothing else. An algorithm's word is not trusted: every
-map, checked or timed, is judged (:mod:`cembench.running.judging`), in another process where there
-is one, and the metrics are computed there.
+Only the call is timed, from the arrays V and F in memory to uv: boundary loops, Laplacian,
+ordering, factorisation and iterations. The algorithm is not trusted: every map, checked or timed,
+is judged (:mod:`cembench.running.judging`), in another process if possible, and the metrics are
+computed there.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ from cembench.running.returned import (
     report_of,
 )
 
-#: A process times further calls until they have taken so many seconds together, or are so many.
+#: A process times further calls up to this total of seconds, or this number of calls.
 ENOUGH_SECONDS = 0.1
 ENOUGH_CALLS = 5
-#: A first call that takes so many seconds is not repeated: a warm-up saves tenths of one.
+#: A first call longer than this, in seconds, is not repeated: a warm-up saves only tenths of one.
 LONG_CALL = 5.0
-#: What the first call is called where it only warms up.
+#: Name of a first call that only warms up.
 WARM_UP = "the warm-up"
 
 Complex = NDArray[np.complex128]
@@ -64,33 +64,33 @@ Call = Callable[[TriangleMesh], tuple[Any, Timing]]
 
 @dataclass
 class TimedCalls:
-    """The calls of one process in order, the first of which may only warm up."""
+    """The calls of one process in order; the first may be a warm-up."""
 
     is_warmed_up: bool = False
     motions: list[str] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
-    #: The map of each as it was right after it.
+    #: The map of each call, copied right after it.
     maps: list[Complex | Fault] = field(default_factory=list)
-    #: CPU seconds when each began and ended.
+    #: CPU seconds at the begin and end of each call.
     before: list[Processor] = field(default_factory=list)
     after: list[Processor] = field(default_factory=list)
-    #: Whether a call changed the surface that it was given.
+    #: Whether a call changed the given surface.
     changed: bool = False
     began: float = field(default_factory=monotonic)
 
     @property
     def timed(self) -> list[Timing]:
-        """The calls that count."""
+        """The calls without a warm-up."""
         return self.timings[self.is_warmed_up :]
 
     def names(self) -> list[str]:
-        """Return what to call each."""
+        """Return the names of the calls."""
         count = len(self.timed)
         calls = [f"call {k} of {count}" for k in range(1, count + 1)]
         return [WARM_UP, *calls] if self.is_warmed_up else calls
 
     def used(self) -> Used:
-        """Return what the calls that count used."""
+        """Return the resources used by the calls without a warm-up."""
         first = int(self.is_warmed_up)
         pairs = list(zip(self.before, self.after, strict=True))
         gaps = list(zip(self.after, self.before[1:], strict=False))
@@ -110,11 +110,11 @@ class TimedCalls:
 def check_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
 ) -> tuple[Outcome, Complex | None]:
-    """Call once: is the result a valid map, and how much memory does the call take?
+    """Call once, judge the map, and measure the memory of the call.
 
-    Never raises for what the algorithm does: an exception, also one that would end the process, is
-    a status with its cause. The one round of the outcome is this call, without warm-up. The second
-    value is the map, also that of an invalid one if it has the right shape and is finite.
+    This never raises because of the algorithm: an exception, even one that would end the process,
+    becomes a status with its cause. The only round of the outcome is this call, without a warm-up.
+    The second value is the map; an invalid one too, if it has the right shape and is finite.
     """
     called, uv = call_cell(algorithm, mesh, cell)
     if uv is None:
@@ -125,7 +125,7 @@ def check_cell(
 def call_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
 ) -> tuple[Outcome, Complex | None]:
-    """Call once, as :func:`check_cell`, and leave the map to be judged by somebody else."""
+    """Call once, like :func:`check_cell`, but leave the map to be judged elsewhere."""
     call = _call(algorithm, mesh, cell)
     program: dict[str, Any] = {}
     work: Work | None = None
@@ -163,7 +163,7 @@ def call_cell(
 def time_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, checked: Checked
 ) -> Round | Outcome:
-    """Time calls on the surface as it is, and judge their maps here: see :func:`timed_calls`."""
+    """Time calls on the original surface, and judge their maps here; see :func:`timed_calls`."""
     calls = timed_calls(algorithm, mesh, cell)
     if isinstance(calls, Outcome):
         return calls
@@ -184,11 +184,11 @@ def timed_calls(
     *,
     first_counts: bool = True,
 ) -> tuple[Round, TimedCalls] | Outcome:
-    """Time a call, after one to warm up; several calls where they are short.
+    """Time a call after a warm-up, or several calls if they are short.
 
-    A call of more than :data:`LONG_CALL` seconds is timed without a warm-up, if `first_counts`.
-    Each call gets the surface in another motion; without `motions`, as it is. The maps are judged
-    when all is timed. An outcome where the algorithm raised, or returned no map.
+    With `first_counts`, a call of more than :data:`LONG_CALL` seconds is timed without a warm-up.
+    Each call gets the surface in a different motion; without `motions`, unmoved. The maps are
+    judged after all timing. Returns an outcome if the algorithm raised or returned no map.
     """
     call = _call(algorithm, mesh, cell)
     try:
@@ -206,7 +206,7 @@ def timed_calls(
             break
     problems += [_changed()] if told.changed else _changes(mesh, cell)
     if not problems and min(t.total for t in told.timings) <= 0:
-        words = "its times cannot be: a call took no time, or less"
+        words = "its times are impossible: a call took no time or negative time"
         problems.append(Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=words))
     if problems:
         return not_ok("invalid", *problems)
@@ -218,14 +218,14 @@ def timed_calls(
 
 
 def _about_program(call: ProgramCalls) -> dict[str, Any]:
-    """Return what an outcome says of a program besides its map; nobody knows its iterations."""
+    """Return the fields of an outcome for a program, whose iterations are unknown."""
     start = call.start_seconds(1)
     about = {"program": call.facts(), "notes": call.notices(start), "start": start}
     return about | {"iterations": None}
 
 
 def _program_round(measured: Round, call: Call, calls: int, start: float | None) -> Round:
-    """Add to a round what an external program's process costs besides."""
+    """Return a round with the additional times of an external program's process."""
     if not isinstance(call, ProgramCalls):
         return measured
     own = call.own_seconds(calls)
@@ -235,7 +235,7 @@ def _program_round(measured: Round, call: Call, calls: int, start: float | None)
 def _timed(
     call: Call, mesh: TriangleMesh, target: str, motions: Sequence[str], *, first_counts: bool
 ) -> TimedCalls:
-    """Call, and note what came out and what it took."""
+    """Make the calls; record their maps and their times."""
     told = TimedCalls()
 
     def once() -> None:
@@ -260,7 +260,7 @@ def _timed(
         return told
     told.is_warmed_up = True
     gc.collect()
-    gc.freeze()  # collecting again looks at what is new, and leaves the rest out of the caches
+    gc.freeze()  # a second collection scans only new objects; the others stay out of the caches
     while len(told.timed) < ENOUGH_CALLS and sum(t.total for t in told.timed) < ENOUGH_SECONDS:
         once()
     gc.unfreeze()
@@ -295,8 +295,8 @@ def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
 
 
 def _read(found: Any) -> Any:
-    """Return what an algorithm returned, its map looked at: what it puts off is its time too."""
-    with suppress(BaseException):  # told when the result is taken apart
+    """Return an algorithm's result after reading its map, so that lazy work is timed too."""
+    with suppress(BaseException):  # reported when the result is examined
         _ = found.uv
     with suppress(BaseException):
         _ = found.corners

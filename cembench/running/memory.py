@@ -1,4 +1,4 @@
-"""How much memory does a call take at most?"""
+"""Peak memory of a call."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Memory:
-    """Resident bytes of this process; None where the system does not tell."""
+    """Resident bytes of this process; None if the system does not report them."""
 
-    #: The largest resident set, mesh and libraries included.
+    #: Peak resident memory, including mesh and libraries.
     peak: int | None
-    #: The peak less what was resident before the call.
+    #: The peak less the resident memory before the call.
     increase: int | None
 
 
 def memory_of_call(call: Callable[[], T]) -> tuple[T, Memory]:
-    """Call once; what is the largest resident set, and by how much did the call raise it?
+    """Call once; return the result, and the peak memory with its increase during the call.
 
-    On Linux the system's high-water mark is reset before the call; elsewhere the peak is that of
-    the whole process, and so is the increase.
+    On Linux the high-water mark is reset before the call; elsewhere, peak and increase are those of
+    the whole process.
     """
     gc.collect()
     with suppress(OSError):
@@ -39,7 +39,7 @@ def memory_of_call(call: Callable[[], T]) -> tuple[T, Memory]:
 
 
 def resident_bytes() -> int:
-    """The resident set of this process now."""
+    """Return the current resident memory of this process."""
     import psutil
 
     resident: int = psutil.Process().memory_info().rss
@@ -47,7 +47,7 @@ def resident_bytes() -> int:
 
 
 def peak_memory_bytes() -> int | None:
-    """The largest resident set this process has had; None where the system does not tell."""
+    """Return the peak resident memory of this process; None if the system does not report it."""
     status = Path("/proc/self/status")
     if status.exists():
         for line in status.read_text().splitlines():

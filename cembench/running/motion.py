@@ -1,10 +1,10 @@
-"""Move a surface so little that nothing about it matters, and so that no kept result fits it.
+"""Move a surface slightly, so that results kept from earlier calls do not fit it.
 
-Every timed call gets another motion of the surface: a rotation, a shift, a tiny scale, and a
-stretch by a millionth. Of a rigid motion the conformal map is the same one, so whoever kept it,
-under whatever key, would be right; of a stretch it is another one, by about as much as the stretch,
-far more than rounding and far less than any table shows. Vertices, triangles and their order stay,
-so the work is the same.
+Every timed call gets the surface in a different motion: a rotation, a shift, a tiny scale, and a
+stretch by a millionth. A rigid motion does not change the conformal map, so a kept map would still
+be right. A stretch changes it by about as much as the stretch itself: far more than rounding, and
+far less than any table shows. Vertices, triangles and their order stay the same, and so does the
+work.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
 
-#: The name of the motion that leaves all as it is.
+#: Name of the identity motion.
 UNMOVED = ""
-#: Relative change of lengths, largest against smallest: what kept results are told by.
+#: Relative stretch, largest against smallest length; it reveals kept results.
 STRETCH = 1e-6
-#: Largest angle, in radians, shift as a share of the surface's size, and relative change of scale:
-#: small, so that a method that looks at axes does the same work.
+#: Largest angle in radians, shift as a share of the surface's size, and relative change of scale;
+#: all are small, so that a method that depends on the axes does the same work.
 ANGLE, SHIFT, SCALE = 0.01, 0.01, 1e-3
 
 
 def motion(name: str) -> tuple[Real, Real]:
-    """Return the matrix (3, 3) and the shift (3,), in sizes of the surface, of the motion so named.
+    """Return the matrix (3, 3) and the shift (3,), in sizes of the surface, of a named motion.
 
     Examples
     --------
@@ -53,7 +53,7 @@ def motion(name: str) -> tuple[Real, Real]:
 
 
 def moved(mesh: TriangleMesh, name: str) -> TriangleMesh:
-    """Return the surface moved, in arrays of its own; under :data:`UNMOVED` a copy of it."""
+    """Return a moved copy of the surface; for :data:`UNMOVED`, a plain copy."""
     F = mesh.F.copy()
     if name == UNMOVED:
         V = mesh.V.copy()

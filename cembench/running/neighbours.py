@@ -1,4 +1,4 @@
-"""What else does the machine do while a process is measured? From the system's own counters."""
+"""Load of the machine by other work during a measurement, from the system's counters."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ import psutil
 
 from cembench.results.records import Neighbours
 
-#: What the kernel of Linux counts of how often a core was too hot.
+#: Counters of the Linux kernel for thermal throttling of a core.
 _THROTTLES = "devices/system/cpu/cpu[0-9]*/thermal_throttle/core_throttle_count"
 
 
 @dataclass(frozen=True)
 class Counters:
-    """Seconds of all cores since the machine started, and how often one was too hot."""
+    """Seconds of all cores since the machine started, and throttling events."""
 
     worked: float
     stolen: float
-    #: None where the system does not tell.
+    #: None if the system does not report it.
     throttles: int | None
     at: float = field(default_factory=monotonic)
 
 
 def counters() -> Counters:
-    """Return what the system counts now."""
+    """Return the current counters of the system."""
     times = psutil.cpu_times()
     names = ("user", "nice", "system", "irq", "softirq")
     worked = sum(float(getattr(times, name, 0.0)) for name in names)
@@ -36,10 +36,10 @@ def counters() -> Counters:
 
 
 def neighbours(before: Counters, after: Counters, threads: int) -> Neighbours:
-    """Return what took part of the machine between two readings, beside a process of ours.
+    """Return the load by other work between two readings.
 
-    That is taken to have worked all the time on so many threads; where it waited, as much less of
-    the others is seen.
+    Our process is assumed to have used all its `threads` the whole time; if it waited, the load of
+    others is underestimated by as much.
     """
     seconds = max(after.at - before.at, 1e-9)
     throttled = None

@@ -1,4 +1,4 @@
-"""Which cells are to be measured?"""
+"""Plan a run: the cells to measure, and their surfaces."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ M = TypeVar("M", bound=TriangleMesh)
 
 @dataclass(frozen=True)
 class Task:
-    """A cell with all that its measurement needs."""
+    """A cell with everything needed to measure it."""
 
     cell: Cell
     algorithm: Algorithm
     mesh: TriangleMesh
     facts: MeshFacts
     plugins: tuple[str, ...] = ()
-    #: SHA-256 of the files that the cell's `code_hash` is made of, by relative paths.
+    #: SHA-256 of the files behind the cell's `code_hash`, by relative path.
     sources: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class PaperRole:
-    """Which row of the paper's Table 1 a surface has, and whether it is that model or stands in."""
+    """A surface's row in the paper's Table 1, and whether it is that model or a stand-in."""
 
     paper_row: str = ""
     origin: MeshOrigin = "surface"
@@ -46,19 +46,19 @@ class PaperRole:
 
 @dataclass(frozen=True)
 class MeasurementSettings:
-    """What a plan's cells have in common."""
+    """Settings that all cells of a plan share."""
 
     solves: str = "reuse"
     backend: str = field(default_factory=default_backend)
     threads: int = 1
-    #: A fixed number of rounds; 0 with a precision.
+    #: Fixed number of rounds; 0 with a precision.
     repeats: int = DEFAULT_ROUNDS
-    #: How far the intervals may reach to either side of a figure, relative to it.
+    #: Largest half-width of the intervals, relative to the figure.
     precision: float | None = None
 
     @classmethod
     def until_precise(cls, precision: float, **more: Any) -> MeasurementSettings:
-        """Return settings for as many rounds as a precision takes."""
+        """Return settings for measuring until a precision is reached."""
         return cls(repeats=0, precision=precision, **more)
 
 
@@ -70,27 +70,27 @@ def plan_cells(
     plugins: Sequence[str] = (),
     standing: Mapping[str, PaperRole] = MappingProxyType({}),
 ) -> list[Task]:
-    """Every algorithm on every surface that it takes, surfaces outermost.
+    """Return a task for every algorithm on every surface that it takes, grouped by surface.
 
-    A surface that comes twice under one name, as from two files of one folder, counts once.
+    A surface that occurs twice under the same name, as from two files of a folder, counts once.
 
-    In `parameters`, the key ``name`` goes to every algorithm that has such a parameter and
-    ``algorithm.name`` to that one alone. `standing` is by the surfaces' names; a surface that is
-    not in it is none of the paper's.
+    In `parameters`, the key ``name`` sets a parameter of every algorithm that has it, and
+    ``algorithm.name`` of that one only. `standing` is keyed by the surfaces' names; surfaces not in
+    it are not the paper's.
 
     Raises
     ------
     ParameterError
-        A parameter that none of the algorithms has, or a value that one refuses.
+        No algorithm has such a parameter, or one refuses its value.
     MeshError
-        Two different surfaces of one name, or one that no algorithm takes.
+        Two different surfaces have the same name, or no algorithm takes a surface.
 
     """
     meshes = list({(mesh.name, mesh.hash): mesh for mesh in meshes}.values())
     names = [mesh.name for mesh in meshes]
     for name in names:
         if names.count(name) > 1:
-            raise MeshError(f"two surfaces are called {name!r}; rename one of the files.")
+            raise MeshError(f"two different surfaces are called {name!r}; rename one of the files.")
     arguments = distribute_parameters(algorithms, parameters)
     sources = {a.name: sources_of(a) for a in algorithms}
     tasks = []
@@ -123,7 +123,7 @@ def plan_cells(
 def distribute_parameters(
     algorithms: Sequence[Algorithm], given: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Which keyword arguments does each algorithm get, by its name? See :func:`plan_cells`."""
+    """Return the keyword arguments of each algorithm by its name; see :func:`plan_cells`."""
     chosen: dict[str, dict[str, Any]] = {a.name: {} for a in algorithms}
     for key, value in given.items():
         only, _, name = key.rpartition(".")
@@ -143,7 +143,7 @@ def distribute_parameters(
 
 
 def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFacts:
-    """What does a table say of this surface?"""
+    """Return the facts of a surface for tables."""
     return MeshFacts(
         vertices=mesh.n,
         faces=mesh.m,
@@ -158,17 +158,15 @@ def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFac
 def read_mesh_for(
     path: Path, algorithms: Sequence[Algorithm], soup: Soup | None = None
 ) -> TriangleMesh:
-    """Read a file as the kind of surface that the algorithms take, the narrowest that it is.
+    """Read a file as the most special kind of surface that the algorithms take.
 
-    With `soup`, that is taken for what the file holds.
-
-    With `repaired`, its first surface is taken for what the file holds.
+    With `soup`, these triangles are used instead of the file's content.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or is of no kind that any of the algorithms takes: why it is not
-        of the first one's kind.
+        The file cannot be read, or no algorithm takes its kind of surface; the message says why it
+        does not fit the first algorithm.
 
     """
     soup = read_soup(path) if soup is None else soup
@@ -191,7 +189,7 @@ def gather_surfaces(
     *,
     mend: bool = False,
 ) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
-    """Read these files, generate these surfaces; and which rows of the paper do they stand for?
+    """Read these files and generate these surfaces; return them and their roles in the paper.
 
     With `mend`, the files are repaired first.
     """
@@ -206,20 +204,20 @@ def gather_surfaces(
     return found, standing | paper_roles(registry, names)
 
 
-#: A file of this kind in a folder is a mesh only where it is named: most hold other arrays.
+#: Files of this format in a folder are meshes only if named: most hold other arrays.
 _OF_ANYTHING = (".npz",)
 
 
 def mesh_files(folder: Path) -> list[Path]:
-    """The entries of a folder that are named like mesh files, by name.
+    """Return the entries of a folder with the suffix of a mesh format, sorted by name.
 
-    What is not a file after all (a pipe, a folder, a broken link) is among them, so that reading it
-    says so.
+    Entries that are not files (a pipe, a folder, a broken link) are included, so that reading them
+    raises an error.
 
     Raises
     ------
     MeshError
-        This is not a folder, it cannot be listed, or there is no mesh in it.
+        The path is not a folder, cannot be listed, or has no mesh files.
 
     """
     try:
@@ -237,7 +235,7 @@ def mesh_files(folder: Path) -> list[Path]:
 
 
 def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:
-    """Generate a registered surface, at its own size unless `faces` says otherwise."""
+    """Generate a registered surface with about `faces` triangles, or at its own size."""
     family = registry.surface(name)
     given = {} if faces is None else {"faces": faces}
     mesh: TriangleMesh = family.function(**family.arguments(given))
@@ -245,12 +243,12 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
 
 
 def surface_named(registry: Registry, name: str, kind: type[M], faces: int | None = None) -> M:
-    """The surface that a user means by a name: a mesh file, or a registered surface of this kind.
+    """Return the surface of this kind that a name refers to: a mesh file or a registered surface.
 
     Raises
     ------
     MeshError
-        There is neither, or the surface is of another kind.
+        There is neither, or the surface is of a different kind.
 
     """
     if name in registry.surfaces and not Path(name).is_file():
@@ -265,13 +263,13 @@ def surface_named(registry: Registry, name: str, kind: type[M], faces: int | Non
 
 
 def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole]:
-    """Which rows of the paper do these registered surfaces stand for? Others are left out."""
+    """Return the roles in the paper of these registered surfaces; others are left out."""
     rows = {name: registry.surface(name).paper_row for name in names}
     return {name: PaperRole(row, "stand-in") for name, row in rows.items() if row}
 
 
 def paper_role_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> PaperRole:
-    """Is what was read from this file one of the paper's models?"""
+    """Return the role in the paper of a surface read from a file."""
     dataset = recognised(registry.datasets.values(), path, mesh.hash)
     row = dataset.paper_row if dataset else ""
     return PaperRole(row, "model") if row else PaperRole()

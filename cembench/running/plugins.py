@@ -1,8 +1,7 @@
-"""Load the user's plug-ins, each in a process of its own first.
+"""Load the user's plug-ins, each in a separate process first.
 
-Importing a plug-in runs it: it may end the process, crash, or never return. So a process that has
-nothing to lose does it before this one. Whatever ends that process, or keeps it from ending, is an
-error that names the plug-in.
+Importing a plug-in runs its code, which may end the process, crash, or never return. So another
+process imports it first. If that process ends early, or does not end, an error names the plug-in.
 """
 
 from __future__ import annotations
@@ -17,30 +16,30 @@ from cembench.core.errors import RegistryError, said_by
 from cembench.registry import COMMAND, Registry, declared_by, load_registry
 from cembench.running.process import Limits, ProcessEnd, die_with_parent, run_limited, spawning
 
-#: Wall-clock seconds that importing a plug-in may take.
+#: Time limit for importing a plug-in, in wall-clock seconds.
 IMPORT_SECONDS = 60.0
-#: What the process writes where all is well; anything else it writes is what is wrong.
+#: Written by the process on success; anything else it writes is an error message.
 _LOADED = b"loaded"
 
 
 def load_with_plugins(plugins: Sequence[str], seconds: float = IMPORT_SECONDS) -> Registry:
-    """Load the registry with these plug-ins, each of which was loaded elsewhere before.
+    """Load the registry with these plug-ins, after loading each in a separate process.
 
     Raises
     ------
     RegistryError
-        As :func:`~cembench.registry.load_registry`; also where importing a plug-in ends the process
-        that does it, or takes longer than `seconds`.
+        As :func:`~cembench.registry.load_registry`; also if importing a plug-in ends the process,
+        or takes longer than `seconds`.
 
     """
     for plugin in plugins:
-        if not plugin.startswith(COMMAND):  # that is data, and imports nothing
+        if not plugin.startswith(COMMAND):  # data only, which imports nothing
             _try(plugin, seconds)
     return load_registry(plugins)
 
 
 def _try(plugin: str, seconds: float) -> None:
-    """Load a plug-in in a process of its own."""
+    """Load a plug-in in a separate process."""
     with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
         answer = Path(folder) / "answer"
         command = [sys.executable, "-m", "cembench.running.plugins", plugin, str(answer)]
@@ -58,8 +57,8 @@ def _try(plugin: str, seconds: float) -> None:
 
 def _told(ending: ProcessEnd, seconds: float) -> str:
     if ending.limit:
-        return f"that took more than {seconds:g} s"
-    return f"the process that did it {ending.how}"
+        return f"the import took more than {seconds:g} s"
+    return f"the importing process {ending.how}"
 
 
 def _main(plugin: str, answer: Path, parent: int) -> None:
@@ -69,7 +68,7 @@ def _main(plugin: str, answer: Path, parent: int) -> None:
         told = _LOADED
     except RegistryError as error:
         told = str(error).encode(errors="replace")
-    except BaseException as error:  # nobody interrupts this process but the plug-in
+    except BaseException as error:  # only the plug-in can interrupt this process
         told = f"plug-in {plugin!r} cannot be imported: {said_by(error)}.".encode(errors="replace")
     answer.write_bytes(told)
     os._exit(0)

@@ -1,7 +1,7 @@
-"""Run a command under limits, and leave nothing of it behind.
+"""Run a command under limits, and end all processes that it started.
 
-The limits hold for everything that the command starts. Its descendants are followed while it runs,
-and recognised afterwards by a mark in their environment, so that also one that left the process
+The limits apply to everything that the command starts. Its descendants are tracked while it runs,
+and recognised afterwards by a mark in their environment, so that even one that left the process
 group, or whose parent is gone, is ended.
 """
 
@@ -25,45 +25,45 @@ import psutil
 
 from cembench.running.processor import running_threads
 
-#: Seconds between two looks at the memory. Each look takes milliseconds of another core.
+#: Seconds between two looks at the memory. Each look uses milliseconds of another core.
 LOOK_EVERY = 0.1
-#: How much of what a process says is kept: the end of it.
+#: Number of bytes kept from the end of a process's output.
 KEPT_OUTPUT_BYTES = 4000
-#: A file of output is emptied when it is larger than this.
+#: An output file larger than this is emptied.
 _LARGEST_LOG_BYTES = 2**20
-#: The variable that tells all processes of a command from others.
+#: Environment variable that marks all processes of a command.
 MARK = "CEMBENCH_PROCESS"
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a process and all that it starts may take."""
+    """Limits of a process and its children."""
 
     #: Wall-clock seconds.
     seconds: float
-    #: Resident bytes, added up over the tree of processes; None: all that there is.
+    #: Resident bytes, summed over the process tree; None: no limit.
     memory_bytes: int | None = None
 
 
 @dataclass(frozen=True)
 class ProcessEnd:
-    """How a process ended: by itself with a code (negative: a signal), or at a limit."""
+    """The end of a process: its exit code (negative: a signal), or the limit it reached."""
 
     code: int
-    #: "time" or "memory" if it was ended for that.
+    #: "time" or "memory" if it was ended at that limit.
     limit: str | None
-    #: Largest resident bytes of the tree that a look found; 0 if it ended before the first.
+    #: Peak resident bytes of the tree seen by a look; 0 if it ended before the first look.
     seen_bytes: int
-    #: The end of what it wrote to standard output and error.
+    #: The end of its standard output and error.
     said: str
-    #: How many processes it left behind, which were ended.
+    #: Number of processes that it left behind, which were ended.
     left: int = 0
-    #: At each look, how many threads of the tree were running or waiting for a processor.
+    #: Number of running or runnable threads of the tree at each look.
     running: tuple[int, ...] = ()
 
     @property
     def how(self) -> str:
-        """Say how it ended by itself: by which signal, or with what code and last words."""
+        """How it ended, in words: the signal, or the exit code with the last line of output."""
         if self.code < 0:
             return f"was ended by signal {_signal_name(-self.code)}"
         last = f": {self.said.splitlines()[-1]}" if self.said else ""
@@ -71,7 +71,7 @@ class ProcessEnd:
 
 
 def _signal_name(number: int) -> str:
-    """Return the name of a signal; most real-time signals have none."""
+    """Return the name of a signal, or its number: most real-time signals have no name."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -79,31 +79,31 @@ def _signal_name(number: int) -> str:
 
 
 class StartedProcess(Protocol):
-    """A process, the first of its group: what is used here of `subprocess.Popen`."""
+    """A process that leads its group; the part of `subprocess.Popen` that is used here."""
 
     @property
     def pid(self) -> int:
-        """Its number, and its group's."""
+        """The id of the process and of its group."""
 
     def poll(self) -> int | None:
-        """The code that it ended with; None while it runs."""
+        """Return the exit code; None while the process runs."""
 
     def wait(self, timeout: float | None = None) -> int:
-        """The same, when it has ended."""
+        """Wait for the process to end, and return the exit code."""
 
     def kill(self) -> None:
-        """End it, if it runs."""
+        """Kill the process if it is running."""
 
 
-#: Starts a process, given its mark (32 characters) and the file that takes its output.
+#: Starts a process, given its mark (32 characters) and its output file.
 Start: TypeAlias = Callable[[str, Path], StartedProcess]
 
 
 def spawning(command: Sequence[str], environment: Mapping[str, str]) -> Start:
-    """What starts a command in this environment."""
+    """Return a function that starts a command in this environment."""
 
     def start(mark: str, log: Path) -> StartedProcess:
-        with log.open("ab") as output:  # appending: what is cut off stays off
+        with log.open("ab") as output:  # append mode, so that truncated output stays truncated
             return subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
@@ -124,10 +124,11 @@ def run_limited(
     alone: bool = False,
     stopped: Callable[[], bool] = lambda: False,
 ) -> ProcessEnd:
-    """Let a process run until it ends or reaches a limit; then end all that it has started.
+    """Run a process until it ends or reaches a limit; then end everything that it started.
 
-    `log` is a file for its output; however much that is, little is kept. A process that is known to
-    start no other is `alone`: nobody looks for what it left. It is ended too when it is `stopped`.
+    `log` is a file for its output, of which only the end is kept. With `alone`, the process is
+    known to start no others, so leftovers are not searched for. The process is ended early if
+    `stopped` returns True.
     """
     mark = uuid.uuid4().hex
     limit, seen, said = None, 0, b""
@@ -159,11 +160,11 @@ def run_limited(
 
 
 def _ended_within(process: StartedProcess, seconds: float) -> bool:
-    """Wait at most so long; on Linux the end of the process wakes us at once."""
+    """Wait at most `seconds` for the end; on Linux the wait ends as soon as the process does."""
     if process.poll() is not None:
         return True
     if hasattr(os, "pidfd_open"):
-        with suppress(ProcessLookupError):  # nobody asks for its code any more: it has ended
+        with suppress(ProcessLookupError):  # the process has ended and its exit code was collected
             handle = os.pidfd_open(process.pid)
             try:
                 select.select([handle], [], [], seconds)
@@ -176,7 +177,7 @@ def _ended_within(process: StartedProcess, seconds: float) -> bool:
 
 
 def _follow(tree: dict[int, psutil.Process], root: int) -> None:
-    """Add what the processes of the tree have started since."""
+    """Add the new children of the processes in the tree."""
     for known in list(tree.values()):
         with suppress(psutil.Error):
             for child in known.children(recursive=known.pid == root):
@@ -192,10 +193,10 @@ def _resident_bytes(process: psutil.Process) -> int:
 
 
 def _drain(log: Path, said: bytes) -> bytes:
-    """Give the space of a log that grows too large back, but for its end.
+    """Free the space of a log that grows too large, except for its end; return the output kept.
 
-    Linux frees the file's beginning while the process writes on. Elsewhere the file is emptied, and
-    what is written between the last look and that is lost.
+    On Linux the beginning of the file is freed while the process keeps writing. Elsewhere the file
+    is emptied, and output written since the last look is lost.
     """
     with suppress(OSError):  # the process may have removed it
         state = log.stat()
@@ -209,7 +210,7 @@ def _drain(log: Path, said: bytes) -> bytes:
 
 
 def _freed(handle: int, size: int) -> bool:
-    """Whether the system could free the first bytes of a file; they read as zeros then."""
+    """Free the first bytes of a file, which then read as zeros; return whether it worked."""
     keep_size, punch_hole = 1, 2  # of <linux/falloc.h>
     if sys.platform != "linux" or size <= 0:
         return False
@@ -229,7 +230,7 @@ def _end_all(
 ) -> tuple[int, int]:
     """End the process and every descendant, twice: one may have started another meanwhile.
 
-    Gives the code that the process ended with and the number of descendants that were there.
+    Returns the exit code of the process and the number of descendants.
     """
     code, left = process.poll(), set()
     for _ in range(2):
@@ -252,7 +253,7 @@ def _end_all(
 
 
 def _lives(process: psutil.Process) -> bool:
-    """Does it still do something? One that nobody has asked for its code does not."""
+    """Whether a process is still running; a zombie is not."""
     try:
         return process.is_running() and process.status() != psutil.STATUS_ZOMBIE
     except psutil.Error:
@@ -260,7 +261,7 @@ def _lives(process: psutil.Process) -> bool:
 
 
 def _marked(mark: str) -> list[psutil.Process]:
-    """The processes whose environment holds the mark, whoever their parent is by now."""
+    """Return the processes with the mark in their environment, whatever their parent is now."""
     found = []
     for one in psutil.process_iter():
         with suppress(psutil.Error, OSError):
@@ -270,9 +271,9 @@ def _marked(mark: str) -> list[psutil.Process]:
 
 
 def die_with_parent(parent: int) -> None:
-    """Let the system end this process when its parent is killed (Linux; elsewhere nothing).
+    """Make the system end this process when its parent is killed (Linux only).
 
-    `parent` is the parent's number: it may have been killed by now.
+    `parent` is the parent's process id; the parent may have been killed already.
     """
     if sys.platform != "linux":
         return
@@ -285,9 +286,9 @@ def die_with_parent(parent: int) -> None:
 
 
 def limit_memory(memory_bytes: int) -> None:
-    """Refuse this process what exceeds the limit between two looks at it (not on Windows).
+    """Limit the memory that this process can reserve between two looks at it (not on Windows).
 
-    The system counts what is reserved rather than what is resident, hence half as much again.
+    The system counts reserved rather than resident memory, so the bound is half as much again.
     """
     try:
         import resource

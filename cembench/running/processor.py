@@ -1,8 +1,8 @@
-"""CPU seconds of this process and of everything it has started, also of what outlived its parent.
+"""CPU seconds of this process and all its descendants, including orphans.
 
-What has ended and was waited for is in the system's sum for children; the rest is looked up in the
-tree of processes. On Linux this process becomes the parent of descendants whose own parent is gone
-(:func:`keep_orphans`), so they stay in the tree, and those that have ended too.
+Children that have ended and were waited for are in the system's sum for children; the others are
+looked up in the process tree. On Linux this process adopts descendants whose own parent is gone
+(:func:`keep_orphans`), so they stay in the tree, even after they have ended.
 """
 
 from __future__ import annotations
@@ -17,50 +17,50 @@ from time import process_time, thread_time
 
 import psutil
 
-#: The option of ``prctl`` that makes a process the parent of orphans below it.
+#: The option of ``prctl`` that makes a process adopt its orphaned descendants.
 _SET_CHILD_SUBREAPER = 36
-#: The state in /proc of a thread that runs, or waits for a processor.
+#: The state in /proc of a running or runnable thread.
 _RUNS = "R"
 
 
 @dataclass(frozen=True)
 class Processor:
-    """CPU seconds at one moment: differences of two of them mean something."""
+    """CPU seconds at one moment; only differences are meaningful."""
 
-    #: Of the thread that asks.
+    #: CPU seconds of the calling thread.
     thread: float
-    #: Of this process, all threads together.
+    #: CPU seconds of all threads of this process.
     process: float
-    #: Of the processes it has started, directly or not.
+    #: CPU seconds of its descendants.
     others: float
-    #: How many other threads, of this process and of those, run or wait for a processor.
+    #: Number of other threads, of this process and its descendants, that run or wait to run.
     running: int = 0
 
     @property
     def total(self) -> float:
-        """Of the process and all it has started."""
+        """CPU seconds of the process and its descendants."""
         return self.process + self.others
 
     @property
     def beside(self) -> float:
-        """The same, without the thread that asks."""
+        """CPU seconds of everything except the calling thread."""
         return self.total - self.thread
 
 
 def before_call() -> Processor:
-    """How many CPU seconds were used until now? The look at other processes comes first."""
+    """Return the CPU seconds so far; other processes are read first, before this thread."""
     others, running = _of_children(), others_running()
     return Processor(thread_time(), process_time(), others, running)
 
 
 def after_call() -> Processor:
-    """The same, and the look at other processes comes last."""
+    """Return the CPU seconds so far; other processes are read last, after this thread."""
     process, thread = process_time(), thread_time()
     return Processor(thread, process, _of_children(), others_running())
 
 
 def keep_orphans() -> None:
-    """Become the parent of descendants whose parent ends (Linux; elsewhere nothing)."""
+    """Adopt descendants whose parent ends (Linux only)."""
     if sys.platform != "linux":
         return
     import ctypes
@@ -69,7 +69,7 @@ def keep_orphans() -> None:
 
 
 def others_running() -> int:
-    """How many threads run, or would, but the one that asks? Those of descendants are counted."""
+    """Return the number of other running or runnable threads, including those of descendants."""
     count = running_threads(os.getpid(), get_native_id())
     if _has_children():
         with suppress(psutil.Error):
@@ -79,7 +79,7 @@ def others_running() -> int:
 
 
 def running_threads(pid: int, but: int = 0) -> int:
-    """How many of a process's threads run or wait for a processor? 0 where nobody tells (Linux)."""
+    """Return the number of running or runnable threads of a process; 0 if unknown (not Linux)."""
     count = 0
     with suppress(OSError):
         for task in Path(f"/proc/{pid}/task").iterdir():
@@ -92,7 +92,7 @@ def running_threads(pid: int, but: int = 0) -> int:
 
 
 def _of_children() -> float:
-    """CPU seconds of all descendants, ended ones included."""
+    """Return the CPU seconds of all descendants, including ended ones."""
     total = 0.0
     with suppress(ImportError):  # Windows
         import resource
@@ -106,7 +106,7 @@ def _of_children() -> float:
 
 
 def _has_children() -> bool:
-    """Whether there may be any: a look at two files, where the system has them."""
+    """Whether there may be children, read from two files if the system has them."""
     tasks = Path("/proc/self/task")
     try:
         return any((task / "children").read_text() for task in tasks.iterdir())
@@ -115,7 +115,7 @@ def _has_children() -> bool:
 
 
 def _seconds_of(process: psutil.Process) -> float:
-    """Those of a process and of its children that it has waited for; of one that ended as well."""
+    """Return the CPU seconds of a process, running or ended, and of children it waited for."""
     with suppress(psutil.Error):
         times = process.cpu_times()
         return float(

@@ -1,9 +1,9 @@
 """Judge whether a valid map is far from conformal for its mesh, and say why.
 
-How small angle errors can be depends on the mesh: on its edges, on how strongly a disk makes the
-conformal factor vary. So a map is compared with another one of the same mesh to the same kind of
-domain, made without iterating: the harmonic map whose boundary lies by harmonic measure. In the
-continuum that is the conformal map itself.
+How small angle errors can be depends on the mesh: on its edges, and on how much the conformal
+factor must vary. So a map is compared with another map of the same mesh to the same kind of domain,
+computed without iterations: the harmonic map with the boundary placed by harmonic measure. In the
+continuum it is the conformal map itself.
 """
 
 from __future__ import annotations
@@ -30,20 +30,20 @@ from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh, defin
 
 Complex = NDArray[np.complex128]
 
-#: A map whose mean angle error is this many times the yardstick's is far from conformal.
+#: A map with a mean angle error above this multiple of the yardstick's is far from conformal.
 FAR = 2.0
-#: So is one whose mean angle error is this share of that of triangles collapsed to segments:
-#: there the yardstick may be as bad.
+#: So is a map above this share of the mean angle error of collapsed triangles; the yardstick may be
+#: as bad there.
 COLLAPSED = 0.25
-#: A triangle is crowded when its image has this share of the mean image area; so many of them, as a
-#: share of all, are named as a cause.
+#: A triangle is crowded if its image is below this share of the mean image area; crowding is named
+#: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
 
 
 def quality_notes(
     target: str, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
 ) -> list[Notice]:
-    """Return what a reader should know of how conformal a valid map is; empty where it is."""
+    """Return remarks on a valid map that is far from conformal; empty for others."""
     notes = []
     if extras.get("stopped") == "crowded":
         told = (
@@ -58,15 +58,15 @@ def quality_notes(
     causes = likely_causes(mesh, uv, extras)
     if error > FAR * reachable:
         told = (
-            f"far from conformal: angles are off by {error:.2f} degrees in the mean, where a "
-            f"harmonic map of this mesh by harmonic measure has {reachable:.2f}. Likely cause: "
+            f"far from conformal: the mean angle error is {error:.2f} degrees, but a harmonic map "
+            f"of this mesh by harmonic measure reaches {reachable:.2f}. Likely cause: "
             f"{'; '.join(causes) or 'the method, not the mesh'}"
         )
         notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
     elif error > COLLAPSED * collapsed_error(mesh):
         told = (
-            f"far from conformal: angles are off by {error:.2f} degrees in the mean, and a "
-            f"harmonic map of this mesh by harmonic measure is no better ({reachable:.2f}). "
+            f"far from conformal: the mean angle error is {error:.2f} degrees, and a harmonic map "
+            f"of this mesh by harmonic measure is no better ({reachable:.2f}). "
             f"Likely cause: {'; '.join(causes) or 'the mesh is too coarse for this domain'}"
         )
         notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
@@ -76,14 +76,15 @@ def quality_notes(
 def collapsed_error(mesh: TriangleMesh) -> float:
     """Return the mean angle error of a map that collapses all triangles, in degrees.
 
-    A collapsed triangle has angles 0, 0 and 180: two thirds of what its largest one lacks.
+    A collapsed triangle has the angles 0, 0 and 180 degrees, so its mean error is two thirds of
+    what its largest angle lacks to 180.
     """
     largest = corner_angles(mesh.V, mesh.F).max(axis=1)
     return float((180 - largest).mean()) * 2 / 3
 
 
 def likely_causes(mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]) -> list[str]:
-    """Return what of the mesh, or of the map's making, can explain large angle errors."""
+    """Return properties of the mesh or the method that can explain large angle errors."""
     causes = []
     if definition_1_notices(mesh.F, mesh.n, mesh.loops):
         causes.append("ears or pinches of the mesh (it breaks Definition 1)")
@@ -93,14 +94,14 @@ def likely_causes(mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]) ->
     areas = np.abs(signed_areas(uv, mesh.F))
     crowded = float((areas < CROWDED_AREA * areas.mean()).mean())
     if crowded > CROWDED_SHARE:
-        causes.append(f"crowding ({crowded:.0%} of the triangles have hardly any area left)")
+        causes.append(f"crowding ({crowded:.0%} of the triangles have almost no area left)")
     return causes
 
 
 def yardstick(target: str, mesh: TriangleMesh, uv: Complex) -> Complex | None:
-    """Return the map (n,) to compare with, of the same target; None where there is none.
+    """Return the map (n,) of the same target to compare with; None if there is none.
 
-    With holes the boundary that is the outer one in `uv` is the outer one here.
+    For a surface with holes, it has the same outer boundary as `uv`.
     """
     try:
         if target == "disk" and isinstance(mesh, DiskMesh):

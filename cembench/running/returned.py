@@ -1,8 +1,8 @@
-"""Take apart what an algorithm returned or raised, into plain data of bounded size.
+"""Convert what an algorithm returned or raised to plain data of bounded size.
 
-An algorithm may return anything: what leaves these functions are arrays, numbers and texts of our
-own making, or a fault that says what is wrong. Nothing it does here, short of ending the process or
-never answering, is more than a fault.
+An algorithm may return anything. These functions return newly made arrays, numbers and texts, or a
+fault that says what is wrong. Whatever the returned object does, short of ending the process or not
+returning, becomes a fault.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
 from cembench.running.external.faults import ProgramFault
 from cembench.running.judge import broken_premises
 
-#: The longest traceback that is kept, in characters.
+#: Maximum length of a stored traceback, in characters.
 LONGEST_TRACEBACK = 20_000
-#: The most iterations, energies and phases that are kept, and bytes of extras as JSON.
+#: Maximum numbers of iterations, energies and phases, and maximum bytes of extras as JSON.
 MOST_ITERATIONS = 2**53
 MOST_ENERGIES = 100_000
 MOST_PHASES = 100
@@ -45,9 +45,9 @@ MOST_EXTRAS_BYTES = 1_000_000
 
 
 def map_of(found: Any, mesh: TriangleMesh, target: str = "disk") -> NDArray[np.complex128] | Fault:
-    """Return a copy of the map, or why it is none: of another type or shape, or not finite.
+    """Return a copy of the map, or a fault: wrong type or shape, or not finite.
 
-    That of an atlas has an entry for each corner, (3 m,).
+    The map of an atlas has an entry for each corner, (3 m,).
     """
     required, shape = (Atlas, (mesh.m, 3)) if target == "atlas" else (Parameterization, (mesh.n,))
     if not isinstance(found, required):
@@ -58,7 +58,9 @@ def map_of(found: Any, mesh: TriangleMesh, target: str = "disk") -> NDArray[np.c
         uv = found.corners if isinstance(found, Atlas) else found.uv
     except BaseException as error:
         return Fault(kind=FaultKind.RAISED, detail=f"its uv cannot be read: {said_by(error)}")
-    plain = np.asarray(uv) if isinstance(uv, np.ndarray) else None  # without a subclass's methods
+    plain = (
+        np.asarray(uv) if isinstance(uv, np.ndarray) else None
+    )  # drops the methods of a subclass
     if plain is None or plain.shape != shape or plain.dtype != np.complex128:
         got = _type_of(uv) if plain is None else f"{plain.dtype} {plain.shape}"
         told = f"uv is {got}; required is complex128 {shape}"
@@ -79,7 +81,7 @@ def hash_of(uv: NDArray[np.complex128]) -> str:
 def report_of(found: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fault]]:
     """Return iterations, energies and extras by the names of :class:`Outcome`, and the faults.
 
-    What is faulty is left out.
+    Faulty values are left out.
     """
     report: dict[str, Any] = {}
     wrong = []
@@ -94,7 +96,7 @@ def report_of(found: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fau
 
 
 def phases_fault(timing: Timing) -> Fault | None:
-    """Return what is wrong with the seconds and phases of a call; None where nothing is."""
+    """Return the fault in the seconds and phases of a call, or None."""
     names, seconds = list(timing.phases), [timing.total, *timing.phases.values()]
     told = ""
     if len(names) > MOST_PHASES:
@@ -109,7 +111,7 @@ def phases_fault(timing: Timing) -> Fault | None:
 
 
 def outcome_of_error(error: BaseException, mesh: TriangleMesh) -> Outcome:
-    """Return how a call on this mesh is recorded that raised this."""
+    """Return the outcome of a call on this mesh that raised this error."""
     if isinstance(error, NotThere):
         return not_ok("skipped", Fault(kind=FaultKind.NOT_THERE, detail=message_of(error)))
     if isinstance(error, ProgramFault):
@@ -126,20 +128,20 @@ def outcome_of_error(error: BaseException, mesh: TriangleMesh) -> Outcome:
     fault = Fault(kind=FaultKind.RAISED, detail=said_by(error))
     if isinstance(error, MemoryError):
         status = "out_of_memory"
-        said = shortened(message_of(error) or "memory was refused")
+        said = shortened(message_of(error) or "not enough memory")
         fault = Fault(kind=FaultKind.OUT_OF_MEMORY, detail=said)
     return not_ok(status, fault, traceback=_traceback_of(error))
 
 
 class _WrongReportError(Exception):
-    """What is wrong with a value, to be read after its name."""
+    """An error about a value; its message follows the name of the value."""
 
 
 def _iterations(given: Any) -> int:
     try:
         count = operator.index(given)
     except TypeError:
-        raise _WrongReportError(f"is {_shown(given)}; required is a whole number") from None
+        raise _WrongReportError(f"is {_shown(given)}; required is an integer") from None
     if not 0 <= count <= MOST_ITERATIONS:
         raise _WrongReportError(f"is {_shown(given)}; allowed is 0 to 2^53")
     return count
@@ -177,7 +179,7 @@ def _type_of(value: Any) -> str:
 
 
 def _shown(value: Any) -> str:
-    """Return a value of a plain type as it is, and any other by its type."""
+    """Return a value of a plain type as text, and any other by its type."""
     return shortened(repr(value), 100) if type(value) in (float, str) else f"a {_type_of(value)}"
 
 

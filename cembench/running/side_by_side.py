@@ -1,4 +1,4 @@
-"""Checks side by side, each in a launcher of its own. Rounds, which are timed, never run so."""
+"""Run checks in parallel, each in its own launcher. Timed rounds never run in parallel."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ Found = tuple[Outcome, NDArray[np.complex128] | None]
 
 
 class Checker(Protocol):
-    """What checks one task at a time, and can be told to give up."""
+    """Checks one task at a time, and can be stopped."""
 
     def check(self, task: Task) -> Found:
-        """Return what one call comes to, and its map."""
+        """Return the outcome of one call, and its map."""
 
     def stop(self) -> None:
-        """End the process that runs, and start no other."""
+        """End the running process, and start no other."""
 
 
 C = TypeVar("C", bound=Checker)
@@ -36,10 +36,11 @@ def check_side_by_side(
     checkers: Sequence[C],
     watched: Callable[[Task], AbstractContextManager[object]],
 ) -> Iterator[tuple[Task, Found, C]]:
-    """Check tasks, as many at a time as there are checkers; give each with the one that did it.
+    """Check tasks in parallel; yield each with its outcome and its checker, as they end.
 
-    In the order in which they end. Whatever ends the iteration, an interrupt too, stops those that
-    are at work. `watched` is entered for each task while it is checked, by one thread at a time.
+    As many run at a time as there are checkers. Anything that ends the iteration, including an
+    interrupt, stops the running checks. `watched` is entered for each task while it is checked, by
+    one thread at a time.
     """
     idle: SimpleQueue[C] = SimpleQueue()
     for checker in checkers:

@@ -1,11 +1,11 @@
-"""The files that an algorithm is made of: an edited one is another algorithm.
+"""The source files of an algorithm; an edited algorithm counts as a different one.
 
-Of a plug-in these are the file that declares it and, transitively, what that imports from its own
-folder or, for a module of a package, from its package. They are found by reading the import
-statements, also those inside functions, and ``import_module("name")`` with a literal name; what is
-imported under a computed name, or read as data, is not seen. Of an algorithm that cembench brings
-it is the declaring file alone: the commit and the version in the environment stand for the rest.
-Of an external program these are its declaration, the started file and its script as well.
+For a plug-in, these are the declaring file and, transitively, the files it imports from its own
+folder or, for a module of a package, from its package. They are found from import statements,
+including those inside functions, and from ``import_module("name")`` with a literal name. Imports
+under a computed name, and data files, are not found. For cembench's own algorithms it is the
+declaring file alone: the commit and the version in the environment identify the rest. For an
+external program, its declaration, its executable and its script are added.
 """
 
 from __future__ import annotations
@@ -24,27 +24,27 @@ from cembench.core.errors import RegistryError
 from cembench.registry import Algorithm
 from cembench.running.external.present import program_sources
 
-#: Functions that import a module by a name in a string.
+#: Functions that import a module by name.
 _IMPORTERS = ("import_module", "__import__")
 
 
 def sources_of(algorithm: Algorithm) -> dict[str, str]:
-    """Return the SHA-256 of an algorithm's files, by their paths relative to its folder or package.
+    """Return the SHA-256 of an algorithm's files, by path relative to its folder or package.
 
     Raises
     ------
     RegistryError
-        The declaring file is not there or cannot be read.
+        The declaring file does not exist or cannot be read.
 
     """
     more = {} if algorithm.program is None else program_sources(algorithm.program)
     file = algorithm.file
-    if file is None and more:  # a command line declares it
+    if file is None and more:  # declared on the command line
         return dict(sorted(more.items()))
     if file is None or not file.is_file():
         raise RegistryError(
             f"algorithm {algorithm.name!r}: its source {file or algorithm.module} is not a file; "
-            "declare it in a Python file, by whose content its records are known."
+            "declare it in a Python file, whose content identifies its records."
         )
     root, top = _root(file, algorithm.module)
     alone = algorithm.module in _own_modules() or (not top and root in _shared_folders())
@@ -60,19 +60,19 @@ def sources_of(algorithm: Algorithm) -> dict[str, str]:
 
 
 def hash_of(sources: Mapping[str, str]) -> str:
-    """Return one hash for all files: that of the only file, or of the list of hashes."""
+    """Return one hash for all files: that of a single file, or of the list of hashes."""
     if len(sources) == 1:
         return next(iter(sources.values()))
     return hashlib.sha256(json.dumps(sources, sort_keys=True).encode()).hexdigest()
 
 
 def code_hash(algorithm: Algorithm) -> str:
-    """Return the hash of all files that an algorithm is made of."""
+    """Return the hash of all files of an algorithm."""
     return hash_of(sources_of(algorithm))
 
 
 def _root(file: Path, module: str) -> tuple[Path, str]:
-    """Return the folder that import names start from, and the one package to stay in, if any."""
+    """Return the folder that imports start from, and the package to stay in, if any."""
     names, stem = module.split("."), file.name.partition(".")[0]
     place = file.parent if stem == "__init__" else file.parent / stem
     is_packaged = len(names) > 1 or stem == "__init__"
@@ -83,19 +83,19 @@ def _root(file: Path, module: str) -> tuple[Path, str]:
 
 @cache
 def _own_modules() -> frozenset[str]:
-    """Return the modules whose algorithms are part of cembench."""
+    """Return the modules of cembench's own algorithms."""
     found = entry_points(group="cembench.algorithms")
     return frozenset(e.module for e in found if e.dist and e.dist.name == "cembench")
 
 
 @cache
 def _shared_folders() -> frozenset[Path]:
-    """Return the folders where a module lies beside all others that are installed."""
+    """Return the folders that hold all installed modules."""
     return frozenset(Path(folder) for folder in sysconfig.get_paths().values())
 
 
 def _closure(file: Path, root: Path, top: str) -> list[Path]:
-    """Return a file and all that it imports, directly or not, from within the root."""
+    """Return a file and all files that it imports, directly or not, from within the root."""
     found: dict[Path, None] = {}
     waiting = [file]
     while waiting:
@@ -111,16 +111,16 @@ def _closure(file: Path, root: Path, top: str) -> list[Path]:
 
 
 def _imported(file: Path, package: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
-    """Yield the names of modules that a file may import; those of objects in them are among them.
+    """Yield the names that a file imports; names of objects in modules are included.
 
-    `package` is the one that the file lies in, from where relative names start.
+    `package` is the package of the file, where relative names start.
     """
     if file.suffix != ".py":
         return
     try:
         tree = ast.parse(file.read_bytes())
     except (SyntaxError, ValueError, RecursionError):
-        return  # it is hashed, and cannot import anything
+        return  # hashed too, although it cannot import anything
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from (tuple(alias.name.split(".")) for alias in node.names)
@@ -138,7 +138,7 @@ def _imported(file: Path, package: tuple[str, ...]) -> Iterator[tuple[str, ...]]
 
 
 def _files_of(root: Path, name: tuple[str, ...]) -> Iterator[Path]:
-    """Yield the files that importing this name runs: the packages above it, and the module."""
+    """Yield the files that importing this name runs: its parent packages and the module."""
     for depth in range(1, len(name) + 1):
         place = root.joinpath(*name[:depth])
         beside = [place.with_name(place.name + suffix) for suffix in all_suffixes()]

@@ -1,4 +1,4 @@
-"""A surface in a file, made ready to be mapped."""
+"""Read a surface from a file, and prepare it for mapping."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from cembench.running.plan import read_mesh_for
 
 @dataclass(frozen=True)
 class SurfaceFile:
-    """A surface that was read from a file, and what was done to it before it is mapped."""
+    """A surface read from a file, with its repair and its cut."""
 
     path: Path
-    #: What is mapped: the surface of the file, mended and cut open if that was wanted.
+    #: The surface to map: that of the file, repaired and cut open if requested.
     mesh: TriangleMesh
     repaired: Repaired | None = None
     #: The surface before it was cut, and the cut.
@@ -34,14 +34,14 @@ class SurfaceFile:
 def read_surface_file(
     path: Path, algorithms: Sequence[Algorithm], *, mend: bool = False, cut: bool = False
 ) -> SurfaceFile:
-    """Read a surface as the kind that the algorithms take, mended and cut open if wanted.
+    """Read a surface as a kind that the algorithms take, repaired and cut open if requested.
 
-    What is cut open is a disk, whatever they take.
+    A surface that is cut open is always read as a disk.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or its surface is not of that kind.
+        The file cannot be read, or its surface is not of such a kind.
 
     """
     soup, repaired = read_repaired(path) if mend else (read_soup(path), None)
@@ -56,7 +56,7 @@ def surface_of_soup(
     *,
     cut: bool = False,
 ) -> SurfaceFile:
-    """Check what a file holds, as :func:`read_surface_file` does."""
+    """Check the content of a file, like :func:`read_surface_file`."""
     if not cut:
         return SurfaceFile(path, read_mesh_for(path, algorithms, soup), repaired)
     uncut = checked(soup, TriangleMesh, path)

@@ -1,4 +1,4 @@
-"""Which cells are measured in more rounds? Those whose intervals are wide, the widest first."""
+"""Choose the cells that need more rounds: those with wide intervals, the widest first."""
 
 from __future__ import annotations
 
@@ -10,18 +10,17 @@ from cembench.results.intervals import Interval
 from cembench.results.looks import share_of
 from cembench.results.records import Cell, Round, lower_median
 
-#: Seconds of a round beside its calls: to start a process, read the mesh and judge the maps.
+#: Overhead of a round in seconds: starting a process, reading the mesh and judging the maps.
 BESIDE_CALLS = 0.25
 
 Rounds = Sequence[Round]
 
 
 def lack(cell: Cell, rounds: Rounds, reference: tuple[Cell, Rounds] | None = None) -> float:
-    """Return how many times too wide the intervals of a cell are; precise is what is at most 1.
+    """Return the factor by which a cell's intervals are too wide; at most 1 is precise.
 
-    Those are the interval of its own seconds and, where it was measured beside a reference, of the
-    ratio to that. Infinite where there is no interval yet; 0 for a cell of a fixed number of
-    rounds.
+    The intervals are that of its seconds and, if it was measured with a reference, that of the
+    ratio. Infinite if there is no interval yet; 0 for a cell with a fixed number of rounds.
     """
     if cell.precision is None:
         return 0.0
@@ -38,7 +37,7 @@ def _half(interval: Interval | None, figure: float) -> float:
 
 
 def cost(rounds: Rounds) -> float:
-    """Return the seconds that another round of a cell will take, judging by the last: a guess."""
+    """Return the estimated seconds of another round of a cell, based on the last one."""
     calls = rounds[-1].calls
     return BESIDE_CALLS + sum(calls) + max(calls)  # one call more, to warm up
 
@@ -49,18 +48,18 @@ def affordable(
     partners: Mapping[str, str],
     seconds: float,
 ) -> set[str]:
-    """Return which cells are measured on in the seconds that are left, with their partners.
+    """Return the cells that get more rounds in the remaining seconds, with their partners.
 
     Parameters
     ----------
     lacks : mapping
-        How many times too wide a cell's intervals are, by label, see :func:`lack`.
+        Factor by which a cell's intervals are too wide, by label; see :func:`lack`.
     costs : mapping
-        Seconds until the next look, by label, also of partners.
+        Seconds until the next look, by label, including those of partners.
     partners : mapping
-        With which cell another one is compared, and so measured side by side.
+        The cell with which a cell is compared, and so measured side by side.
     seconds : float
-        What is left; infinite where there is no limit.
+        Remaining seconds; infinite without a limit.
 
     """
     chosen: set[str] = set()

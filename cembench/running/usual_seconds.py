@@ -1,18 +1,18 @@
-"""How long do the built-in algorithms usually take? For estimates before anything is recorded.
+"""Typical seconds of the built-in algorithms, for estimates without records.
 
-Seconds of a call on 10,000 triangles and how they grow, for systems whose factors are kept and for
-those factored at every solve. Those of the paper's algorithms are fits through the runs that are
-kept in ``reports/standard`` and ``reports/paper``; the others were measured in one sitting, on
-surfaces of 5,600 to 34,000 triangles, as the processor's time. Another machine is faster or slower
-by some factor: a record of the same algorithm counts before this table.
+The table holds the seconds of a call on 10,000 triangles and their growth, under both
+linear-algebra policies. The figures of the paper's algorithms are fits through the runs in
+``reports/standard`` and ``reports/paper``; the others are CPU seconds measured in one sitting, on
+surfaces of 5,600 to 34,000 triangles. Other machines differ by a factor: a record of the same
+algorithm has priority over this table.
 """
 
 from __future__ import annotations
 
-#: Triangles that the seconds are of.
+#: Number of triangles to which the seconds refer.
 FACES = 10_000
 
-#: By the algorithm's name: seconds and exponent with kept factors, the same without.
+#: By algorithm name: seconds and exponent with reused factorisations, and the same without.
 USUAL: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
     "abf++": ((0.15, 1.06), (0.19, 1.14)),
     "abf-linear": ((0.11, 1.25), (0.12, 1.11)),

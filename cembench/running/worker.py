@@ -1,7 +1,7 @@
 """The process that measures a cell once: ``python -m cembench.running.worker JOB.json``.
 
-The job names the mesh's arrays, which were checked, and the file to write. If that file is not
-there in the end, the worker died.
+The job names the mesh's checked arrays and the file to write. If that file is missing at the end,
+the worker died.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from cembench.running.process import die_with_parent, limit_memory
 from cembench.running.processor import keep_orphans
 from cembench.running.returned import outcome_of_error
 
-#: What the geometry loads where it needs it, because it takes a tenth of a second.
+#: Modules loaded on demand elsewhere, because each takes a tenth of a second.
 _LOADED_LATE = ("igl", "scipy.optimize")
-#: The folder beside the answer in which external programs have theirs.
+#: The folder next to the answer for the folders of external programs.
 PROGRAMS = "programs"
 _MESH_TYPES = {kind.__name__: kind for kind in (TriangleMesh, DiskMesh, HoledMesh)}
 
@@ -44,55 +44,55 @@ JobTask = Literal["check", "time", "again", "judge check", "judge calls"]
 
 
 class Job(BaseModel):
-    """What one process has to do."""
+    """The job of one process."""
 
-    #: "check": one call, its map and its memory. "time": warmed up, as often as is worth it.
-    #: "again": one call on the surface in the first of the motions, its map alone.
-    #: "judge check", "judge calls": of what one of these left; no algorithm is imported for that.
+    #: "check": one call, with its map and memory. "time": a warm-up and timed calls. "again": one
+    #: call on the surface in the first motion, for its map. "judge check", "judge calls": judge the
+    #: results of these without importing an algorithm.
     task: JobTask
     cell: Cell
     plugins: tuple[str, ...]
     mesh_type: str
     notices: tuple[Notice, ...]
-    #: Of V and F, as ``.npy``.
+    #: Files of V and F, ``.npy``.
     mesh_files: tuple[Path, Path]
-    #: Takes an :class:`Answer`.
+    #: Output file for the :class:`Answer`.
     answer_file: Path
-    #: Takes the map of a check, or those of timed calls, a row each.
+    #: Output file for the map of a check, or those of timed calls, one row each.
     uv_file: Path
-    #: What the maps of timed calls are compared with.
+    #: The checked map's data, for comparison with timed calls.
     checked: Checked = Checked()
-    #: Of the surface in each call of a process that times, and whether the first is timed if long.
+    #: Motions of the surface for the calls, and whether a long first call is timed.
     motions: tuple[str, ...] = ()
     first_counts: bool = True
-    #: What is judged: what a check told of its call, or what the rows of `uv_file` are called.
+    #: Input of judging: the outcome of a check, or the names of the rows of `uv_file`.
     promise: Promise = Promise()
     called: Outcome | None = None
     names: tuple[str, ...] = ()
-    #: Samples of maps of other processes, ``.npy``, by motion; and whether such repeat themselves.
+    #: Samples of maps from other processes (``.npy``) by motion, and whether these repeat.
     known: dict[str, Path] = {}
     repeats: bool | None = None
     memory_bytes: int | None = None
-    #: The number of the process that this one ends with.
+    #: Id of the parent process; this process ends with it.
     parent: int
 
 
 class Answer(BaseModel):
-    """What a process found: the outcome of a check or of what failed, or the timed calls."""
+    """The answer of a process: an outcome, or the timed calls."""
 
     outcome: Outcome | None = None
     round: Round | None = None
-    #: Of timed calls: what to call the map of each, its motion, and what they used.
+    #: For timed calls: the names of their maps, their motions, and the resources used.
     names: tuple[str, ...] = ()
     motions: tuple[str, ...] = ()
     used: Used | None = None
-    #: What was seen from outside: see :class:`~cembench.running.process.ProcessEnd`.
+    #: Observed by the parent; see :class:`~cembench.running.process.ProcessEnd`.
     running: tuple[int, ...] = ()
     judged: JudgedCalls | None = None
 
 
 def main(path: Path) -> None:
-    """Do the job that the file describes."""
+    """Run the job described by the file."""
     job = Job.model_validate_json(path.read_bytes())
     die_with_parent(job.parent)
     keep_orphans()
@@ -105,7 +105,7 @@ def main(path: Path) -> None:
 
 
 def end() -> NoReturn:
-    """End at once: taking an interpreter down with all its libraries takes longer than a call."""
+    """End at once, because an orderly shutdown of the interpreter takes longer than a call."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(Exception):  # the algorithm may have closed or replaced it
             stream.flush()
@@ -113,7 +113,7 @@ def end() -> NoReturn:
 
 
 def load_libraries() -> None:
-    """Load now what the first call would otherwise load in the middle of being measured."""
+    """Load modules that the first call would otherwise load while it is measured."""
     for name in _LOADED_LATE:
         importlib.import_module(name)
 
@@ -146,7 +146,7 @@ def _time(job: Job) -> Answer:
     used = told.used()
     used.began = began
     if algorithm.program is not None:
-        used.own = 0.0  # writing and reading the files is not in the program's wall clock
+        used.own = 0.0  # writing and reading the files is not part of the program's wall-clock time
     return Answer(round=measured, names=tuple(told.names()), motions=tuple(told.motions), used=used)
 
 

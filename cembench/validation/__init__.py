@@ -1,5 +1,5 @@
-"""Is a new solver right, and is it better? What ``cembench validate`` examines, a stage a module.
+"""The stages of ``cembench validate``, one per module.
 
-:mod:`contract` and :mod:`correctness` end in findings, each ok or not; :mod:`quality` and
-:mod:`scaling` measure beside a baseline; :mod:`verdict` says all of it in a sentence.
+:mod:`contract` and :mod:`correctness` return findings, each ok or not; :mod:`quality` and
+:mod:`scaling` compare with a baseline; :mod:`verdict` sums up the result in a sentence.
 """

@@ -1,4 +1,4 @@
-"""Are two maps the same but for a Moebius map, which conformality cannot tell apart?"""
+"""Distance of two maps up to a Moebius map or a similarity, which keep a map conformal."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from cembench.conformal.moebius import Moebius
 Complex = NDArray[np.complex128]
 
 
-#: Steps of the reweighting below; it settles in a few.
+#: Steps of the reweighting below; a few are enough.
 _STEPS = 20
 
 
 def closest_moebius(z: Complex, w: Complex) -> Moebius:
-    """Which Moebius map carries the points z (n,) nearest to the points w (n,)?
+    """Return the Moebius map that brings the points z (n,) closest to the points w (n,).
 
     Least squares of ``a z + b - w (c z + d)`` with coefficients of unit norm, divided by the
-    ``c z + d`` of the step before, so that in the end the distance of the images is minimised.
+    ``c z + d`` of the previous step, so that the distance of the images is minimised in the limit.
     """
     columns = np.stack([z, np.ones_like(z), -w * z, -w], axis=1)
     weight = np.ones(len(z))
@@ -33,16 +33,16 @@ def closest_moebius(z: Complex, w: Complex) -> Moebius:
 
 
 def closest_similarity(z: Complex, w: Complex) -> Moebius:
-    """Which turn, scale and shift carries z (n,) nearest to w (n,)?"""
+    """Return the rotation, scale and shift that bring z (n,) closest to w (n,)."""
     columns = np.stack([z, np.ones_like(z)], axis=1)
     (a, b), *_ = np.linalg.lstsq(columns, w, rcond=None)
     return Moebius(complex(a), complex(b), 0j, 1 + 0j)
 
 
 def distance(z: Complex, w: Complex, *, moebius: bool) -> float:
-    """How far are the maps apart when laid on each other?
+    """Return the distance of two maps after the best alignment.
 
-    Root mean square, relative to the radius of w; infinite where they cannot be laid on.
+    Root mean square, relative to the radius of w; infinite if they cannot be aligned.
     """
     onto = (closest_moebius if moebius else closest_similarity)(z, w)
     radius = float(np.sqrt((np.abs(w - w.mean()) ** 2).mean()))

@@ -1,4 +1,4 @@
-"""Does the algorithm keep to what it promised by being declared one?"""
+"""Stage 1: whether an algorithm keeps the contract of a registered algorithm."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from cembench.validation import surfaces
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.solver import CheckedMap, Solver
 
-#: How far the last entry of the energy history may be from E_C of the map, relative to its area.
+#: Allowed distance of the last entry of the energy history from the map's E_C, over its area.
 SAME_ENERGY = 1e-6
 
 
 def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFinding]:
-    """The findings; where defaults are out of range or there is no map, only that is told."""
+    """Return the findings; if a default is out of range or there is no map, only that finding."""
     findings = [parameters_fit(solver.algorithm)]
     if not findings[0].ok:
         return findings
@@ -39,7 +39,7 @@ def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFindi
 
 
 def parameters_fit(algorithm: Algorithm) -> ValidationFinding:
-    """Is each default within its own range, and can JSON hold it, so that a record can?"""
+    """Check that each default is within its range and can be stored in a record, as JSON."""
     wrong = []
     for parameter in algorithm.parameters:
         try:
@@ -58,7 +58,7 @@ def parameters_fit(algorithm: Algorithm) -> ValidationFinding:
 
 
 def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
-    """Does a call end with an array that is a map, whatever that map is worth?"""
+    """Check that a call returns an array that is a map, whatever its quality."""
     outcome = mapped.outcome
     measured = f"complex128 ({mapped.mesh.n},), finite"
     if not mapped.is_usable:
@@ -75,7 +75,7 @@ def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
 
 
 def leaves_the_mesh(mapped: CheckedMap) -> ValidationFinding:
-    """Are V and F as they were after the call?"""
+    """Check that the call left V and F unchanged."""
     changes = [f.detail for f in mapped.outcome.faults if f.kind is FaultKind.MESH_CHANGED]
     return ValidationFinding(
         stage="contract",
@@ -88,7 +88,7 @@ def leaves_the_mesh(mapped: CheckedMap) -> ValidationFinding:
 
 
 def tells_its_energy(mapped: CheckedMap) -> ValidationFinding:
-    """Is what it reports of its iterations plausible, and its last energy that of the map?"""
+    """Check that the reported iterations are plausible, and the last energy is the map's."""
     outcome = mapped.outcome
     history, iterations = outcome.energy_history, outcome.iterations or 0
     energy, area = (outcome.metrics.get(name) or 0.0 for name in ("conformal_energy", "image_area"))
@@ -105,7 +105,7 @@ def tells_its_energy(mapped: CheckedMap) -> ValidationFinding:
     if not history:
         right = f"{iterations} iterations, no energies"
     elif other:
-        right = f"{iterations} iterations; energies are of another kind: {other}"
+        right = f"{iterations} iterations; energies are of a different kind: {other}"
     return ValidationFinding(
         stage="contract",
         name="energy history",
@@ -119,7 +119,7 @@ def tells_its_energy(mapped: CheckedMap) -> ValidationFinding:
 
 
 def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
-    """Does the same call in another process give the same bits?"""
+    """Check that the same call in another process returns the same bits."""
     same = first.outcome.uv_hash == second.outcome.uv_hash
     apart = math.inf
     if first.uv is not None and second.uv is not None:
@@ -130,12 +130,12 @@ def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
         ok=same,
         measured="the same bits twice" if same else f"two calls differ by up to {apart:.2g}",
         allowed="the same mesh and parameters give the same bits, in every process",
-        remedy="give random numbers a seed (np.random.default_rng(0)); iterate over no set.",
+        remedy="give random numbers a seed (np.random.default_rng(0)); do not iterate over a set.",
     )
 
 
 def copes(mapped: list[CheckedMap]) -> ValidationFinding:
-    """On meshes out of the ordinary: a map, or a cause?"""
+    """Check that unusual meshes give a map, or an error with a cause."""
     bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
     said = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
     without = [m.mesh.name for m in mapped if m.outcome.gave_up]
@@ -148,5 +148,5 @@ def copes(mapped: list[CheckedMap]) -> ValidationFinding:
         ok=not bad,
         measured="; ".join(said) or right,
         allowed="a finite map, or AlgorithmFailed with the cause, on any mesh of its type",
-        remedy="raise cembench.AlgorithmFailed where the method does not apply.",
+        remedy="raise cembench.AlgorithmFailed if the method does not apply.",
     )

@@ -1,4 +1,4 @@
-"""Are the maps right: valid, conformal in the limit, and independent of what must not matter?"""
+"""Stage 2: whether maps are valid, tend to conformal ones, and ignore numbering and pose."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from cembench.validation.alignment import distance
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.solver import CheckedMap, Complex, Solver
 
-#: How far figures may move, relatively, and maps, when the same surface is given another way.
+#: Allowed relative change of figures, and of maps, if the same surface is given differently.
 SAME_FIGURES = 1e-6
-#: How far a map may move when factors are not kept.
+#: Allowed change of a map between the two linear-algebra policies.
 SAME_MAP = 1e-9
-#: Least order of E_C and of the mean angle error in the size h of the triangles. Linear elements
+#: Least order of E_C and of the mean angle error in the triangle size h. Linear elements
 #: promise 2 and 1.
 ENERGY_ORDER, ANGLE_ORDER = 1.5, 0.75
-#: Below this, relative to the area and in degrees, an error has no order: it is rounding.
+#: Below this (relative to the area; in degrees), an error is rounding and has no order.
 ENERGY_ROUNDING, ANGLE_ROUNDING = 1e-12, 1e-6
-#: How far from the exact map, relative to its radius, on the finest triangulation.
+#: Allowed distance from the exact map on the finest triangulation, relative to its radius.
 POSITION_ERROR = 0.01
 
 _INVARIANT = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg", "dilatation_mean")
@@ -39,19 +39,19 @@ _INVARIANT = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg", 
 
 @dataclass(frozen=True)
 class RefinementSeries:
-    """The maps of one surface, from coarse to fine."""
+    """The maps of one surface on triangulations from coarse to fine."""
 
     surface: surfaces.RefinedSurface
     maps: tuple[CheckedMap, ...]
 
     @property
     def order_scale(self) -> list[float]:
-        """Relative sizes h of the triangles."""
+        """Relative triangle sizes h."""
         return [float(m.mesh.m) ** -0.5 for m in self.maps]
 
 
 def examine_correctness(solver: Solver, registry: Registry) -> list[ValidationFinding]:
-    """The findings; where a surface has no map at all, only that is told."""
+    """Return the findings; if a surface has no map at all, only that finding."""
     kind = surfaces.kind_of(solver.algorithm)
     series = [
         RefinementSeries(refined, tuple(solver.map(mesh) for mesh in refined.meshes))
@@ -75,7 +75,7 @@ def examine_correctness(solver: Solver, registry: Registry) -> list[ValidationFi
 
 
 def told_alone(finding: ValidationFinding) -> ValidationFinding:
-    """The same of an algorithm that does not promise a conformal limit: told, not judged."""
+    """Return the finding as information only, for algorithms that promise no conformal limit."""
     if finding.ok:
         return finding
     measured = f"{finding.measured}; it does not promise a conformal map"
@@ -83,7 +83,7 @@ def told_alone(finding: ValidationFinding) -> ValidationFinding:
 
 
 def maps_known_surfaces(maps: Sequence[CheckedMap]) -> ValidationFinding:
-    """Is there a map of each of the closed-form surfaces?"""
+    """Check that each closed-form surface is mapped."""
     bad = [f"{_named(m)}: {m.outcome.status}: {m.outcome.cause}" for m in maps if m.uv is None]
     return ValidationFinding(
         stage="correctness",
@@ -96,7 +96,7 @@ def maps_known_surfaces(maps: Sequence[CheckedMap]) -> ValidationFinding:
 
 
 def keeps_orientation(maps: Sequence[CheckedMap]) -> ValidationFinding:
-    """Are triangles that are counter-clockwise on the surface so in the plane?"""
+    """Check that triangles stay counter-clockwise in the plane."""
     mirrored = [_named(m) for m in maps if image_area(m.mesh, _uv(m)) <= 0]
     return ValidationFinding(
         stage="correctness",
@@ -104,14 +104,14 @@ def keeps_orientation(maps: Sequence[CheckedMap]) -> ValidationFinding:
         ok=not mirrored,
         measured=f"the map is mirrored on {', '.join(mirrored)}" if mirrored else "kept",
         allowed="positive image area: counter-clockwise triangles stay counter-clockwise",
-        remedy="return np.conj(uv), or go round the boundary as mesh.boundary does.",
+        remedy="return np.conj(uv), or follow the boundary in the direction of mesh.boundary.",
     )
 
 
 def boundary_findings(
     algorithm: Algorithm, maps: Sequence[CheckedMap]
 ) -> Iterator[ValidationFinding]:
-    """Does the boundary lie where the target says? Nothing is asked of a free boundary."""
+    """Yield checks that the boundary lies where the target says; none for a free boundary."""
     if algorithm.target == "free boundary":
         return
     disk = algorithm.target == "disk"
@@ -132,7 +132,7 @@ def boundary_findings(
 
 
 def folds(maps: Sequence[CheckedMap]) -> ValidationFinding:
-    """Are there folded triangles, on surfaces where there need not be any?"""
+    """Check for folded triangles on surfaces that can be mapped without."""
     counts = [(flipped_triangles(m.mesh, _uv(m)), m) for m in maps]
     bad = [f"{count} of {m.mesh.m} triangles folded on {_named(m)}" for count, m in counts if count]
     return ValidationFinding(
@@ -149,14 +149,14 @@ def folds(maps: Sequence[CheckedMap]) -> ValidationFinding:
 
 
 def energy_vanishes(series: RefinementSeries) -> ValidationFinding:
-    """Does E_C, relative to the area, fall to zero as the triangles shrink?"""
+    """Check that E_C, relative to the area, tends to zero under refinement."""
     energies = [_relative_energy(m) for m in series.maps]
     order = _order(series, energies)
     return _rate(series, "E_C", energies, order, ENERGY_ORDER, ENERGY_ROUNDING)
 
 
 def angles_improve(series: RefinementSeries) -> ValidationFinding:
-    """Does the mean angle error fall as the triangles shrink?"""
+    """Check that the mean angle error falls under refinement."""
     errors = [_figure(m, "angle_error_mean_deg") for m in series.maps]
     order = _order(series, errors)
     return _rate(series, "angle error", errors, order, ANGLE_ORDER, ANGLE_ROUNDING)
@@ -184,7 +184,7 @@ def _rate(
 
 
 def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
-    """How far is it from the closed-form map, after the best Moebius map?"""
+    """Check the distance from the closed-form map, after the best Moebius map."""
     exact = series.surface.exact_map
     if exact is None:
         raise ValueError(f"no closed-form map of {series.surface.name} is known")
@@ -202,7 +202,7 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
 
 
 def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
-    """Is the modulus of four boundary points that of the surface, within its error certificate?"""
+    """Check the modulus of four boundary points against the surface's error certificate."""
     pairs = [(certify(_disk(m.mesh)), _uv(m)) for m in series.maps]
     off = [found.off(uv[found.corners]) for found, uv in pairs]
     finest, uv = pairs[-1]
@@ -221,7 +221,7 @@ def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
 
 def _disk(mesh: TriangleMesh) -> DiskMesh:
     if not isinstance(mesh, DiskMesh):
-        raise TypeError(f"{mesh.name} is no disk")
+        raise TypeError(f"{mesh.name} is not a disk")
     return mesh
 
 
@@ -235,7 +235,7 @@ def _invariances(solver: Solver, uneven: CheckedMap) -> Iterator[ValidationFindi
         again,
         None if again.uv is None else again.uv[number],
         moebius=not similarity,
-        remedy="let nothing hang on a vertex's number: choose start points by geometry.",
+        remedy="do not let anything depend on a vertex's number: choose start points by geometry.",
     )
     moved = solver.map(surfaces.moved(uneven.mesh))
     yield same_map(
@@ -258,9 +258,9 @@ def same_map(
     moebius: bool,
     remedy: str,
 ) -> ValidationFinding:
-    """Is the map the same, or are its figures, when the surface is given another way?
+    """Check that the map or its figures are the same if the surface is given differently.
 
-    `uv` is the second map in the numbering of the first; equal is meant up to a Moebius map of
+    `uv` is the second map in the numbering of the first. Maps are equal up to a Moebius map of
     the disk, or a similarity for a free boundary.
     """
     measured, ok = f"{second.outcome.status}: {second.outcome.cause}", False
@@ -280,7 +280,7 @@ def same_map(
 
 
 def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFinding:
-    """Is it the same map whether factors are kept or not?"""
+    """Check that both linear-algebra policies give the same map."""
     apart = np.inf
     if anew.uv is not None:
         apart = float(np.abs(_uv(reused) - anew.uv).max())
@@ -299,7 +299,7 @@ def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFind
 
 
 def _figures_apart(first: CheckedMap, second: CheckedMap) -> float:
-    """The largest relative difference of what neither motion, numbering nor scale changes."""
+    """Return the largest relative difference of figures that motion, numbering and scale keep."""
     mine, other = all_metrics(first.mesh, _uv(first)), all_metrics(second.mesh, _uv(second))
     apart = [
         abs(mine[name] - other[name]) / max(abs(mine[name]), 1e-300) for name in _INVARIANT[1:]
@@ -315,7 +315,7 @@ def _figures_apart(first: CheckedMap, second: CheckedMap) -> float:
 
 
 def _order(series: RefinementSeries, errors: Sequence[float]) -> float:
-    """The slope of log(error) against log(h)."""
+    """Return the slope of log(error) against log(h)."""
     heights = np.log(np.maximum(errors, 1e-300))
     return float(np.polyfit(np.log(series.order_scale), heights, 1)[0])
 

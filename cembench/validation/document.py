@@ -1,4 +1,4 @@
-"""A validation as a report's document: the verdict, the findings, the figures behind them."""
+"""A validation as a report document: the verdict, the findings and their figures."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _TITLES = {
 
 
 def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
-    """The report; records are read from the folder `runs`, and plots are drawn into `folder`."""
+    """Return the report; records are read from `runs`, and plots are written to `folder`."""
     sections = [
         Section("verdict", "Verdict", (Text(f"{validation.title}: {sentence(validation)}."),))
     ]
@@ -171,7 +171,7 @@ def _pairs_table(against: BaselineComparison, title: str, records: dict[str, Rec
         columns=tuple(columns),
         rows=tuple(_pair_row(pair, records) for pair in against.pairs),
         notes=(
-            "a dash stands where there is no valid map, or no positive figure to divide by",
+            "a dash: no valid map, or no positive figure to divide by",
             *_about_solve_time(against),
         ),
     )
@@ -218,7 +218,7 @@ def _measured(value: float | None, form: str, origin: Origin, record: str) -> Va
 
 
 def quotient(ours: float | None, theirs: float | None) -> float | None:
-    """Ours over theirs; None where one is not there, or theirs is no positive figure."""
+    """Return ours over theirs; None if one is missing or theirs is not positive."""
     return None if ours is None or theirs is None or theirs <= 0 else ours / theirs
 
 

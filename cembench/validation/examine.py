@@ -1,4 +1,4 @@
-"""The whole examination: four stages, each reached only if the ones before found no fault."""
+"""The whole validation: four stages, each run only if the ones before found no fault."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ from cembench.validation.scaling import growths, scales, sizes
 from cembench.validation.solver import Solver
 from cembench.validation.verdict import Requirement, Validation, unmet
 
-#: Rounds of the scaling stage: an exponent is fitted to each.
+#: Rounds of the scaling stage; an exponent is fitted to each.
 SCALING_ROUNDS = 2
-#: With what a solver is compared unless the user says otherwise.
+#: Default baseline for each target.
 _USUAL_BASELINE = {"disk": "cem", "free boundary": "lscm", "circular holes": "koebe-cem"}
 
 
 @dataclass(frozen=True)
 class ValidationOptions:
-    """What the user asked for."""
+    """Options of a validation."""
 
-    #: None: the usual one of the target.
+    #: Baselines; None: the default of the target.
     against: Sequence[str] | None = None
-    #: What is compared on; empty: the usual six.
+    #: Surfaces to compare on; empty: the default six.
     meshes: Sequence[TriangleMesh] = ()
     standing: Mapping[str, PaperRole] = field(default_factory=dict)
     faces: int = 5000
     rounds: int = DEFAULT_ROUNDS
-    #: Triangles of the largest mesh of the scaling stage; 0: no such stage.
+    #: Triangles of the largest mesh of the scaling stage; 0: skip the stage.
     up_to: int = 30_000
     require: Sequence[Requirement] = ()
-    #: Only the first two stages: no comparison, no timing.
+    #: Run only the first two stages, without comparison or timing.
     checks_only: bool = False
     options: Options = field(default_factory=Options)
     command: str = ""
@@ -60,7 +60,7 @@ class ValidationOptions:
 
 @dataclass(frozen=True)
 class ValidationHooks:
-    """What hears how the examination goes on."""
+    """Callbacks that receive the progress of a validation."""
 
     stage: Callable[[str], None] = lambda _: None
     watcher: Callable[[int], AbstractContextManager[Watcher]] = lambda _: nullcontext(Watcher())
@@ -73,12 +73,12 @@ def examine(
     asked: ValidationOptions,
     telling: ValidationHooks | None = None,
 ) -> Validation:
-    """Examine one algorithm; the runs that were timed are left in the folder.
+    """Validate one algorithm; the timed runs are kept in the folder.
 
     Raises
     ------
     CembenchError
-        An unknown baseline or surface, or a surface that the algorithm does not take: before
+        A baseline or surface is unknown, or the algorithm does not take a surface; raised before
         anything is timed.
 
     """
@@ -86,11 +86,11 @@ def examine(
     algorithm = solver.algorithm
     if algorithm.target == "atlas":
         raise ParameterError(
-            f"{algorithm.name} makes an atlas, and validate examines maps with one UV a vertex. "
+            f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
             "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
         )
     if asked.up_to:
-        sizes(asked.up_to)  # complains now of what could not be fitted later
+        sizes(asked.up_to)  # fail now, not after the timing
     work = _Work(
         solver,
         registry,
@@ -134,7 +134,7 @@ def examine(
 
 
 def _source(solver: Solver) -> str:
-    """Return where the algorithm is from: a command, a plug-in, or a module."""
+    """Return the origin of the algorithm: a command, a plug-in or a module."""
     if solver.algorithm.program is not None:
         return str(solver.algorithm.program)
     return solver.plugins[0] if solver.plugins else solver.algorithm.origin
@@ -142,7 +142,7 @@ def _source(solver: Solver) -> str:
 
 @dataclass(frozen=True)
 class _Work:
-    """What every stage gets."""
+    """The input of every stage."""
 
     solver: Solver
     registry: Registry
@@ -162,7 +162,7 @@ class _Work:
     def measured(
         self, stage: Stage, meshes: Sequence[TriangleMesh], beside: Sequence[str], rounds: int
     ) -> list[Record]:
-        """Side by side, in one sitting: what the folder holds from before is not taken."""
+        """Measure the algorithms side by side in one sitting; earlier records are not used."""
         chosen = [self.solver.algorithm, *(self.registry.algorithm(name) for name in beside)]
         given = {f"{self.name}.{key}": value for key, value in self.solver.parameters.items()}
         how = MeasurementSettings(repeats=rounds)
@@ -224,14 +224,14 @@ def _is_asked(stage: Stage, asked: ValidationOptions) -> bool:
 def baselines(
     algorithm: Algorithm, registry: Registry, asked: Sequence[str] | None
 ) -> tuple[str, ...]:
-    """With which algorithms is it compared? With the usual one of its target, if there is one.
+    """Return the names of the baselines; by default the usual one of the target, if installed.
 
     Raises
     ------
     RegistryError
-        An unknown name.
+        A name is unknown.
     ParameterError
-        One that takes other surfaces, or the algorithm itself.
+        A baseline takes other surfaces, or is the algorithm itself.
 
     """
     if asked is None:

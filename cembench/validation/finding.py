@@ -1,4 +1,4 @@
-"""What one check has found."""
+"""The result of one check."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Stage = Literal["contract", "correctness", "quality", "scaling"]
 
 
 class ValidationFinding(BaseModel):
-    """One check: what was measured, what is allowed, and what to do where it is not ok.
+    """Result of a check: what was measured, what is allowed, and what to do if it is not ok.
 
     `measured` is a clause that a sentence can quote; `allowed` and `remedy` are sentences.
     """

@@ -1,13 +1,13 @@
-"""Is it better than a baseline, and is it faster? Paired by surface, and by round for the seconds.
+"""Stage 3: quality and speed against a baseline, paired by surface and by round.
 
-Quality: the ratio of a figure on each surface that both map validly. A surface counts as lower or
-higher where the ratio is more than 1 % off 1; the median ratio has the order interval of
+Quality: the ratio of a figure on each surface that both algorithms map validly. A surface counts as
+lower or higher if the ratio is more than 1 % off 1; the median ratio has the order interval of
 :mod:`cembench.results.intervals` over the surfaces, none for fewer than six.
 
 Speed: a round's figure is the median over the surfaces of the ratio of both algorithms' seconds in
-that round; the interval is over the rounds, so it tells how sure the figure is on these surfaces,
-not how it would be on others. Verdicts that are listed together, of several surfaces or several
-baselines, are corrected for that (Holm).
+that round. The interval is over the rounds: it shows how certain the figure is on these surfaces,
+not what it would be on others. Verdicts listed together, over several surfaces or baselines, are
+corrected for multiple comparisons (Holm).
 """
 
 from __future__ import annotations
@@ -27,34 +27,34 @@ from cembench.results.many import corrected
 from cembench.results.records import FaultKind, Record
 from cembench.validation.finding import ValidationFinding
 
-#: Ratios this near to 1 are ties.
+#: Ratios this close to 1 are ties.
 TIE = 0.01
-#: Energies below this share of the image's area are rounding, and equal.
+#: Energies below this share of the image's area are rounding, and count as equal.
 _NO_ENERGY = 1e-9
 _GAUGE = "common_gauge_energy"
 
 
 class PairedComparison(BaseModel):
-    """On how many surfaces is a figure lower, equal within 1 %, or higher than the baseline's?"""
+    """Numbers of surfaces with a figure below, equal to (within 1 %) or above the baseline's."""
 
     model_config = ConfigDict(frozen=True)
 
     lower: int
     equal: int
     higher: int
-    #: Median over the surfaces of ours over theirs, and where it lies with 95 %.
+    #: Median over the surfaces of our figure over theirs, and its 95 % interval.
     ratio: float | None
     low: float | None
     high: float | None
 
     @property
     def surfaces(self) -> int:
-        """How many pairs there were."""
+        """Number of pairs."""
         return self.lower + self.equal + self.higher
 
 
 class Speed(BaseModel):
-    """Our seconds over the baseline's, and the verdict of the interval over the rounds."""
+    """Our seconds over the baseline's, with the interval over the rounds and its verdict."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -63,12 +63,12 @@ class Speed(BaseModel):
     high: float | None
     verdict: SpeedVerdict
     rounds: int
-    #: How unlikely a difference as clear as this is by chance; see `results.comparison`.
+    #: p-value of the difference; see `results.comparison`.
     p: float = 1.0
 
 
 class Pair(BaseModel):
-    """One surface: our figures and the baseline's; None where there is no valid map."""
+    """One surface: our figures and the baseline's; None if there is no valid map."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -82,8 +82,8 @@ class Pair(BaseModel):
     baseline_seconds: float | None
     seconds_ratio: float | None
     speed: SpeedVerdict | None
-    #: Of an external program: its wall clock on a small mesh, and its solve time, which the ratio
-    #: is of.
+    #: For an external program: its wall-clock seconds on a small mesh, and its solve time, which
+    #: the ratio uses.
     start_seconds: float | None = None
     solve_seconds: float | None = None
     #: Keys of our record and of the baseline's.
@@ -97,33 +97,33 @@ class BaselineComparison(BaseModel):
 
     baseline: str
     title: str
-    #: Targets differ, or the image's size is free, so energies were divided by its area.
+    #: Whether energies are divided by the image's area: targets differ, or its size is free.
     relative: bool
-    #: Energies are those of the maps in the common gauge: two disks whose records have them.
+    #: Whether energies are those in the common gauge: both are disks and the records have them.
     common_gauge: bool = False
     pairs: tuple[Pair, ...]
     energy: PairedComparison
     angle: PairedComparison
-    #: None where no round timed both.
+    #: None if no round timed both.
     speed: Speed | None
-    #: Where the solver's time is from that the ratios are of, for an external program.
+    #: For an external program, the origin of the solve time that the ratios use.
     solve_time: str = ""
 
     @property
     def energy_name(self) -> str:
-        """What the energies are called that were compared."""
+        """Name of the compared energies."""
         if self.common_gauge:
             return "E_C in the common gauge"
         return "E_C by area" if self.relative else "E_C"
 
 
 def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> BaselineComparison:
-    """All records of a run, of which those of two algorithms are compared.
+    """Compare the records of two algorithms in a run.
 
     Raises
     ------
     ValueError
-        There is no record of one of them.
+        One of them has no record.
 
     """
     mine = {r.cell.mesh: r for r in records if r.cell.algorithm == ours}
@@ -132,7 +132,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     if not names:
         raise ValueError(f"no surface has records of both {ours!r} and {baseline!r}")
     one, other = next(iter(mine.values())), next(iter(theirs.values()))
-    # The size of a free image is another's choice where the code is another's.
+    # External code chooses the size of a free image itself.
     free = one.target == "free boundary" and (one.external, other.external) != (None, None)
     relative = one.target != other.target or free
     gauge = not relative and all(_has_gauge(r) for n in names for r in (mine[n], theirs[n]))
@@ -161,7 +161,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
 
 
 def together(against: Sequence[BaselineComparison]) -> tuple[BaselineComparison, ...]:
-    """Return comparisons with several baselines whose verdicts on speed hold together (Holm)."""
+    """Return the comparisons with verdicts on speed corrected for their number (Holm)."""
     told = iter(corrected([_comparison(a.speed) for a in against if a.speed is not None]))
     return tuple(a if a.speed is None else _with_verdict(a, next(told).verdict) for a in against)
 
@@ -181,14 +181,14 @@ def _comparison(speed: Speed) -> Comparison:
 
 
 def _verdicts(pairs: Sequence[tuple[Record, Record]]) -> list[SpeedVerdict | None]:
-    """Return who is faster on each surface, in verdicts that hold together; None without times."""
+    """Return the corrected verdict on speed for each surface; None without times."""
     found = [compare(ours, theirs) for ours, theirs in pairs]
     told = iter(corrected([one for one in found if one is not None]))
     return [None if one is None else next(told).verdict for one in found]
 
 
 def sides(ratios: Sequence[float]) -> PairedComparison:
-    """What do the ratios of the surfaces, ours over theirs, say?"""
+    """Return the summary of ratios, ours over theirs, over the surfaces."""
     interval = median_interval(ratios)
     return PairedComparison(
         lower=sum(ratio < 1 - TIE for ratio in ratios),
@@ -201,7 +201,7 @@ def sides(ratios: Sequence[float]) -> PairedComparison:
 
 
 def speed_of(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
-    """How do our seconds compare, over all surfaces that both were timed on?"""
+    """Return the speed comparison over all surfaces on which both were timed."""
     by_surface = [paired_ratios(ours, theirs) for ours, theirs in pairs]
     by_surface = [ratios for ratios in by_surface if ratios]
     by_round = [_median_ratio(ratios) for ratios in zip(*by_surface, strict=False)]
@@ -220,17 +220,17 @@ def speed_of(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
 
 
 def folds_on(records: Sequence[Record]) -> list[str]:
-    """Surfaces on which there is a map whose only fault is folded triangles."""
+    """Return the surfaces with a map whose only fault is folded triangles."""
     return [r.cell.mesh for r in records if _only_folds(r)]
 
 
 def without_map(records: Sequence[Record]) -> dict[str, str]:
-    """Surfaces on which the algorithm gave up or met a limit, with the cause."""
+    """Return the surfaces on which the algorithm failed or reached a limit, with the cause."""
     return {r.cell.mesh: r.outcome.cause or "" for r in records if _has_none(r)}
 
 
 def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
-    """Is every outcome a map, a map with folds, or an honest refusal? The candidate's records."""
+    """Check that each record has a map, a map with folds, or a failure with a cause."""
     bad = [
         f"{r.cell.mesh}: {r.outcome.status}: {r.outcome.cause}"
         for r in records
@@ -257,11 +257,11 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
             stage="quality",
             name="repeatable in every round",
             ok=not changing,
-            measured=f"other bits in a later call on {', '.join(changing)}"
+            measured=f"different bits in a later call on {', '.join(changing)}"
             if changing
             else "the same bits in every round",
             allowed="the same bits in every process, and in the second call of a process",
-            remedy="keep nothing from one call to the next.",
+            remedy="do not keep state from one call to the next.",
         ),
     ]
 
@@ -292,7 +292,7 @@ def _valid(record: Record) -> Mapping[str, float | int | None]:
 
 
 def _has_gauge(record: Record) -> bool:
-    """Whether its map has an energy in the common gauge; one that is not valid has nothing."""
+    """Whether a map has an energy in the common gauge; an invalid map has none."""
     found = _valid(record)
     return record.target == "disk" and (not found or found.get(_GAUGE) is not None)
 
@@ -315,7 +315,7 @@ def _median_ratio(ratios: Sequence[float]) -> float:
 
 
 def _only_folds(record: Record) -> bool:
-    """Whether nothing is wrong but folds, and a boundary out of order, which makes them."""
+    """Whether folds, and a boundary out of order that causes them, are the only faults."""
     kinds = {fault.kind for fault in record.outcome.faults}
     return FaultKind.FOLDED in kinds <= {FaultKind.FOLDED, FaultKind.BOUNDARY_ORDER}
 

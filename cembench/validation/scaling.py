@@ -1,4 +1,4 @@
-"""How do the seconds grow with the number of triangles?"""
+"""Stage 4: growth of the seconds with the number of triangles."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from cembench.core.errors import ParameterError
 from cembench.results.records import Record
 from cembench.validation.finding import ValidationFinding
 
-#: The largest exponent that is allowed. Factoring the Laplacian of a planar mesh costs faces^1.5
-#: in theory; 0.25 is for iterations that become more with the mesh, and for the clock.
+#: Largest allowed exponent. Factoring the Laplacian of a planar mesh costs faces^1.5
+#: in theory; 0.25 allows for iteration counts that grow with the mesh, and for clock noise.
 MOST_EXPONENT = 1.75
-#: The fewest triangles of the largest mesh.
+#: Minimum triangles of the largest mesh.
 LEAST_UP_TO = 900
-#: Phase whose growth is shown beside.
+#: Phase whose growth is shown too.
 _FACTORISATION = "factorisation"
 
 
 class Growth(BaseModel):
-    """Seconds against triangles, and with which exponent they grow between the two largest meshes.
+    """Seconds against triangles, and the exponent of growth between the two largest meshes.
 
-    On smaller ones what does not grow hides what does. Each round has an exponent of its own;
+    On smaller meshes constant costs hide the growth. Each round has its own exponent;
     `exponent` is that of the medians, `low` and `high` the smallest and largest of the rounds.
     """
 
@@ -38,12 +38,12 @@ class Growth(BaseModel):
 
 
 def sizes(up_to: int) -> tuple[int, ...]:
-    """The numbers of triangles: three, each three times the one before.
+    """Return three numbers of triangles, each three times the one before.
 
     Raises
     ------
     ParameterError
-        So few that the start of a call outweighs them.
+        `up_to` is so small that the start of a call dominates.
 
     """
     if up_to < LEAST_UP_TO:
@@ -55,12 +55,12 @@ def sizes(up_to: int) -> tuple[int, ...]:
 
 
 def growth(what: str, faces: Sequence[int], rounds: Sequence[Sequence[float]]) -> Growth:
-    """With which exponent do they grow? `rounds` holds each round's seconds, smallest mesh first.
+    """Return the growth of seconds; `rounds` holds those of each round, smallest mesh first.
 
     Raises
     ------
     ValueError
-        Fewer than two sizes, or no round.
+        There are fewer than two sizes, or no round.
 
     """
     if len(faces) < 2 or not rounds:
@@ -78,7 +78,7 @@ def growth(what: str, faces: Sequence[int], rounds: Sequence[Sequence[float]]) -
 
 
 def growths(records: Sequence[Record], ours: str, baseline: str | None) -> list[Growth]:
-    """That of our seconds, of the baseline's, and of its factorisation; as far as there are any."""
+    """Return the growth of our seconds, the baseline's, and its factorisation, where known."""
     found = []
     for name in (ours, baseline):
         timed = [r for r in records if r.cell.algorithm == name and r.outcome.rounds]
@@ -98,9 +98,9 @@ def growths(records: Sequence[Record], ours: str, baseline: str | None) -> list[
 
 
 def scales(ours: Growth | None, others: Sequence[Growth]) -> ValidationFinding:
-    """Is our exponent one that a solver of sparse systems may have? None: too few timed sizes.
+    """Check our exponent against that of a sparse solver; `ours` is None for too few sizes.
 
-    Judged is the smallest exponent of the rounds: a disturbance in one of them is no fault.
+    The smallest exponent of the rounds is judged, so a disturbance in one round is not a fault.
     """
     beside = ", ".join(f"{other.what} {other.exponent:.2f}" for other in others)
     measured = "it could not be timed on two sizes"

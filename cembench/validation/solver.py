@@ -1,4 +1,4 @@
-"""The algorithm that is examined, and how it is called: always in a process of its own."""
+"""The algorithm under test, always called in its own process."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Call = Callable[[Task], tuple[Outcome, Complex | None]]
 
 @dataclass(frozen=True)
 class CheckedMap:
-    """One surface, what the harness says of the call, and the map if a figure can be made of it."""
+    """A surface, the outcome of the call, and the map if there is one."""
 
     mesh: TriangleMesh
     outcome: Outcome
@@ -32,12 +32,12 @@ class CheckedMap:
 
     @property
     def is_usable(self) -> bool:
-        """Is there a map of the right shape and type, and finite?"""
+        """Whether there is a finite map of the right shape and type."""
         return self.uv is not None
 
 
 def in_a_process(options: Options) -> Call:
-    """Call with these limits, in a process of its own."""
+    """Return a function that calls an algorithm in its own process, within these limits."""
 
     def call(task: Task) -> tuple[Outcome, Complex | None]:
         record, uv = map_once(task, options)
@@ -48,7 +48,7 @@ def in_a_process(options: Options) -> Call:
 
 @dataclass(frozen=True)
 class Solver:
-    """An algorithm with its parameters, and what calls it."""
+    """An algorithm with its parameters, and the function that calls it."""
 
     algorithm: Algorithm
     plugins: tuple[str, ...] = ()
@@ -56,22 +56,22 @@ class Solver:
     call: Call = field(default_factory=lambda: in_a_process(Options(timeout=120.0)))
 
     def map(self, mesh: TriangleMesh, solves: str = "reuse") -> CheckedMap:
-        """What comes out on this surface, with systems solved this way?"""
+        """Map a surface under this linear-algebra policy, and return the checked map."""
         how = MeasurementSettings(solves=solves, repeats=1)
         (task,) = plan_cells([self.algorithm], [mesh], self.parameters, how, self.plugins)
         return CheckedMap(mesh, *self.call(task))
 
 
 def load_solver(text: str) -> tuple[Algorithm, Registry, tuple[str, ...]]:
-    """Which algorithm does the user mean: ``FILE.py``, ``FILE.py:name``, or a registered name?
+    """Load the algorithm that ``FILE.py``, ``FILE.py:name``, or a registered name refers to.
 
-    Returns it with the registry that it is in, and the plug-ins to load for it.
+    Returns the algorithm, the registry that holds it, and the plug-ins to load for it.
 
     Raises
     ------
     RegistryError
-        There is no such file or name, the file cannot be imported, or it declares no algorithm or
-        several and none is named.
+        There is no such file or name, the file cannot be imported, or it declares no algorithm, or
+        several without one being named.
 
     """
     if text.startswith(COMMAND):

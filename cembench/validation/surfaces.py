@@ -1,6 +1,6 @@
-"""The surfaces that every check runs on: small, and with what is known of their maps.
+"""The small surfaces of the checks, with what is known of their maps.
 
-They are taken from the registry by name, so a check says which family it needs and no more.
+They are taken from the registry by name, so a check only names the family it needs.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, ExactMap, Registry
 
-#: Families whose map is known or whose energy tends to zero, and in how many triangles.
+#: Families whose map is known or whose energy tends to zero, with their numbers of triangles.
 _REFINED: dict[type[TriangleMesh], dict[str, tuple[int, ...]]] = {
     DiskMesh: {"spherical-cap": (384, 1536, 6144), "hemi-ellipsoid": (384, 1536, 6144)},
     HoledMesh: {"catenoid-ring": (384, 1536, 6144), "holed-cap": (2000, 3000, 4500)},
 }
-#: What is compared on where the user names nothing: family and parameters.
+#: Default surfaces of the comparison: family and parameters.
 _COMPARED: dict[type[TriangleMesh], tuple[tuple[str, dict[str, Any]], ...]] = {
     DiskMesh: (
         ("hemi-ellipsoid", {}),
@@ -34,13 +34,13 @@ _COMPARED: dict[type[TriangleMesh], tuple[tuple[str, dict[str, Any]], ...]] = {
         *(("holed-cap", {"holes": holes}) for holes in (1, 2, 3, 5, 8)),
     ),
 }
-#: On which the growth of the seconds is measured.
+#: Surfaces of the scaling stage.
 _GROWING: dict[type[TriangleMesh], str] = {DiskMesh: "hemi-ellipsoid", HoledMesh: "catenoid-ring"}
 
 
 @dataclass(frozen=True)
 class RefinedSurface:
-    """One surface in triangulations that become finer."""
+    """One surface in ever finer triangulations."""
 
     name: str
     meshes: tuple[TriangleMesh, ...]
@@ -48,19 +48,19 @@ class RefinedSurface:
 
 
 def kind_of(algorithm: Algorithm) -> type[TriangleMesh]:
-    """Which surfaces are it tried on? One that takes any surface is tried on disks."""
+    """Return the kind of surface to test on; disks for an algorithm that takes any surface."""
     return HoledMesh if algorithm.mesh_type is HoledMesh else DiskMesh
 
 
 def make(registry: Registry, name: str, faces: int, **parameters: Any) -> TriangleMesh:
-    """A registered surface of about so many triangles."""
+    """Return a registered surface with about `faces` triangles."""
     family = registry.surface(name)
     mesh: TriangleMesh = family.function(**family.arguments({"faces": faces} | parameters))
     return mesh
 
 
 def uneven(registry: Registry, kind: type[TriangleMesh]) -> TriangleMesh:
-    """A surface without symmetry, so that no choice hangs on rounding or on numbering."""
+    """Return a surface without symmetry, so that no choice depends on rounding or numbering."""
     rng = np.random.default_rng(7)
     name = _GROWING[kind]
     mesh = make(registry, name, 1500)
@@ -70,14 +70,14 @@ def uneven(registry: Registry, kind: type[TriangleMesh]) -> TriangleMesh:
 
 
 def awkward(registry: Registry, kind: type[TriangleMesh]) -> list[TriangleMesh]:
-    """Surfaces that are allowed and out of the ordinary."""
+    """Return unusual but allowed surfaces."""
     if kind is HoledMesh:
         return [_slanted(make(registry, "catenoid-ring", 600), kind)]
     return [_fan(), _strip(), _slanted(make(registry, "hemi-ellipsoid", 600), kind)]
 
 
 def refined(registry: Registry, kind: type[TriangleMesh]) -> list[RefinedSurface]:
-    """The families on which errors must fall with the size of the triangles."""
+    """Return the families on which errors must fall under refinement."""
     return [
         RefinedSurface(
             name,
@@ -89,7 +89,7 @@ def refined(registry: Registry, kind: type[TriangleMesh]) -> list[RefinedSurface
 
 
 def compared(registry: Registry, kind: type[TriangleMesh], faces: int) -> list[TriangleMesh]:
-    """What quality and speed are measured on where the user names no surface."""
+    """Return the default surfaces for quality and speed."""
     meshes = []
     for name, parameters in _COMPARED[kind]:
         mesh = make(registry, name, faces, **parameters)
@@ -101,14 +101,14 @@ def compared(registry: Registry, kind: type[TriangleMesh], faces: int) -> list[T
 def growing(
     registry: Registry, kind: type[TriangleMesh], sizes: tuple[int, ...]
 ) -> list[TriangleMesh]:
-    """One surface in these sizes."""
+    """Return one surface in these sizes."""
     name = _GROWING[kind]
     meshes = [make(registry, name, faces) for faces in sizes]
     return [mesh.renamed(f"{name}-{mesh.m}") for mesh in meshes]
 
 
 def moved(mesh: TriangleMesh) -> TriangleMesh:
-    """The same surface turned, shifted and 40 times as large."""
+    """Return the same surface rotated, shifted and 40 times as large."""
     Q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
     Q *= np.sign(np.linalg.det(Q))
     V = 40 * mesh.V @ Q.T + [1, -2, 3]
@@ -116,9 +116,7 @@ def moved(mesh: TriangleMesh) -> TriangleMesh:
 
 
 def renumbered(mesh: TriangleMesh) -> tuple[TriangleMesh, NDArray[np.int64]]:
-    """The same surface with vertices, triangles and corners in another order; each vertex's new
-    number.
-    """
+    """Return the surface with vertices, triangles and corners reordered, and the new numbers."""
     rng = np.random.default_rng(4)
     number = rng.permutation(mesh.n)
     V = np.empty_like(mesh.V)
@@ -130,7 +128,7 @@ def renumbered(mesh: TriangleMesh) -> tuple[TriangleMesh, NDArray[np.int64]]:
 
 
 def _fan() -> DiskMesh:
-    """Seven triangles about the only interior vertex."""
+    """Return seven triangles around a single interior vertex."""
     angle = 2 * np.pi * np.arange(7) / 7
     rim = np.stack([np.cos(angle), np.sin(angle), 0.2 * np.cos(2 * angle)], axis=1)
     k = np.arange(7)
@@ -139,7 +137,7 @@ def _fan() -> DiskMesh:
 
 
 def _strip() -> DiskMesh:
-    """Triangles in a row, without an interior vertex."""
+    """Return a row of triangles without an interior vertex."""
     k = np.arange(6)
     V = np.array([[j, i, 0.0] for i in range(2) for j in range(7)])
     F = np.concatenate([np.stack([k, k + 1, k + 8], axis=1), np.stack([k, k + 8, k + 7], axis=1)])
@@ -147,6 +145,6 @@ def _strip() -> DiskMesh:
 
 
 def _slanted(mesh: TriangleMesh, kind: type[TriangleMesh]) -> TriangleMesh:
-    """Sheared until many triangles are obtuse and a tenth of the edges is not Delaunay."""
+    """Return the surface sheared: many obtuse triangles, a tenth of the edges not Delaunay."""
     V = mesh.V @ np.array([[1.0, 0, 0], [1.0, 1, 0], [0, 0, 1]])
     return kind.from_arrays(V, mesh.F, name=f"slanted {mesh.name}")

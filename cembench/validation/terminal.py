@@ -1,4 +1,4 @@
-"""A validation on a terminal of 80 columns."""
+"""A validation, printed for a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cembench.validation.verdict import STAGES, Validation, sentence
 
 
 def validation_text(validation: Validation) -> RenderableType:
-    """The findings, the figures, and the verdict at the end."""
+    """Return the findings, the figures, and the verdict at the end."""
     parts: list[RenderableType] = []
     for stage in STAGES:
         found = [finding for finding in validation.findings if finding.stage == stage]
@@ -78,14 +78,14 @@ def _pair_cells(pair: Pair, *, program: bool) -> tuple[str, ...]:
 
 
 def ratio_text(ours: float | None, theirs: float | None) -> str:
-    """Ours over theirs; a dash where there is none, or where theirs is no positive figure."""
+    """Return ours over theirs; a dash if one is missing or theirs is not positive."""
     if ours is None or theirs is None or theirs <= 0:
         return "-"
     return f"{ours / theirs:.3f}"
 
 
 def growths_table(growths: tuple[Growth, ...]) -> Table:
-    """Seconds by size and the fitted exponents."""
+    """Return a table of seconds by size with the fitted exponents."""
     sizes = [f"{faces:,} faces" for faces in growths[0].faces]
     rows = [
         [

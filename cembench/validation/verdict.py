@@ -1,4 +1,4 @@
-"""What came out, in a sentence that can be read aloud.
+"""The verdict of a validation, as data and as a sentence.
 
 The figures are data (:class:`Validation`); :func:`sentence` is the one place that words them.
 """
@@ -20,7 +20,7 @@ STAGES: tuple[Stage, ...] = get_args(Stage)
 
 
 class Requirement(StrEnum):
-    """What ``--require`` may ask for besides validity, of every baseline."""
+    """Requirements that ``--require`` can add to validity, for every baseline."""
 
     faster = "faster"
     not_slower = "not-slower"
@@ -30,7 +30,7 @@ class Requirement(StrEnum):
 
 
 class Validation(BaseModel):
-    """All that was examined of one algorithm."""
+    """The result of validating one algorithm."""
 
     model_config = ConfigDict(frozen=True)
 
@@ -39,48 +39,48 @@ class Validation(BaseModel):
     target: str
     source: Printable
     parameters: dict[str, Any]
-    #: Whether it promises maps that tend to conformal ones.
+    #: Whether the algorithm promises maps that tend to conformal ones.
     conformal: bool = True
     command: Printable
     environment: str
     findings: tuple[ValidationFinding, ...]
-    #: Stages that were not reached, with the reason.
+    #: Stages that were not run, with the reason.
     skipped: dict[Stage, str] = {}
-    #: Those among them that were skipped because nobody asked for them.
+    #: The stages among them that were not asked for.
     not_asked_for: tuple[Stage, ...] = ()
     surfaces: tuple[str, ...] = ()
     folds_on: tuple[str, ...] = ()
-    #: Surfaces without a map, and why.
+    #: Surfaces without a map, and the cause.
     no_map_on: dict[str, str] = {}
     against: tuple[BaselineComparison, ...] = ()
     growths: tuple[Growth, ...] = ()
-    #: Of those asked for, the requirements that are not met.
+    #: Requirements that were asked for and are not met.
     unmet: tuple[Requirement, ...] = ()
     seconds: float = 0.0
 
     @property
     def faults(self) -> tuple[ValidationFinding, ...]:
-        """The findings that are not ok, the first cause first."""
+        """The findings that are not ok, in the order they were found."""
         return tuple(finding for finding in self.findings if not finding.ok)
 
     @property
     def valid(self) -> bool:
-        """Is there no fault?"""
+        """Whether there is no fault."""
         return not self.faults
 
     @property
     def passed(self) -> bool:
-        """Valid, and all that was required is met?"""
+        """Whether the algorithm is valid and meets all requirements."""
         return self.valid and not self.unmet
 
 
 def unmet(asked: Sequence[Requirement], validation: Validation) -> tuple[Requirement, ...]:
-    """Which requirements are not met? Where there is no baseline, a comparison is not."""
+    """Return the requirements that are not met; without a baseline, comparisons are not."""
     return tuple(r for r in dict.fromkeys(asked) if not _meets(r, validation))
 
 
 def sentence(validation: Validation) -> str:
-    """The verdict in words."""
+    """Return the verdict as a sentence."""
     if not validation.valid:
         return _invalid(validation.faults)
     parts = ["valid" if validation.conformal else "valid; not conformal, which it does not promise"]
@@ -137,7 +137,7 @@ def _ratio_words(found: PairedComparison) -> str:
 
 
 def _times(ratio: float, low: float, high: float, words: str) -> str:
-    """One digit after the point, two where one would say 1.0."""
+    """Return factors with one decimal digit, or two if one would print 1.0."""
     digits = 1 if ratio >= 1.15 else 2
     return f"{ratio:.{digits}f} times {words} ({low:.{digits}f}-{high:.{digits}f})"
 

@@ -1,1 +1,1 @@
-"""What a user does with the library: theory, morphing, checking the installation."""
+"""The functions behind the public API and the commands: map, benchmark, morph, theory, ..."""

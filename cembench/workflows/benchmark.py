@@ -1,4 +1,4 @@
-"""Measure algorithms on surfaces with the harness: processes of their own, rounds, records."""
+"""Benchmark algorithms on surfaces: separate processes, rounds and records."""
 
 from __future__ import annotations
 
@@ -33,10 +33,17 @@ if TYPE_CHECKING:
 class Run:
     """A folder of records: what `cembench run` writes and `cembench report` reads.
 
-    Attributes
+    Parameters
     ----------
     folder : Path
-        Where the records and maps are.
+        Folder with the records and maps.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cembench
+    >>> cembench.Run(Path("results/run")).folder.name
+    'run'
 
     """
 
@@ -45,23 +52,36 @@ class Run:
     def records(self) -> list[Record]:
         """Return every record.
 
+        Returns
+        -------
+        list of Record
+            The records, sorted by file name.
+
         Raises
         ------
         RecordError
-            The folder is not a run, or a record is damaged.
+            The folder is not a run, or one of its records is damaged.
 
         """
         return Store(self.folder).records()
 
     def table(self, reference: str = "cem") -> pd.DataFrame:
-        """Return one row a cell: its figures, seconds with a 95 % interval, and status.
+        """Return a table with one row per cell.
 
-        `reference` is the algorithm whose speedup over the others (Eq. 33) has columns too.
+        Parameters
+        ----------
+        reference : str
+            The algorithm whose speedup over the others (Eq. 33) is included.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Figures, seconds with a 95 % interval, and status of each cell.
 
         Raises
         ------
         MissingExtra
-            pandas is not installed; :meth:`rows` does without.
+            pandas is not installed; :meth:`rows` works without it.
 
         """
         require(Extra.TABLES, "a DataFrame")
@@ -70,16 +90,37 @@ class Run:
         return pd.DataFrame(self.rows(reference))
 
     def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
-        """Return what :meth:`table` holds as plain data, a dictionary a cell."""
+        """Return the data of :meth:`table` as one dictionary per cell.
+
+        Parameters
+        ----------
+        reference : str
+            The algorithm whose speedup over the others (Eq. 33) is included.
+
+        Returns
+        -------
+        list of dict
+            The rows.
+
+        """
         from cembench.results.record_rows import rows
 
         return rows(self.records(), reference)
 
     def speedups(self, reference: str = "cem") -> pd.DataFrame:
-        """Return how much faster the reference is than each other algorithm, t / t_ref - 1.
+        """Return the speedup of the reference over each other algorithm, t / t_ref - 1 (Eq. 33).
 
-        One row a surface, algorithm and policy, with the interval from paired rounds; empty where
-        the reference was not measured.
+        Parameters
+        ----------
+        reference : str
+            Name of the reference algorithm.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per surface, algorithm and policy, with the interval from paired rounds; empty
+            if the reference was not measured.
+
         """
         columns = ["mesh", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
         table = self.table(reference)
@@ -87,7 +128,26 @@ class Run:
         return compared[[*columns, "verdict"]].reset_index(drop=True)
 
     def report(self, folder: str | os.PathLike[str] | None = None) -> Report:
-        """Write the report, as `cembench report` does; `folder` defaults to RUN/report."""
+        """Write the report, like `cembench report`.
+
+        Parameters
+        ----------
+        folder : path, optional
+            The report's folder; default: ``report`` in the run's folder.
+
+        Returns
+        -------
+        Report
+            The contents of the report.
+
+        Raises
+        ------
+        MissingExtra
+            A package for reports is not installed.
+        RecordError
+            The run has no records, or the folder cannot be written.
+
+        """
         from cembench.report.write_report import write_report
 
         target = Path(folder) if folder is not None else self.folder / "report"
@@ -133,39 +193,43 @@ def benchmark(
     plugins: Sequence[str] = (),
     watcher: Watcher | None = None,
 ) -> Run:
-    """Measure algorithms on surfaces, each pair in processes of its own.
+    """Benchmark algorithms on surfaces, with fresh processes for every round.
 
     Parameters
     ----------
     surfaces : iterable of meshes, paths, names or pairs of arrays (V, F)
-        Surfaces that came as arrays are called ``surface-1``, ``surface-2``, ...
+        V is (n, 3), F is (m, 3) and counts from 0. Surfaces given as arrays are named
+        ``surface-1``, ``surface-2``, ...
     algorithms : sequence of str, optional
-        Default: every usual algorithm that takes at least one of the surfaces.
+        Names from :func:`cembench.list_algorithms`; default: every usual algorithm that takes at
+        least one of the surfaces.
     precision : float
-        Rounds go on until 95 % intervals reach at most so far to either side, relative to the
-        figure: those of a cell's seconds, and of their ratio to the reference's.
+        Target half-width of the 95 % intervals, relative to the figure, for the seconds of each
+        cell and for their ratio to the reference. Rounds continue until it is reached.
     rounds : int, optional
-        A fixed number of rounds instead; fewer than six give no interval.
+        Fixed number of rounds, instead of a precision; fewer than six give no interval.
     budget : float, optional
-        Seconds after which only the first seven rounds are finished; None: no limit.
+        Seconds after which only the first seven rounds of each cell are completed; None: no limit.
     reference : str
-        The algorithm whose ratios to the others become precise.
+        The algorithm with which the others are compared.
     out : path, optional
         The run's folder; what it already holds is not measured again. Default: a new temporary
         folder, see :attr:`Run.folder`.
     parameters : mapping, optional
-        ``name`` goes to every algorithm that has it, ``algorithm.name`` to one.
+        Parameters of the algorithms: ``name`` sets it for every algorithm that has it,
+        ``algorithm.name`` for one.
     solves : sequence of "reuse" and "backslash"
-        Whether a factorisation is reused as long as its matrix does not change.
+        The linear-algebra policies: reuse a factorisation while its matrix is unchanged, or
+        factor at every solve.
     backend : str
-        The library that factors: cvxopt, superlu or pardiso; default: cvxopt where it is
+        The library that factors matrices: cvxopt, superlu or pardiso; default: cvxopt if it is
         installed, else superlu.
     threads : int
         Threads of the numerical libraries.
     timeout : float
-        Seconds that a call may take.
+        Time limit of a call, in seconds.
     memory_bytes : int, optional
-        Memory limit of a process with all that it starts.
+        Memory limit of a process and its children, in bytes.
     seed : int
         Seed of the random order within a round.
     plugins : sequence of str
@@ -173,21 +237,43 @@ def benchmark(
     watcher : Watcher, optional
         Receives progress events.
 
+    Returns
+    -------
+    Run
+        The records, as rows, tables or a report.
+
     Raises
     ------
-    MeshError, RegistryError, ParameterError, RecordError
-        As for the command line; nothing is measured then.
+    MeshError
+        A surface is unknown or damaged, or no algorithm takes it.
+    RegistryError
+        An algorithm is unknown, or a plug-in cannot be loaded.
+    ParameterError
+        A parameter is unknown or out of range.
+    RecordError
+        The folder is not a run, or cannot be written to.
+
+    Notes
+    -----
+    All errors are raised before anything is measured.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> run = cembench.benchmark(["flat-disk"], ["harmonic-circle"], rounds=1)
+    >>> [record.outcome.status for record in run.records()]
+    ['ok']
 
     """
     registry = load_registry(plugins)
     given = list(surfaces)
     if not given:
-        raise ParameterError("no surface to measure on; give at least one.")
+        raise ParameterError("there is no surface to measure on; give at least one.")
     if rounds is not None and rounds < 1:
-        raise ParameterError(f"rounds={rounds!r} is not allowed; it takes at least 1.")
+        raise ParameterError(f"rounds={rounds!r} is not allowed; write an integer of at least 1.")
     if not 0 < precision < 1:
         raise ParameterError(
-            f"precision={precision!r} is not allowed; it is a share between 0 and 1, as 0.05."
+            f"precision={precision!r} is not allowed; write a share between 0 and 1, e.g. 0.05."
         )
     chosen = [registry.algorithm(name) for name in algorithms or registry.usual_algorithms]
     kinds = list(dict.fromkeys(a.mesh_type for a in chosen))
@@ -215,7 +301,7 @@ def benchmark(
 
 
 def _roles(registry: Registry, given: SurfaceInput) -> dict[str, PaperRole]:
-    """Which row of the paper's tables a named surface stands for, if any."""
+    """Return the row of the paper's tables for a named surface, if it has one."""
     if isinstance(given, str) and given in registry.surfaces and not Path(given).is_file():
         return paper_roles(registry, [given])
     return {}

@@ -1,4 +1,4 @@
-"""What there is: algorithms and surfaces by name."""
+"""The registered algorithms and surfaces, by name."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from cembench.registry import Algorithm, Surface, load_registry
 
 
 def list_algorithms(plugins: Iterable[str] = ()) -> list[Algorithm]:
-    """Return the algorithms that can be named, with their target, parameters and source.
+    """Return the registered algorithms, with their target, parameters and source.
+
+    Parameters
+    ----------
+    plugins : iterable of str
+        Python files or ``module:name`` with more algorithms.
+
+    Returns
+    -------
+    list of Algorithm
+        The algorithms, sorted by name.
 
     Examples
     --------
@@ -23,7 +33,17 @@ def list_algorithms(plugins: Iterable[str] = ()) -> list[Algorithm]:
 
 
 def list_surfaces(plugins: Iterable[str] = ()) -> list[Surface]:
-    """Return the surface families that can be named.
+    """Return the registered surface families.
+
+    Parameters
+    ----------
+    plugins : iterable of str
+        Python files or ``module:name`` with more families.
+
+    Returns
+    -------
+    list of Surface
+        The surface families, sorted by name.
 
     Examples
     --------
@@ -36,25 +56,30 @@ def list_surfaces(plugins: Iterable[str] = ()) -> list[Surface]:
 
 
 def surface(name: str, faces: int | None = None, **parameters: Any) -> TriangleMesh:
-    """Return a mesh of a registered surface family.
+    """Return a mesh from a registered surface family.
 
-    To declare a family of your own, use the decorator :func:`cembench.surface_family`.
+    The decorator :func:`cembench.surface_family` declares new families.
 
     Parameters
     ----------
     name : str
-        See :func:`list_surfaces`.
+        A name from :func:`list_surfaces`.
     faces : int, optional
-        Triangles to aim for; default: the family's own size.
+        Approximate number of triangles; default: the family's own size.
     **parameters
-        The family's own, such as `seed`.
+        Parameters of the family, such as `seed`.
+
+    Returns
+    -------
+    DiskMesh or HoledMesh
+        The surface.
 
     Raises
     ------
     RegistryError
-        An unknown name; the message lists the known ones.
+        The name is unknown; the message lists the known ones.
     ParameterError
-        An unknown parameter, or a value out of its range.
+        A parameter is unknown, or its value is out of range.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Make a disk of what is none: closed surfaces, and surfaces with handles."""
+"""Cut surfaces that are not disks, such as closed ones or ones with handles, into disks."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ def cut(surface: SurfaceInput, *, through: Sequence[int] = ()) -> Cut:
     surface : mesh, path, name or pair of arrays (V, F)
         A connected surface, closed or with boundary loops, of any genus.
     through : sequence of int
-        Vertices that the cut has to reach, counted from 0. A sphere without any is cut between
-        two points that lie far from each other.
+        Vertices that the cut must reach, counted from 0. By default, a sphere is cut between two
+        points far from each other.
 
     Returns
     -------
     Cut
-        ``.mesh``, the disk, with the surface's triangles in their order; ``.origin``, int64 (k,),
-        the vertex of the surface that each vertex of the disk is a copy of; ``.edges`` and
-        ``.length`` of the cut.
+        ``.mesh`` is the disk, with the surface's triangles in their order; ``.origin``, int64
+        (k,), is the vertex of the surface that each vertex of the disk is a copy of; ``.edges``
+        and ``.length`` describe the cut.
 
     Raises
     ------
     MeshError
         The surface is damaged or not connected.
     ParameterError
-        A vertex that the surface does not have, or two neighbours and nothing else on a sphere.
+        A vertex does not exist, or on a sphere only two neighbouring vertices are given.
 
     Examples
     --------

@@ -1,7 +1,7 @@
-"""Is everything there that cembench needs, and what does an extra bring?
+"""Check the installation: libraries, extras, back ends, plug-ins and the machine.
 
-A package that has something of its own to look at offers it through the entry points
-``cembench.checks``: functions without arguments that return a :class:`InstallationFinding`.
+Other packages can add checks through the entry points ``cembench.checks``: functions without
+arguments that return an :class:`InstallationFinding`.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ _REQUIRED = {
     "libigl": "igl",
     "matplotlib": "matplotlib",
 }
-#: What each extra is for.
+#: Purpose of each extra.
 _FOR = {
     Extra.FETCH: "fetches public surfaces",
     Extra.FORMATS: "reads VTK, glTF and GIFTI files, writes geometry images as EXR",
-    Extra.PARDISO: "another back end",
+    Extra.PARDISO: "adds another linear-algebra back end",
     Extra.PARQUET: "exports runs as Parquet",
     Extra.REPORT: "writes reports",
     Extra.STANDINS: "makes stand-ins for the paper's models",
@@ -38,13 +38,13 @@ _FOR = {
 }
 
 
-#: Where packages offer checks of their own.
+#: Entry-point group for checks of other packages.
 CHECKS = "cembench.checks"
 
 
 @dataclass(frozen=True)
 class InstallationFinding:
-    """One line of the report; `remedy` says what to do where it is not ok."""
+    """One line of the check; `remedy` says what to do if it is not ok."""
 
     name: str
     ok: bool
@@ -54,7 +54,7 @@ class InstallationFinding:
 
 
 def examine() -> list[InstallationFinding]:
-    """Look at the interpreter, the libraries, the back ends, the plug-ins and the machine."""
+    """Check the interpreter, the libraries, the back ends, the plug-ins and the machine."""
     return [
         _python(),
         *(_library(package, module) for package, module in _REQUIRED.items()),
@@ -91,7 +91,7 @@ def _backends() -> InstallationFinding:
         "cvxopt" in there,
         f"{', '.join(there)} (default {default_backend()}; cvxopt is under the GPL)",
         required=False,
-        remedy="Run `pip install cvxopt`; without it SuperLU factors, several times slower.",
+        remedy="Run `pip install cvxopt`; SuperLU, used without it, is several times slower.",
     )
 
 
@@ -107,10 +107,10 @@ def _plugins() -> InstallationFinding:
 
 
 def _offered(entry: EntryPoint) -> InstallationFinding:
-    """What an installed package's own check finds; one that breaks is a finding itself."""
+    """Return the finding of another package's check; a check that raises is a failed finding."""
     try:
         found = entry.load()()
-    except Exception as error:  # it is not ours and may raise anything
+    except Exception as error:  # external code may raise anything
         detail = f"{entry.value} failed: {type(error).__name__}: {error}"
         remedy = "Repair or uninstall the package that declares it."
         return InstallationFinding(entry.name, False, detail, required=False, remedy=remedy)
@@ -121,12 +121,12 @@ def _offered(entry: EntryPoint) -> InstallationFinding:
 def _datasets() -> list[InstallationFinding]:
     try:
         known = load_registry().datasets
-    except CembenchError:  # said in the plug-ins' own line
+    except CembenchError:  # reported in the line of the plug-ins
         return []
     here = [name for name, dataset in known.items() if is_fetched(dataset)]
     detail = f"{len(here)} of {len(known)} fetched{': ' if here else ''}{', '.join(here)}"
     detail += f"; kept in {cache_directory()}"
-    remedy = "For the paper's public models run `cembench fetch NAME`; stand-ins do without."
+    remedy = "Run `cembench fetch NAME` for the paper's public models; stand-ins need no download."
     return [
         InstallationFinding(
             "datasets", len(here) == len(known), detail, required=False, remedy=remedy

@@ -1,4 +1,4 @@
-"""Geometry images as files: the samples of a surface on the grid of its map."""
+"""Geometry images: a surface sampled on the grid of its map, as a file."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: How a geometry image can be written.
+#: File formats of geometry images.
 IMAGES = (".npy", ".exr", ".png")
 
 
 def write_geometry_image(path: Path, mesh: TriangleMesh, z: Complex, side: int) -> None:
     """Sample a surface through its map and write the samples.
 
-    A map onto the disk is sampled on the square, any other where it lies. NPY and EXR hold
-    coordinates, NaN off the surface; PNG 16 bits a channel, the surface's box stretched to 0 ... 1,
-    and opacity 0 off the surface.
+    A map onto the disk is sampled on the square, any other map in place. NPY and EXR hold
+    coordinates, NaN off the surface. PNG has 16 bits per channel, with the surface's bounding box
+    scaled to 0 ... 1, and is transparent off the surface.
 
     Raises
     ------
     ParameterError
-        The format is unknown, or the side out of its range.
+        The format is unknown, or `side` is out of range.
     RenderError
         The file cannot be written, or OpenEXR is not installed.
 
@@ -49,10 +49,10 @@ def write_geometry_image(path: Path, mesh: TriangleMesh, z: Complex, side: int) 
 
 
 def check_image_format(path: Path) -> None:
-    """Raise where a geometry image cannot be written to a file of this name."""
+    """Raise if a geometry image cannot be written to this path."""
     if path.suffix.lower() not in IMAGES:
         raise ParameterError(
-            f"{path}: {path.suffix!r} is no format of geometry images; allowed: "
+            f"{path}: {path.suffix!r} is not a format for geometry images; allowed: "
             f"{', '.join(IMAGES)}."
         )
     if path.suffix.lower() == ".exr":
@@ -68,7 +68,7 @@ def _npy(samples: Real) -> bytes:
 
 
 def _png_16_bits(samples: Real, V: Real) -> bytes:
-    """Compose a PNG file with 16 bits a channel, which Pillow does not write."""
+    """Return a PNG file with 16 bits per channel, which Pillow cannot write."""
     low, high = V.min(axis=0), V.max(axis=0)
     extent = float((high - low).max()) or 1.0
     known = np.asarray(np.isfinite(samples).all(axis=2))

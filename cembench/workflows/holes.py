@@ -1,4 +1,4 @@
-"""Map a surface with holes by every algorithm for that class."""
+"""Map a surface with holes by every algorithm for such surfaces."""
 
 from __future__ import annotations
 
@@ -12,26 +12,27 @@ from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 
 def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Result]:
-    """Map a surface with holes to a disk with round holes, by every algorithm that can.
+    """Map a surface with holes to a disk with circular holes, by every algorithm that can.
 
     Parameters
     ----------
     surface : mesh, path, name or pair of arrays (V, F)
-        A surface of genus zero with two boundary loops or more.
+        A surface of genus 0 with two boundary loops or more.
     outer : int, optional
-        A vertex of the outer boundary; default: the widest loop is the outer one.
+        A vertex of the outer boundary, counted from 0; by default the widest loop is the outer
+        one.
 
     Returns
     -------
     dict of Result
-        By the algorithm's name; one that found no valid map is left out.
+        The maps by algorithm name, without algorithms that found no valid map.
 
     Raises
     ------
     MeshError
         The surface is damaged or has no hole.
     AlgorithmFailed
-        No algorithm found a valid map; the message says why for each.
+        No algorithm found a valid map; the message gives the cause for each.
 
     Examples
     --------
@@ -54,5 +55,7 @@ def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Resul
         except AlgorithmFailed as error:
             causes.append(str(error))
     if not found:
-        raise AlgorithmFailed("; ".join(causes) or "no algorithm for surfaces with holes is there")
+        raise AlgorithmFailed(
+            "; ".join(causes) or "no algorithm for surfaces with holes is installed"
+        )
     return found

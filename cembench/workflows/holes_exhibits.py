@@ -1,4 +1,4 @@
-"""Koebe's method on surfaces with holes, as exhibits of a run (Figures 1 and 7)."""
+"""Exhibits of Koebe's method on surfaces with holes (Figures 1 and 7)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from cembench.running.plan import MeasurementSettings, plan_cells
 
 #: The surface of the paper's Figures 1 and 7.
 STAND_IN = "ho-face-with-holes"
-#: Steps that a picture shows; surfaces with more boundaries are drawn without the rest.
+#: Maximum number of steps in a picture; further steps are left out.
 MOST_STEPS = 4
 
 
@@ -40,11 +40,11 @@ def examine_holes(
     complain: Callable[[str], object],
     tell: Callable[[str], object] = lambda _: None,
 ) -> list[dict[str, Any]]:
-    """Map a surface in every way there is: a row for each, and two exhibits of the first sweep.
+    """Map a surface by every algorithm; return a row for each and write two exhibits.
 
-    `outer` is a vertex of the outer boundary, `sweeps` the most that are tried, `command` what
-    makes the exhibits again. `complain` hears of a method whose steps cannot be taken, `tell` of
-    each step before it is taken.
+    `outer` is a vertex of the outer boundary, `sweeps` the maximum number of sweeps, `command` the
+    command that makes the exhibits again. `complain` is called if Koebe's method fails, `tell`
+    before each step.
     """
     rows = []
     for algorithm in algorithms:
@@ -78,7 +78,7 @@ def _next_step(mesh: HoledMesh, algorithm: Algorithm, step: MapStep, sweeps: int
 
 
 def _best_sweep(mesh: HoledMesh, steps: list[MapStep]) -> int:
-    """Return the first sweep whose finished map has an E_C within 1 % of the lowest."""
+    """Return the first sweep whose final map has an E_C within 1 % of the lowest."""
     results = [step.result for step in steps if step.result is not None]
     energies = [dirichlet_energy(mesh, uv) - image_area(mesh, uv) for uv in results]
     enough = min(energies) * (1.01 if min(energies) > 0 else 0.99)
@@ -88,7 +88,7 @@ def _best_sweep(mesh: HoledMesh, steps: list[MapStep]) -> int:
 def _measured(
     mesh: HoledMesh, algorithm: Algorithm, outer: int | None, sweeps: int | None
 ) -> tuple[dict[str, Any], Record, Any]:
-    """One checked call in a process of its own, as a row."""
+    """Return a row for one checked call in its own process."""
     known = {parameter.name for parameter in algorithm.parameters}
     given = {"outer": outer, "sweeps": sweeps}
     parameters = {k: v for k, v in given.items() if v is not None and k in known}
@@ -122,7 +122,7 @@ def _lay_down_pictures(
     run: Path,
     command: str,
 ) -> None:
-    """Figure 1, the steps of the first sweep, and Figure 7, the map."""
+    """Write the exhibits for Figure 1, the steps of the first sweep, and Figure 7, the map."""
     metrics = record.outcome.metrics
     origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
     figures = {
@@ -140,12 +140,12 @@ def _lay_down_pictures(
     name = f"koebe-map-{mesh.name}"
     picture = exhibit_folder(run, name) / "map.png"
     write_preview(mesh, uv, picture, title=f"{mesh.name}: {record.title}", caption=caption)
-    alternative = "A checkerboard on the surface and on its image, a disk with round holes."
+    alternative = "A checkerboard on the surface and on its image, a disk with circular holes."
     write_exhibit(
         run,
         Exhibit(
             name=name,
-            title=f"{mesh.name} and its image, a disk with round holes",
+            title=f"{mesh.name} and its image, a disk with circular holes",
             text=f"The result of one sweep of Koebe's method. {caption}.",
             command=command,
             origin=origin,
@@ -197,7 +197,7 @@ def _panels(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
 
 
 def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> ExhibitTable:
-    """Circularity of each boundary after each step of the sweep."""
+    """Return the circularity of each boundary after each step of the sweep."""
     first, others = mesh.outer_and_holes(outer)
     loops = (first, *others)
     names = ("outer", *(f"hole {k}" for k in range(1, len(loops))))
@@ -233,7 +233,7 @@ _TABLE = (
 
 
 def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -> None:
-    """Lay the figures of all surfaces into a run as one table."""
+    """Add a table of the figures of all surfaces to a run."""
     table = ExhibitTable(
         title="Surfaces with holes",
         columns=tuple(title for title, _ in _TABLE),
@@ -249,7 +249,7 @@ def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -
         Exhibit(
             name="holes",
             title="Surfaces with holes",
-            text="Koebe's method after one sweep and after the best number of sweeps, beside the "
+            text="Koebe's method after one sweep and after the best number of sweeps, and the "
             "other maps to a disk with holes.",
             command=command,
             origin="stand-in" if standing else "surface",

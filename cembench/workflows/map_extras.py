@@ -1,4 +1,4 @@
-"""What `map` writes of a surface beside its map: samples, a new mesh, a page to turn it on."""
+"""Extra outputs of `map`: a geometry image, a remeshed surface, and an interactive page."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ from cembench.workflows.places import Place
 
 @dataclass(frozen=True)
 class Extras:
-    """Files that are wanted beside a map.
+    """Extra files to write with a map.
 
     Parameters
     ----------
     samples : Path, optional
-        A geometry image: NPY, EXR or PNG.
+        Path of a geometry image: NPY, EXR or PNG.
     remeshed : Path, optional
-        The surface meshed anew through the map.
+        Path of the surface remeshed through the map.
     side : int
-        Samples along a side, for both.
+        Samples along a side, for both files.
     place : Place
-        Where the texture coordinates of the new mesh lie.
+        Placement of the texture coordinates of the new mesh.
     page : Path, optional
-        A page on which to turn surface and map.
+        Path of an interactive page with surface and map.
 
     """
 
@@ -48,12 +48,12 @@ class Extras:
 
     @property
     def files(self) -> list[Path]:
-        """Those that are wanted."""
+        """The files to write."""
         return list(self.named.values())
 
     @property
     def named(self) -> dict[str, Path]:
-        """Those that are wanted, by what they are."""
+        """The files to write, by kind."""
         named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
         return {what: path for what, path in named.items() if path is not None}
 
@@ -61,7 +61,7 @@ class Extras:
 def write_extras(
     extras: Extras, mesh: TriangleMesh, z: NDArray[np.complex128], record: Record
 ) -> tuple[Notice, ...]:
-    """Write the files; return what rounding folded in the new mesh."""
+    """Write the files; return notices about triangles that rounding folds in the new mesh."""
     told: tuple[Notice, ...] = ()
     if extras.samples is not None:
         write_geometry_image(extras.samples, mesh, z, extras.side)
@@ -80,12 +80,12 @@ def write_extras(
 def check_extras(
     meshes: Sequence[Path], outputs: Sequence[Path | None], wishes: Wishes, extras: Extras
 ) -> None:
-    """Raise what would be raised for a texture or an extra file, before anything is mapped."""
+    """Raise the errors of textures and extra files before anything is mapped."""
     check_wishes(meshes, wishes)
     if wishes.textured and None in outputs:
         raise ParameterError("--checker and --bake need a file that uses the texture: add -o.")
     if len(set(outputs)) < len(outputs) and outputs[0] and wishes.place is not Place.unit:
-        raise ParameterError("surfaces that share one file share the unit square: leave --uv away.")
+        raise ParameterError("surfaces in one file share the unit square: leave out --uv.")
     if extras.files and len(meshes) > 1:
         raise ParameterError(
             "--geometry-image, --remesh and --html take one surface; map them one by one."
@@ -93,7 +93,7 @@ def check_extras(
     if extras.page is not None:
         require(Extra.REPORT, "map --html", "jinja2", "markupsafe")
     if extras.page is not None and extras.page.suffix.lower() not in (".html", ".htm"):
-        raise ParameterError(f"{extras.page}: --html writes a page; name it with .html.")
+        raise ParameterError(f"{extras.page}: --html writes a web page; use the suffix .html.")
     if extras.page is not None and not extras.page.parent.is_dir():
         raise MeshError(f"{extras.page}: there is no folder {extras.page.parent}. Make it first.")
     if extras.samples is not None:
@@ -103,15 +103,15 @@ def check_extras(
 
 
 def check_shells(surfaces: int, path: Path, wishes: Wishes, extras: Extras) -> None:
-    """Raise :class:`ParameterError` where a file of several surfaces cannot have what is wished."""
+    """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
     if surfaces < 2:
         return
     if extras.files:
         raise ParameterError(
             f"{path} holds {surfaces} surfaces; --geometry-image, --remesh and --html take one. "
-            "`cembench repair --components all` makes a file of each."
+            "`cembench repair --components all` writes each to its own file."
         )
     if wishes.place is not Place.unit:
         raise ParameterError(
-            f"{path} holds {surfaces} surfaces, which share the unit square: leave --uv away."
+            f"{path} holds {surfaces} surfaces, which share the unit square: leave out --uv."
         )

@@ -1,4 +1,4 @@
-"""Files of a map that other programs open: surface, texture coordinates, textures, samples."""
+"""Write maps to files for other programs: surfaces, texture coordinates and textures."""
 
 from __future__ import annotations
 
@@ -33,16 +33,16 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Wishes:
-    """What is written of a map beside the surface and its texture coordinates.
+    """Options for writing a map.
 
     Parameters
     ----------
     place : Place
-        Where the texture coordinates lie.
+        Placement of the texture coordinates.
     checker : bool
-        Whether a checkerboard is added as a texture. GLB has one always.
+        Whether to add a checkerboard texture. GLB always has one.
     bake : Path, optional
-        A texture for the coordinates that the surface's file had, to be painted anew for these.
+        A texture for the file's own coordinates, to be repainted for the new ones.
 
     """
 
@@ -52,17 +52,17 @@ class Wishes:
 
     @property
     def textured(self) -> bool:
-        """Whether there is a texture beside formats that hold none."""
+        """Whether a texture file is written beside formats that cannot hold one."""
         return self.checker or self.bake is not None
 
 
 def beside(output: Path, wishes: Wishes) -> list[Path]:
-    """Return the files that are written with an output, beside it.
+    """Return the additional files that are written beside an output.
 
     Raises
     ------
     ParameterError
-        A texture is wished for a format that has none.
+        A texture is requested for a format that cannot refer to one.
 
     """
     suffix = output.suffix.lower()
@@ -74,17 +74,17 @@ def beside(output: Path, wishes: Wishes) -> list[Path]:
     if suffix == ".ply":
         return [texture]
     raise ParameterError(
-        f"{output}: {suffix} names no texture; --checker and --bake go with .glb, .obj and .ply."
+        f"{output}: {suffix} names no texture; --checker and --bake go with .glb, .obj or .ply."
     )
 
 
 def check_wishes(meshes: Sequence[Path], wishes: Wishes) -> None:
-    """Raise what :func:`write_map` would raise for a texture, before anything is mapped.
+    """Raise the texture errors of :func:`write_map` before anything is mapped.
 
     Raises
     ------
     ParameterError
-        A checkerboard and a texture, or a texture for several surfaces.
+        Both a checkerboard and a texture, or a texture for several surfaces, are requested.
     RenderError
         The texture cannot be read.
 
@@ -105,24 +105,24 @@ def write_map(
 ) -> tuple[Notice, ...]:
     """Write a surface with its map as texture coordinates.
 
-    An OBJ file that was not repaired keeps all that it had, and gets the coordinates. A surface
-    that was cut is written uncut, with coordinates for each corner, where the format can hold that.
+    An OBJ file that was not repaired keeps its content and gets the coordinates. A surface that was
+    cut is written uncut, with coordinates per corner, if the format supports that.
 
     Parameters
     ----------
     output : Path
-        OBJ, PLY, GLB, VTP or NPZ.
+        OBJ, PLY, GLB, VTP or NPZ file.
     surface : SurfaceFile
-        The surface, and the file that it came from.
+        The surface and the file it was read from.
     z : complex128 (n,)
-        Its map.
+        The map.
     wishes : Wishes, optional
-        Where the coordinates lie, and which texture goes with them.
+        Placement of the coordinates, and the texture.
 
     Returns
     -------
     tuple of Notice
-        Whether rounding folded triangles in the file.
+        A notice if rounding folds triangles in the file.
 
     Raises
     ------
@@ -147,9 +147,9 @@ def write_map(
 def write_shells(
     output: Path, shells: Shells, maps: Sequence[Complex], wishes: Wishes
 ) -> tuple[Notice, ...]:
-    """Write a file of several surfaces again, their maps side by side in the unit square.
+    """Write a file of several surfaces, with their maps side by side in the unit square.
 
-    As :func:`write_map` otherwise: an OBJ file keeps all that it had.
+    Otherwise like :func:`write_map`: an OBJ file keeps its content.
     """
     uv, corners = shells.together(maps)
     mesh = shells.whole
@@ -171,16 +171,16 @@ def write_shells(
 def write_corner_map(
     output: Path, surface: SurfaceFile, corners: Complex, wishes: Wishes
 ) -> tuple[Notice, ...]:
-    """Write a surface with an image of its own for each corner (3 m,), as islands have them.
+    """Write a surface with one UV per corner (3 m,), as an atlas has.
 
     Raises
     ------
     MeshError, ParameterError, RenderError
-        As for :func:`write_map`; a texture cannot be baked for islands.
+        As for :func:`write_map`; a texture cannot be baked for an atlas.
 
     """
     if wishes.bake is not None:
-        raise ParameterError("--bake needs a map with one image for each vertex; this is an atlas.")
+        raise ParameterError("--bake needs a map with one UV per vertex; this is an atlas.")
     mesh = surface.mesh
     found = cut_map(mesh, corners.reshape(-1, 3))
     moved = placed(found.uv, wishes.place)
@@ -192,10 +192,10 @@ def write_corner_map(
 def save_map(
     output: Path, mesh: TriangleMesh, z: Complex, wishes: Wishes | None = None
 ) -> tuple[Notice, ...]:
-    """Write a surface that came from no file; as :func:`write_map`."""
+    """Write a surface that was not read from a file; like :func:`write_map`."""
     wishes = wishes or Wishes()
     if wishes.bake is not None:
-        raise ParameterError("a texture is baked for surfaces that are read from an OBJ file.")
+        raise ParameterError("--bake needs a surface read from an OBJ file.")
     moved = placed(z, wishes.place)
     surface = Textured(mesh.V, mesh.F, _columns(moved), name=mesh.name)
     _write(output, surface, _checker(wishes, output), wishes, None)
@@ -205,9 +205,9 @@ def save_map(
 def write_atlas(
     output: Path, surfaces: Sequence[SurfaceFile], maps: Sequence[Complex], wishes: Wishes
 ) -> tuple[Notice, ...]:
-    """Write several surfaces into one file, their maps side by side in the unit square.
+    """Write several surfaces to one file, with their maps side by side in the unit square.
 
-    A GLB file has a node for each; other formats one mesh of all.
+    A GLB file gets a node for each surface; other formats get one mesh.
     """
     areas = [float(corner_products(file.mesh.V, file.mesh.F)[1].sum()) for file in surfaces]
     moved = packed(maps, areas)
@@ -226,7 +226,7 @@ def write_atlas(
 
 
 def placed(z: Complex, place: Place) -> Complex:
-    """Move a map to where its texture coordinates are wished."""
+    """Return a map moved to the placement of its texture coordinates."""
     return to_unit_square(z) if place is Place.unit else z
 
 
@@ -250,8 +250,8 @@ def _texture(
 
     if surface.repaired:
         raise ParameterError(
-            "--bake needs the faces as the file has them; write the surface with `cembench repair` "
-            "and look at what it changed."
+            "--bake needs the faces of the original file, but the surface was repaired; run "
+            "`cembench repair` to see what it changes, and fix the file so that it keeps its UVs."
         )
     old = read_obj_uv(surface.path, textured.F)
     assert textured.uv is not None
@@ -270,7 +270,7 @@ def _checker(wishes: Wishes, output: Path) -> bytes | None:
 def _write(
     output: Path, surface: Textured, texture: bytes | None, wishes: Wishes, original: str | None
 ) -> None:
-    """Write the files of a surface, the texture first: no file names one that is not there."""
+    """Write the files of a surface, the texture first, so that no file names a missing one."""
     for path in beside(output, wishes):
         if path.suffix == ".png":
             assert texture is not None
@@ -290,7 +290,7 @@ def _write(
 
 
 def _joined(parts: Sequence[Textured]) -> Textured:
-    """Return several surfaces as one mesh."""
+    """Return several surfaces joined into one mesh."""
     starts = np.cumsum([0, *(len(part.V) for part in parts)])
     coordinates = [part.uv for part in parts if part.uv is not None]
     uv_starts = np.cumsum([0, *(len(uv) for uv in coordinates)])
@@ -306,7 +306,7 @@ def _joined(parts: Sequence[Textured]) -> Textured:
 def _folded_by_rounding(
     output: Path, z: Complex, moved: Complex, F: NDArray[np.int64]
 ) -> tuple[Notice, ...]:
-    """Say how many triangles the file folds that the map does not."""
+    """Return a notice of how many triangles rounding folds in the file."""
     single = output.suffix.lower() in SINGLE
     written = _columns(moved).astype(np.float32 if single else np.float64).astype(np.float64)
     after = orientations(written @ np.array([1, 1j]), F)
@@ -317,6 +317,6 @@ def _folded_by_rounding(
     remedy = "write OBJ, VTP or NPZ" if single else "--uv disk keeps the map as it is"
     told = (
         f"{count} of {len(F)} triangles are so small in the map that rounding to {precision} folds "
-        f"them or takes their area; {remedy}"
+        f"or flattens them; {remedy}"
     )
     return (Notice(NoticeKind.FOLDED_BY_ROUNDING, told),)

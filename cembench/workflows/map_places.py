@@ -1,4 +1,4 @@
-"""Where the maps of `cembench map` and their pictures go, and the pictures themselves."""
+"""Output paths of `cembench map`, and its pictures."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cembench.workflows.shells import Shells
 
 
 def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
-    """Raise :class:`ParameterError` where no algorithm maps what a cut makes."""
+    """Raise :class:`ParameterError` if no algorithm takes the disk that a cut makes."""
     if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
         raise ParameterError(
             f"--cut makes a disk, which {candidates[0].name} does not take; name an algorithm for "
@@ -31,12 +31,12 @@ def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
 def picture_files(
     sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
 ) -> list[Path]:
-    """Return where the picture of each surface goes: beside its output, or here.
+    """Return the path of each surface's picture: beside its output, or in the current folder.
 
     Raises
     ------
     ParameterError
-        Two would have one name.
+        Two pictures would have the same path.
 
     """
     pictures = [
@@ -47,21 +47,21 @@ def picture_files(
     ]
     twice = [picture for picture in pictures if pictures.count(picture) > 1]
     if twice:
-        raise ParameterError(f"two pictures would be {twice[0]}; draw them one after another.")
+        raise ParameterError(f"two pictures would be written to {twice[0]}; draw them one by one.")
     return pictures
 
 
 def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | None]:
-    """Return where the map of each surface goes: a file, or files of a folder for several.
+    """Return the output path of each surface: a file, or files in a folder for several.
 
-    A file for several surfaces comes as often as there are surfaces.
+    If several surfaces go to one file, it is returned once for each.
 
     Raises
     ------
     MeshError
-        A format that cannot hold the UVs, or a folder that is not there.
+        The format cannot hold UVs, or the folder does not exist.
     ParameterError
-        Two surfaces of one name.
+        Two surfaces have the same name.
 
     """
     if output is None:
@@ -88,13 +88,13 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
 
 
 def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, record: Record) -> None:
-    """Draw a surface and its map into a PNG, with the figures that were recorded."""
+    """Draw a surface and its map as a PNG, with the recorded figures."""
     title = f"{record.cell.mesh}: {record.title}"
     write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
 
 
 def draw_shells(shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path) -> None:
-    """Draw the surfaces of a file and their maps, side by side as in its UVs, into a PNG."""
+    """Draw the surfaces of a file and their maps, placed as in its UVs, as a PNG."""
     starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
     V = np.concatenate([part.mesh.V for part in shells.parts])
     F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])

@@ -1,4 +1,4 @@
-"""Map the surfaces of files one after another, and write each as soon as it is there."""
+"""Map the surfaces of files one by one, and write each as soon as it is mapped."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ from cembench.workflows.map_places import draw_map, draw_shells
 from cembench.workflows.shells import Shells
 
 Complex = NDArray[np.complex128]
-#: Shows words while something is done.
+#: Shows a text during some work.
 Busy = Callable[[str], AbstractContextManager[object]]
 
 
 @dataclass(frozen=True)
 class Job:
-    """A surface and the call that maps it."""
+    """A surface and the measurement that maps it."""
 
     surface: SurfaceFile
     task: Task
@@ -43,18 +43,18 @@ class Job:
 
 @dataclass(frozen=True)
 class FileJobs:
-    """What is done with one file.
+    """The surfaces of one file and their outputs.
 
     Parameters
     ----------
     shells : Shells
-        Its surfaces.
+        The surfaces.
     jobs : tuple of Job
-        One for each.
+        One job per surface.
     output : Path, optional
-        Where they go with their maps.
+        File for the surfaces with their maps.
     picture : Path, optional
-        Where a picture of them goes.
+        File for a picture of them.
 
     """
 
@@ -66,14 +66,14 @@ class FileJobs:
 
 @dataclass(frozen=True)
 class Mapped:
-    """A surface that was mapped, and what was written of it."""
+    """A mapped surface, and the files written."""
 
     surface: SurfaceFile
     record: Record
     uv: Complex | None
-    #: Names of what was written, with the files.
+    #: Kinds of outputs written, with their files.
     written: Mapping[str, str]
-    #: What is to be known of a file that was written.
+    #: Notices about the written files.
     told: tuple[tuple[Path, Notice], ...] = ()
 
     @property
@@ -90,7 +90,7 @@ def jobs_of(
     how: MeasurementSettings,
     plugins: Sequence[str],
 ) -> tuple[Job, ...]:
-    """Choose for each surface the first algorithm that takes it."""
+    """Return a job for each surface, with the first algorithm that takes it."""
     found = []
     for surface in shells.parts:
         mesh = surface.mesh
@@ -110,10 +110,10 @@ def map_surfaces(
     *,
     keep_invalid: bool = False,
 ) -> Iterator[Mapped]:
-    """Map the surfaces in turn and write what is wanted of each; give each when it is done.
+    """Map the surfaces one by one, write their outputs, and yield each when it is done.
 
-    The file of several surfaces is written with its last one; so is its picture. It is not, where a
-    map is missing in it: :func:`incomplete` tells.
+    A file of several surfaces and its picture are written after the last one, unless a map is
+    missing; see :func:`incomplete`.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def map_surfaces(
 def incomplete(
     files: Sequence[FileJobs], found: Sequence[Mapped], *, keep_invalid: bool = False
 ) -> list[Path]:
-    """Return the files that were not written, because a map is missing in them."""
+    """Return the files that were not written because a map is missing."""
     missing, start = [], 0
     for file in files:
         own = found[start : start + len(file.jobs)]
@@ -149,7 +149,7 @@ def incomplete(
 
 
 def write_together(output: Path, found: Sequence[Mapped], wishes: Wishes) -> tuple[Notice, ...]:
-    """Write all surfaces into one file; all must have a map."""
+    """Write all surfaces to one file; all must have a map."""
     maps = [mapped.uv for mapped in found if mapped.uv is not None]
     return write_atlas(output, [mapped.surface for mapped in found], maps, wishes)
 

@@ -1,4 +1,4 @@
-"""Morph surfaces into each other from what a user has in hand."""
+"""Morph surfaces into each other."""
 
 from __future__ import annotations
 
@@ -23,31 +23,33 @@ def morph(
     algorithm: str = "direct-cem",
     **options: Any,
 ) -> Morph:
-    """Register surfaces to the first one, so that its vertices can move through all of them.
+    """Register surfaces to the first one, whose vertices then move through all of them.
 
     Parameters
     ----------
     surfaces : sequence of meshes, paths, names or pairs of arrays (V, F)
         Two or more topological disks.
     landmarks : mapping, optional
-        By name, the vertex on every surface, counted from 0; the first landmark goes to the centre
-        of the disk. With none, curvature aligns the surfaces.
+        For each landmark name, its vertex on every surface, counted from 0. The first landmark
+        goes to the centre of the disk. Without landmarks, curvature aligns the surfaces.
     algorithm : str
-        The map to the disk.
+        Name of the algorithm for the maps to the disk.
     **options
         `lam`, `reach`, `pose` of :func:`cembench.workflows.morphing.morph.morph`.
 
     Returns
     -------
     Morph
-        ``morph.at(t)`` gives the first surface's vertices (n, 3) at a time from 0 to 1.
+        ``morph.at(t)`` returns the first surface's vertices, float64 (n, 3), at a time from 0 to 1.
 
     Raises
     ------
-    MeshError, ParameterError
-        A surface that is not a disk, fewer than two, or landmarks that cannot be right.
+    MeshError
+        A surface is damaged or not a disk.
+    ParameterError
+        There are fewer than two surfaces, or the landmarks are inconsistent.
     AlgorithmFailed
-        No map or no registration without folds.
+        No map or no registration without folds was found.
 
     Examples
     --------
@@ -59,14 +61,15 @@ def morph(
 
     """
     if len(surfaces) < 2:
-        raise ParameterError("a morph needs two surfaces or more; name at least one other.")
+        raise ParameterError("a morph needs two surfaces or more; name at least one more.")
     meshes = [_disk(surface) for surface in surfaces]
     names = tuple(landmarks or {})
     rows = [list((landmarks or {})[name]) for name in names]
     for name, row in zip(names, rows, strict=True):
         if len(row) != len(meshes):
             raise ParameterError(
-                f"landmark {name!r} has {len(row)} vertices; it needs {len(meshes)}, one a surface."
+                f"landmark {name!r} has {len(row)} vertices; it needs one for each of "
+                f"the {len(meshes)} surfaces."
             )
     places = Landmarks(names, np.array(rows, dtype=np.int64).reshape(len(names), len(meshes)))
     check_landmarks(places, meshes)

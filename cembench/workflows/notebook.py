@@ -1,4 +1,4 @@
-"""What a notebook shows of a result: figures as a table of HTML."""
+"""HTML tables for notebooks."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 
 
 def html_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = ()) -> str:
-    """Return a table of HTML; every text is escaped, the first column is the rows' heading.
+    """Return an HTML table; texts are escaped, and the first column holds the row headings.
 
     >>> html_table([["folds", "< 1"]])
     "<table><tr><th style='text-align:left'>folds</th><td>&lt; 1</td></tr></table>"

@@ -1,4 +1,4 @@
-"""Map one surface and check the map, in this process: arrays in, a result out."""
+"""Map one surface in this process and check the map."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cembench.workflows.surface_input import KINDS, SurfaceInput, checked_surfac
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: The algorithm that is best for a user, by the kind of surface.
+#: The recommended algorithm for each kind of surface.
 DEFAULT_ALGORITHMS: Mapping[type[TriangleMesh], str] = {
     DiskMesh: "direct-cem",
     HoledMesh: "direct-cem-holes",
@@ -38,16 +38,25 @@ DEFAULT_ALGORITHMS: Mapping[type[TriangleMesh], str] = {
 class Result:
     """A checked map of a surface to the plane.
 
-    Attributes
+    Parameters
     ----------
     mesh : TriangleMesh
         The surface.
     algorithm : Algorithm
-        What mapped it.
+        The algorithm that mapped it.
     z : complex128 (n,)
         Image of each vertex.
     outcome : Outcome
-        What the check found: figures, notices, seconds.
+        Result of the check: figures, notices and seconds.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> result = cembench.parameterize(cembench.surface("flat-disk", 200), "harmonic-circle")
+    >>> result.ok, result.z.shape == (result.mesh.n,)
+    (True, True)
+    >>> result.save("flat.obj").name
+    'flat.obj'
 
     """
 
@@ -68,17 +77,17 @@ class Result:
 
     @property
     def cause(self) -> str | None:
-        """Why the map is not valid; None for a valid one."""
+        """Why the map is not valid; None if it is valid."""
         return self.outcome.cause
 
     @property
     def metrics(self) -> Mapping[str, float | int | None]:
-        """Figures by name, computed by the harness; None where one is infinite."""
+        """Figures by name, computed by the harness; None if one is infinite."""
         return self.outcome.metrics
 
     @property
     def notices(self) -> tuple[str, ...]:
-        """What a reader should know of the surface and of the map."""
+        """Remarks on the surface and the map, e.g. a broken premise of the paper."""
         return (*map(str, self.mesh.notices), *map(str, self.outcome.notes))
 
     @property
@@ -88,22 +97,22 @@ class Result:
 
     @property
     def seconds(self) -> float | None:
-        """Wall-clock seconds of the call, without warm-up; `benchmark` measures with care."""
+        """Wall-clock seconds of the call, without warm-up; use `benchmark` for reliable timings."""
         return self.outcome.median_seconds
 
     @property
     def iterations(self) -> int | None:
-        """Iterations that were run; 0 for a direct method."""
+        """Number of iterations; 0 for a direct method."""
         return self.outcome.iterations
 
     @property
     def energy_history(self) -> tuple[float, ...]:
-        """E_C (Eq. 7) of the start and after each iteration."""
+        """E_C (Eq. 7) at the start and after each iteration."""
         return self.outcome.energy_history
 
     @property
     def extras(self) -> Mapping[str, Any]:
-        """What else the algorithm reports of itself."""
+        """Additional data reported by the algorithm."""
         return self.outcome.extras
 
     def save(
@@ -119,20 +128,27 @@ class Result:
         Parameters
         ----------
         path : path
-            OBJ, PLY, GLB, VTP or NPZ, by its suffix. GLB has a checkerboard as its texture.
+            OBJ, PLY, GLB, VTP or NPZ, by its suffix. GLB gets a checkerboard texture.
         uv : {"unit", "disk"}
             Whether the map is moved into the unit square, where engines look for textures
             (``(z + 1 + 1j) / 2`` for a disk), or written as it is.
         checker : bool
-            Whether an OBJ or PLY file gets a checkerboard too, as files beside it.
+            Whether an OBJ or PLY file gets a checkerboard texture too, as separate files.
         overwrite : bool
-            Whether files that are there may be replaced.
+            Whether existing files may be replaced.
+
+        Returns
+        -------
+        Path
+            The file.
 
         Raises
         ------
         MeshError
-            An unknown format, a folder that is not there, or a file that is and may not be
-            replaced. Nothing is half-written.
+            The format is unknown, the folder does not exist, or the file exists and must not be
+            replaced. No partial file is left.
+        ParameterError
+            `uv` is neither "unit" nor "disk".
 
         """
         from cembench.core.outputs import refuse_existing
@@ -151,10 +167,19 @@ class Result:
         return path
 
     def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
-        """Return the surface sampled on a regular grid of the map, float64 (side, side, 3).
+        """Return the surface sampled on a regular grid of the map.
 
-        A map onto the disk is sampled on the square, see
-        :func:`cembench.conformal.resample.geometry_image`.
+        Parameters
+        ----------
+        side : int
+            Samples along a side.
+
+        Returns
+        -------
+        float64 (side, side, 3)
+            Points of the surface. A map onto the disk is sampled on the square, see
+            :func:`cembench.conformal.resample.geometry_image`.
+
         """
         from cembench.conformal.resample import geometry_image
 
@@ -162,27 +187,36 @@ class Result:
         return geometry_image(self.mesh, self.z, side, "square" if square else "disk")
 
     def remesh(self, side: int = 65) -> DiskMesh:
-        """Return the surface meshed anew, with triangles that are equilateral on its disk.
+        """Return the surface remeshed with triangles that are equilateral in the disk.
 
-        `side` lattice points lie along the disk's diameter; see
-        :func:`cembench.conformal.resample.regular_remesh`.
+        Parameters
+        ----------
+        side : int
+            Lattice points along the disk's diameter; see
+            :func:`cembench.conformal.resample.regular_remesh`.
+
+        Returns
+        -------
+        DiskMesh
+            The new mesh.
+
         """
         from cembench.conformal.resample import regular_remesh
 
         return regular_remesh(self.mesh, self.z, side)[0]
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """Draw the surface and its image under one checkerboard.
+        """Draw the surface and its image under the same checkerboard.
 
         Parameters
         ----------
         path : path, optional
-            Where to write the picture as well; PNG.
+            PNG file to write the picture to, too.
 
         Returns
         -------
         matplotlib.figure.Figure
-            A notebook shows it.
+            The figure, which a notebook displays.
 
         """
         from matplotlib.figure import Figure
@@ -201,24 +235,24 @@ class Result:
         return figure
 
     def show(self, path: str | os.PathLike[str] | None = None) -> Path:
-        """Open a page in the browser on which the surface and its image can be turned.
+        """Open an interactive page with the surface and its image in the browser.
 
-        The page needs no network and no other file.
+        The page works offline and needs no other file.
 
         Parameters
         ----------
         path : path, optional
-            Where to write it, an HTML file; then it is not opened. Default: a temporary file.
+            HTML file to write; it is then not opened. Default: a temporary file.
 
         Returns
         -------
         Path
-            The page.
+            The file of the page.
 
         Raises
         ------
         RenderError
-            It cannot be written.
+            The page cannot be written.
 
         """
         import tempfile
@@ -287,32 +321,33 @@ def parameterize(
     Parameters
     ----------
     surface : mesh, path, name or pair of arrays (V, F)
-        V is (n, 3), F is (m, 3) and counts from 0. Disks and surfaces with holes.
+        A disk or a surface with holes. V is (n, 3), F is (m, 3) and counts from 0.
     algorithm : str, optional
-        See :func:`cembench.list_algorithms`; default: ``"direct-cem"``, and for surfaces with
-        holes ``"direct-cem-holes"``.
+        A name from :func:`cembench.list_algorithms`; default: ``"direct-cem"``, or
+        ``"direct-cem-holes"`` for surfaces with holes.
     keep_invalid : bool
-        Return a map that breaks a promise (a fold, say) instead of raising; look at
+        Whether to return an invalid map (for example, one with folds) instead of raising; see
         :attr:`Result.ok`.
     plugins : iterable of str
         Python files or ``module:name`` with more algorithms.
     **parameters
-        The algorithm's own, checked as on the command line.
+        Parameters of the algorithm.
 
     Returns
     -------
     Result
+        The map with its figures.
 
     Raises
     ------
     MeshError
-        The surface is damaged, or not of a kind that the algorithm takes.
+        The surface is damaged, or the algorithm does not take surfaces of its kind.
     RegistryError
-        An unknown algorithm.
+        The algorithm is unknown.
     ParameterError
-        An unknown parameter, or a value out of its range.
+        A parameter is unknown, or its value is out of range.
     AlgorithmFailed
-        No map was found, or (unless `keep_invalid`) it is not valid.
+        No map was found, or the map is not valid and `keep_invalid` is False.
 
     Examples
     --------
@@ -334,7 +369,7 @@ def parameterize(
 
 
 def default_algorithm(mesh: TriangleMesh) -> str:
-    """Return the name of the algorithm that suits this kind of surface best."""
+    """Return the name of the recommended algorithm for this kind of surface."""
     for kind, name in DEFAULT_ALGORITHMS.items():
         if isinstance(mesh, kind):
             return name

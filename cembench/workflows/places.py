@@ -1,4 +1,4 @@
-"""Where texture coordinates lie; apart, because the command line's help needs nothing else."""
+"""Placement of texture coordinates, in its own module so that the command line loads quickly."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Place(StrEnum):
-    """Where texture coordinates lie: in the unit square, or as the algorithm has them."""
+    """Placement of texture coordinates: in the unit square, or as in the map."""
 
     unit = "unit"
     disk = "disk"

@@ -1,8 +1,8 @@
-"""Surfaces by the hundred from what a user can reach: a folder, an archive, Thingi10K.
+"""Collections of surfaces: a folder, an archive, or Thingi10K.
 
-Each gives its surfaces one after another, made ready for maps: disks and surfaces with holes as
-they are, closed ones of genus 0 cut open. What cannot be used is given too, with the reason, so
-that a count of successes has its denominator.
+Each function yields surfaces that are ready to be mapped: disks and surfaces with holes as they
+are, closed surfaces of genus 0 cut open. Unusable surfaces are yielded too, with the reason, so
+that success rates have the right denominator.
 """
 
 from __future__ import annotations
@@ -25,31 +25,31 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.reading import is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
-#: A member of an archive may have so many bytes.
+#: Maximum size of an archive member, in bytes.
 LARGEST_MEMBER = 2**31
-#: So many members of an archive are looked at.
+#: Maximum number of archive members that are examined.
 MOST_MEMBERS = 1_000_000
 _PIECE = 2**20
 
 
 @dataclass(frozen=True)
 class Provided:
-    """A surface, or why there is none.
+    """A surface, or the reason why there is none.
 
     Parameters
     ----------
     name : str
-        What it is called; no two of one provider are called the same.
+        Its name, unique within a provider.
     source : str
-        Where it comes from: a path, a member of an archive, a file of Thingi10K.
+        Its origin: a path, a member of an archive, or a file of Thingi10K.
     mesh : DiskMesh, HoledMesh or None
-        The surface; None where it cannot be used.
+        The surface; None if it cannot be used.
     error : str
-        Why not.
+        Why it cannot be used.
     licence : str
-        As the provider states it; "" where it does not.
+        The licence stated by the provider; "" for none.
     cut : bool
-        Whether it was closed and has been cut open.
+        Whether it was closed and was cut open.
 
     """
 
@@ -62,19 +62,19 @@ class Provided:
 
 
 def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Provided]:
-    """Give the surfaces of all mesh files in a folder and the folders in it, by path.
+    """Yield the surfaces of all mesh files in a folder and its subfolders, sorted by path.
 
     Parameters
     ----------
     folder : Path
-        Links to folders are not followed.
+        The folder; symbolic links to folders are not followed.
     limit : int, optional
-        So many files at most.
+        Maximum number of files.
 
     Raises
     ------
     ParameterError
-        It is not a folder.
+        The path is not a folder.
 
     Examples
     --------
@@ -95,16 +95,15 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
 
 
 def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Provided]:
-    """Give the surfaces of all mesh files in a ZIP or TAR archive, in its order.
+    """Yield the surfaces of all mesh files in a ZIP or TAR archive, in its order.
 
-    Nothing is unpacked beside the archive: one member at a time lies in a temporary folder, under
-    a name of ours. Links and devices in it are not followed, and a member that grows beyond
-    2 GiB is given up.
+    One member at a time is unpacked to a temporary folder, under a new name. Links and devices are
+    ignored, and a member that grows beyond 2 GiB is skipped.
 
     Raises
     ------
     ParameterError
-        It is not an archive, or is damaged.
+        The file is not an archive, or is damaged.
 
     """
     names = Names()
@@ -129,22 +128,22 @@ def surfaces_of_thingi10k(
     cache_dir: Path | None = None,
     **filters: Any,
 ) -> Iterator[Provided]:
-    """Give surfaces of Thingi10K, models for 3D printing, through the package `thingi10k`.
+    """Yield surfaces of Thingi10K, models for 3D printing, through the package `thingi10k`.
 
     Parameters
     ----------
     limit : int, optional
-        So many models at most; the whole set is fetched once, by the package, however many.
+        Maximum number of models; the package downloads the whole set once in any case.
     license : str, optional
-        A regular expression that the licence has to match; None for any. Each model has its own.
+        A regular expression that a model's licence must match; None for any licence.
     num_facets : tuple
-        Fewest and most triangles.
+        Minimum and maximum number of triangles.
     genus : int, optional
-        Of closed models, which are cut open; None for any that is a manifold, also with boundary.
+        Genus of closed models, which are cut open; None for all manifolds, also with boundary.
     cache_dir : Path, optional
-        Where the package keeps the set.
+        Folder in which the package stores the set.
     **filters
-        Further ones of `thingi10k.dataset`, such as `category`, `num_boundary_edges`.
+        Further filters of `thingi10k.dataset`, such as `category`, `num_boundary_edges`.
 
     Raises
     ------
@@ -156,15 +155,15 @@ def surfaces_of_thingi10k(
         thingi10k = importlib.import_module("thingi10k")
     except ImportError as error:
         raise ParameterError(
-            f"the package thingi10k is not there ({error}); run `pip install thingi10k`."
+            f"the package thingi10k is not installed ({error}); run `pip install thingi10k`."
         ) from None
     wanted = {"license": license, "num_facets": num_facets, "genus": genus, "num_components": 1}
     try:
         thingi10k.init(variant="npz", cache_dir=None if cache_dir is None else str(cache_dir))
         entries = thingi10k.dataset(manifold=True, oriented=True, **(wanted | filters))
     except TypeError:
-        raise  # an unknown filter: the caller's mistake, told by the package
-    except Exception as error:  # whatever its libraries raise without a network
+        raise  # an unknown filter: the caller's mistake, reported by the package
+    except Exception as error:  # anything its libraries raise without a network
         raise ParameterError(
             f"thingi10k cannot fetch its models: {type(error).__name__}: {error}. Check the "
             "network, or name a folder that holds them with cache_dir."
@@ -186,7 +185,7 @@ def surfaces_of_thingi10k(
 def provided(
     name: str, source: str, load: Callable[[], TriangleMesh], licence: str = ""
 ) -> Provided:
-    """Load a surface and make it ready for maps, or say why that cannot be done."""
+    """Load a surface and prepare it for mapping; on failure, return the reason."""
     try:
         mesh = load()
         if mesh.loops:
@@ -194,7 +193,7 @@ def provided(
             return Provided(name, source, _as(kind, mesh, name), licence=licence)
         edges = 3 * mesh.m // 2
         if mesh.n - edges + mesh.m != 2:
-            why = "it is closed, and not one sphere: only closed surfaces of genus 0 are cut"
+            why = "it is closed, but not a single sphere: only closed surfaces of genus 0 are cut"
             return Provided(name, source, error=why, licence=licence)
         return Provided(name, source, cut_open(mesh).mesh.renamed(name), licence=licence, cut=True)
     except CembenchError as error:
@@ -206,13 +205,13 @@ def _as(kind: type[TriangleMesh], mesh: TriangleMesh, name: str) -> TriangleMesh
 
 
 class Names:
-    """Names that differ: the second "face" is "face-2"."""
+    """Makes names unique: the second "face" becomes "face-2"."""
 
     def __init__(self) -> None:
         self.taken: set[str] = set()
 
     def of(self, name: str) -> str:
-        """Return the name, or one with a number."""
+        """Return the name, with a number if it was used before."""
         number, found = 1, name
         while found in self.taken:
             number += 1
@@ -230,7 +229,7 @@ def _first(items: Iterable[Any], limit: int | None) -> Iterator[Any]:
 
 @dataclass(frozen=True)
 class _Member:
-    """A mesh file in an archive: its path there, its declared size, and its bytes."""
+    """A mesh file in an archive: its path, its declared size, and its bytes."""
 
     path: PurePosixPath
     size: int
@@ -238,7 +237,7 @@ class _Member:
 
 
 def _members(path: Path) -> Generator[_Member, None, None]:
-    """Give the regular files of an archive that are named like meshes."""
+    """Yield the regular files of an archive that have the suffix of a mesh format."""
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
             for info in archive.infolist()[:MOST_MEMBERS]:
@@ -271,9 +270,12 @@ def _unpacked(member: _Member, names: Names, folder: Path, archive: Path) -> Pro
                 while piece := content.read(_PIECE):
                     left -= len(piece)
                     if left < 0:
-                        return Provided(name, source, error="it is larger than it says")
+                        return Provided(name, source, error="it is larger than its declared size")
                     file.write(piece)
-        except (RuntimeError, NotImplementedError) as error:  # encrypted, or packed otherwise
+        except (
+            RuntimeError,
+            NotImplementedError,
+        ) as error:  # encrypted, or an unsupported compression
             return Provided(name, source, error=f"it cannot be unpacked: {error}")
         file.flush()
         place = Path(file.name)

@@ -1,4 +1,4 @@
-"""Mend what is no clean surface: a file, or arrays, become oriented manifolds."""
+"""Repair a mesh file or arrays into oriented manifolds."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.workflows.surface_input import SurfaceInput, pair_of_arrays
 
-#: What a mended surface can be, the most special first.
+#: Kinds of repaired surfaces, the most special first.
 _KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh, TriangleMesh)
 
 
 @dataclass(frozen=True)
 class Repair:
-    """What a repair came to.
+    """The result of a repair.
 
-    Attributes
+    Parameters
     ----------
     meshes : tuple of TriangleMesh
-        The surfaces, the one with most triangles first; each is a :class:`DiskMesh` or
-        :class:`HoledMesh` if it is one.
+        The surfaces, the one with the most triangles first; each is a :class:`DiskMesh` or
+        :class:`HoledMesh` if possible.
     steps : mapping of str to int
-        How often each step was taken, by its name, in the order of the steps.
+        How often each step was applied, by name, in the order of the steps.
     notices : tuple of Notice
-        What the file's reader changed or ignored.
+        What the reader of the file changed or ignored.
 
     """
 
@@ -46,7 +46,7 @@ class Repair:
 
     @property
     def mesh(self) -> TriangleMesh:
-        """The surface with most triangles."""
+        """The surface with the most triangles."""
         return self.meshes[0]
 
 
@@ -57,31 +57,31 @@ def repair(
     fill_holes: int = 0,
     components: Components = "largest",
 ) -> Repair:
-    """Mend a surface until it is an oriented manifold, and count every step.
+    """Repair a surface into an oriented manifold, and count every step.
 
     Parameters
     ----------
     surface : path, pair of arrays (V, F), or mesh
         V is (n, 3) and may hold NaN, F is (m, 3) and counts from 0.
     weld : float
-        Vertices at most so far apart, in the surface's units, become one; 0 welds those that
-        coincide exactly.
+        Vertices up to this distance apart, in the surface's units, are merged; 0 merges only
+        those that coincide exactly.
     fill_holes : int
-        Boundary loops of at most so many edges are filled, except the longest of a component.
+        Boundary loops of at most this many edges are filled, except the longest of a component.
     components : "largest" or "all"
-        Which connected components are kept.
+        The connected components to keep.
 
     Returns
     -------
     Repair
-        ``.mesh``, the surface; ``.meshes``, of all components; ``.steps``, what was done.
+        ``.mesh`` is the surface, ``.meshes`` are all components, ``.steps`` counts what was done.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or nothing is left of its surface.
+        The file cannot be read, or no surface is left.
     ParameterError
-        A tolerance or a number of edges below 0, or `components` is neither word.
+        `weld` or `fill_holes` is negative, or `components` is neither "largest" nor "all".
 
     Examples
     --------
@@ -119,7 +119,7 @@ def _soup(surface: SurfaceInput) -> Soup:
 
 
 def _mesh(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> TriangleMesh:
-    """Return the most special kind of surface that these arrays are."""
+    """Return the mesh of the most special kind that fits these arrays."""
     for kind in _KINDS[:-1]:
         try:
             return kind.from_arrays(V, F, name=name)

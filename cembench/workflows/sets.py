@@ -1,7 +1,7 @@
-"""Sets of surfaces, for runs over many: named ones, a folder, an archive.
+"""Sets of surfaces for large runs: named sets, a folder, or an archive.
 
-What a set cannot give (a file that cannot be fetched, a surface that is no disk) is given too, with
-the reason: without it a share of successes would have the wrong denominator.
+Surfaces that are not available (a file that cannot be fetched, a surface that is not a disk) are
+listed too, with the reason, because success rates need the right denominator.
 """
 
 from __future__ import annotations
@@ -28,32 +28,32 @@ from cembench.workflows.providers import (
     surfaces_of_thingi10k,
 )
 
-#: So many surfaces of a set that has no end are taken, unless the user says otherwise.
+#: Default number of surfaces from a set without an end.
 USUAL_LIMIT = 100
-#: The exhibit of a run that says what its sets gave.
+#: Name of the exhibit that lists the surfaces of a run's sets.
 EXHIBIT = "surface-set"
-#: The surface family of the face model, by its registered name.
+#: Registered name of the face model's surface family.
 FACE = "ict-face"
 
 ShowProgress = Callable[[Dataset], Progress | None]
 
 
 def _quietly(dataset: Dataset) -> None:
-    """Show nothing of a download."""
+    """Show no progress of a download."""
 
 
 @dataclass(frozen=True)
 class SurfaceSet:
-    """A named set: datasets of some groups, or samples of the face model, or Thingi10K.
+    """A named set: datasets of some groups, samples of the face model, or Thingi10K.
 
     Parameters
     ----------
     title : str
-        What is in it.
+        Description of the set.
     groups : tuple of str
         Groups of datasets.
     part : str
-        The part of the face model that is sampled; "" for none.
+        The part of the face model to sample; "" for none.
 
     """
 
@@ -65,7 +65,7 @@ class SurfaceSet:
 #: All named sets.
 SETS: Mapping[str, SurfaceSet] = MappingProxyType(
     {
-        "real-disks": SurfaceSet("real disks, models of the paper too", ("paper", "disks")),
+        "real-disks": SurfaceSet("real disks, including models of the paper", ("paper", "disks")),
         "real-holes": SurfaceSet("real surfaces with holes", ("holes",)),
         "closed": SurfaceSet("real closed surfaces of genus 0, cut open", ("closed",)),
         "stress": SurfaceSet("surfaces that are hard to map, or damaged", ("stress",)),
@@ -83,25 +83,27 @@ def surfaces_of_set(
     limit: int | None = None,
     progress: ShowProgress = _quietly,
 ) -> Iterator[Provided]:
-    """Give the surfaces of a set, ready for maps, each with its name and source.
+    """Yield the surfaces of a set, ready to be mapped, each with its name and source.
 
     Parameters
     ----------
     name : str
-        A name in :data:`SETS`, or the path of a folder or of an archive with mesh files.
+        A name in :data:`SETS`, or the path of a folder or archive with mesh files.
     registry : Registry
-        Where datasets and surface families are known.
+        The registry of datasets and surface families.
     limit : int, optional
-        So many surfaces at most; default: all, and :data:`USUAL_LIMIT` of a set that has no end.
+        Maximum number of surfaces; default: all, or :data:`USUAL_LIMIT` of a set without an end.
     progress : function of a dataset
-        What is told how the download of one gets on.
+        Returns the progress callback for a download.
 
     Raises
     ------
     ParameterError
         There is no such set, folder or archive.
-    DatasetError, MissingExtra
-        The face model cannot be had.
+    DatasetError
+        The face model cannot be fetched.
+    MissingExtra
+        The face model needs a package that is not installed.
 
     Examples
     --------
@@ -162,16 +164,16 @@ def _of_face_model(registry: Registry, part: str, limit: int) -> Iterator[Provid
 
 @dataclass(frozen=True)
 class Gathered:
-    """What the sets of a run gave.
+    """The surfaces of a run's sets.
 
     Parameters
     ----------
     surfaces : tuple of Provided
-        Those that can be measured; their names differ.
+        Surfaces that can be measured, with unique names.
     refused : tuple of Provided
-        The others, each with the reason.
+        The other surfaces, each with the reason.
     roles : mapping
-        The row of the paper's Table 1, by the surface's name, for those that are its models.
+        The role in the paper's Table 1, by surface name, of those that are its models.
 
     """
 
@@ -181,16 +183,16 @@ class Gathered:
 
     @property
     def meshes(self) -> list[TriangleMesh]:
-        """The surfaces that can be measured, under their names."""
+        """The meshes that can be measured."""
         return [one.mesh.renamed(one.name) for one in self.surfaces if one.mesh is not None]
 
 
 def gathered(
     given: Iterable[Provided], registry: Registry, algorithms: Sequence[Algorithm]
 ) -> Gathered:
-    """Sort what sets gave into what these algorithms can be measured on, and the rest.
+    """Split the surfaces of sets into those that the algorithms can be measured on, and the rest.
 
-    A surface that is given twice, with the same vertices and triangles, counts once.
+    A surface that occurs twice, with the same vertices and triangles, counts once.
     """
     names, seen = Names(), set[str]()
     kinds = tuple({a.mesh_type for a in algorithms})
@@ -215,7 +217,7 @@ def gathered(
 
 
 def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
-    """Describe what the sets of a run gave, for its report."""
+    """Return an exhibit that lists the surfaces of a run's sets."""
     count = len(found.surfaces) + len(found.refused)
     cut = sum(one.cut for one in found.surfaces)
     text = (
@@ -236,7 +238,7 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
     ]
     if found.refused:
         rows = tuple((one.name, one.error, one.source) for one in found.refused)
-        columns = ("surface", "why not", "from")
+        columns = ("surface", "reason", "from")
         tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
     return Exhibit(
         name=EXHIBIT,

@@ -1,4 +1,4 @@
-"""A file of several surfaces: its shells are mapped one by one and share the unit square."""
+"""Files with several surfaces, whose shells are mapped one by one and share the unit square."""
 
 from __future__ import annotations
 
@@ -23,10 +23,9 @@ from cembench.running.surface_file import SurfaceFile, read_surface_file, surfac
 Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
 
-#: The most surfaces that a file may hold to be mapped one by one; what falls into more pieces is a
-#: soup of triangles that wants to be welded.
+#: Maximum number of surfaces in a file; one with more pieces is a triangle soup that needs welding.
 MOST = 100
-#: Defects that each surface of a file may have or not; others are mended in the file first.
+#: Defects that belong to a single surface; others concern the whole file.
 _OF_SHELLS = {Defect.components, Defect.closed, Defect.holes, Defect.no_hole, Defect.handles}
 
 
@@ -39,13 +38,13 @@ class Shells:
     path : Path
         The file.
     V, F : float64 (n, 3), int64 (m, 3)
-        All of it; polygons cut into triangles.
+        The whole file, with polygons cut into triangles.
     parts : tuple of SurfaceFile
-        The shells, one where the file is one surface.
+        The shells; one if the file is a single surface.
     vertices : tuple of int64 (n_i,)
-        Which vertices of the whole those of each shell are.
+        Vertex numbers of each shell in the whole file.
     faces : tuple of int64 (m_i,)
-        Which triangles of the whole those of each shell are.
+        Triangle numbers of each shell in the whole file.
 
     """
 
@@ -58,23 +57,23 @@ class Shells:
 
     @property
     def whole(self) -> TriangleMesh:
-        """All of it as one mesh, which nothing but a writer or a picture takes."""
+        """The whole file as one mesh, for writers and pictures only."""
         return TriangleMesh.trusted(self.V, self.F, self.path.stem)
 
     def packed(self, maps: Sequence[Complex]) -> list[Complex]:
-        """Put the shells' maps side by side into the unit square; larger surfaces get more."""
+        """Place the maps side by side in the unit square; larger surfaces get larger parts."""
         areas = [float(corner_products(p.mesh.V, p.mesh.F)[1].sum()) for p in self.parts]
         return packed(maps, areas)
 
     def together(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
-        """Put the shells' maps side by side into the unit square.
+        """Place the maps side by side in the unit square, per corner where surfaces were cut.
 
         Returns
         -------
         uv : complex128 (k,)
-            Number i is the image of vertex i; behind them come those that only a cut needs.
+            Entry i is the image of vertex i; further entries are copies made by cuts.
         corners : int64 (m, 3), optional
-            Which of them each corner has, where surfaces were cut.
+            The entry of each corner, if surfaces were cut.
 
         """
         uv, copies = np.zeros(len(self.V), np.complex128), []
@@ -94,15 +93,15 @@ class Shells:
 def read_shells(
     path: Path, algorithms: Sequence[Algorithm], *, mend: bool = False, cut: bool = False
 ) -> Shells:
-    """Read the surfaces of a file, each as the kind that the algorithms take.
+    """Read the surfaces of a file, each as a kind that the algorithms take.
 
-    Triangles that hang together, if only at a vertex, are one surface. What is mended is one: its
-    largest.
+    Triangles that are connected, even at a single vertex, are one surface. With `mend`, only the
+    largest surface is read.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or one of its surfaces is not of that kind.
+        The file cannot be read, or one of its surfaces is not of such a kind.
 
     """
     if mend:
@@ -129,7 +128,7 @@ def read_shells(
         except MeshError as error:
             raise MeshError(
                 f"surface {k + 1} of the {len(found)} in this file, with vertex {own[0]} and "
-                f"{len(held)} triangles (numbers that follow count within it): {error}"
+                f"{len(held)} triangles (the following numbers count within this surface): {error}"
             ) from None
         vertices.append(own)
         faces.append(held)
@@ -142,7 +141,7 @@ def _alone(file: SurfaceFile) -> Shells:
 
 
 def _split(soup: Soup) -> list[tuple[Ints, Ints]]:
-    """Return the vertices and triangles of each surface; none if a vertex is in no triangle."""
+    """Return the vertices and triangles of each surface; empty if a vertex is in no triangle."""
     F = soup.triangles
     count, label = components(F, len(soup.V))
     of_faces = label[F[:, 0]]

@@ -1,4 +1,4 @@
-"""From what a user has in hand to a checked surface: a mesh, a file, a name, or two arrays."""
+"""Make a checked surface from a mesh, a file, a name, or a pair of arrays."""
 
 from __future__ import annotations
 
@@ -27,21 +27,21 @@ def checked_surface(
     kinds: Sequence[type[TriangleMesh]] = KINDS,
     registry: Registry | None = None,
 ) -> TriangleMesh:
-    """Return a surface of the first of these kinds that it is.
+    """Return a surface as the first of these kinds that fits.
 
     Parameters
     ----------
     given : mesh, path, name or pair of arrays
-        See :data:`SurfaceInput`. A name that is also a file means the file.
+        See :data:`SurfaceInput`. If a name is also a file, the file is read.
     kinds : sequence of mesh classes
-        Tried in order; the first one's error is raised where none fits.
+        Tried in order; if none fits, the first one's error is raised.
     registry : Registry, optional
-        Where names are looked up; default: everything that is installed.
+        Registry of names; default: everything installed.
 
     Raises
     ------
     MeshError
-        The surface is damaged, or of none of these kinds.
+        The surface is damaged, or is of none of these kinds.
 
     """
     if isinstance(given, TriangleMesh):
@@ -65,7 +65,7 @@ def checked_surface(
 
 
 def pair_of_arrays(given: Any) -> tuple[Any, Any]:
-    """Return the arrays of a pair; :class:`MeshError` names what is none."""
+    """Return the two arrays of a pair; raise :class:`MeshError` for anything else."""
     if isinstance(given, tuple | list) and len(given) == 2:
         return given[0], given[1]
     size = f" of {len(given)} items" if isinstance(given, tuple | list) else ""
@@ -82,7 +82,7 @@ def _converted(mesh: TriangleMesh, kind: type[TriangleMesh]) -> TriangleMesh:
 def _first(
     kinds: Sequence[type[TriangleMesh]], make: Callable[[type[TriangleMesh]], TriangleMesh]
 ) -> TriangleMesh:
-    """Return what the first kind that fits makes; the first kind's error counts."""
+    """Return the mesh of the first kind that fits; otherwise raise the first kind's error."""
     for kind in kinds[1:]:
         try:
             return make(kind)

@@ -1,8 +1,8 @@
-"""Section 4 of the paper as an experiment: what of it holds on this surface, and to which digit?
+"""Numerical tests of the statements of Section 4 of the paper on a surface.
 
-K = L_bb^-1 L_ib^T L_ii^-1 L_ib (Eq. 27) takes boundary values to those after one step (23). It is
-similar to a symmetric matrix, for G v = lambda L_bb v with G = L_ib^T L_ii^-1 L_ib has the same
-eigenvalues and both are symmetric: a symmetric eigensolver finds them without forming K.
+K = L_bb^-1 L_ib^T L_ii^-1 L_ib (Eq. 27) maps boundary values to those after one step (23). It is
+similar to a symmetric matrix: G v = lambda L_bb v with G = L_ib^T L_ii^-1 L_ib has the same
+eigenvalues, and G and L_bb are symmetric. A symmetric eigensolver finds them without forming K.
 """
 
 from __future__ import annotations
@@ -30,30 +30,30 @@ from cembench.mesh.triangle_mesh import DiskMesh
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: To how much a statement must be met to hold.
+#: Tolerance within which an equation counts as satisfied.
 TOLERANCE = 1e-8
-#: Eigenvalues that the matrix-free solver is asked for.
+#: Number of eigenvalues computed by the matrix-free solver.
 LEADING = 8
-#: A weight counts as positive in L, and the edge as not Delaunay, from this share of the largest.
+#: A weight in L counts as positive, and its edge as not Delaunay, above this share of the largest.
 SIGNIFICANT = 1e-12
 
 
 @dataclass(frozen=True)
 class Check:
-    """A premise or a statement, and what was found.
+    """A premise or a statement, and the result of testing it.
 
     Parameters
     ----------
     name : str
-        What a table calls it.
+        Its name in tables.
     source : str
-        Where the paper states it.
+        Its place in the paper.
     holds : bool
-        Whether it is met, within `TOLERANCE` where it is an equation.
+        Whether it holds; for an equation, within `TOLERANCE`.
     figure : float
-        The number that decides.
+        The deciding number.
     meaning : str
-        What that number is.
+        Meaning of that number.
 
     """
 
@@ -66,20 +66,20 @@ class Check:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What CEM's boundary iteration does when nothing stops or steers it.
+    """The course of CEM's boundary iteration without a stopping rule or safeguards.
 
     Parameters
     ----------
     energies : float64 (k + 1,)
-        E_C of the start and after each iteration.
+        E_C at the start and after each iteration.
     steps : float64 (k,)
-        Root mean square of how far the boundary vertices moved in each, up to a rotation.
+        Root-mean-square movement of the boundary vertices in each iteration, up to a rotation.
     largest_gap : float
-        The largest arc without a vertex in any iterate, in radians; pi or more would be a collapse.
+        The largest arc without a vertex in any iterate, in radians; pi or more means a collapse.
     off_circle : float
-        How far any iterate lay off the unit circle.
+        Largest distance of an iterate from the unit circle.
     out_of_order : int
-        The largest number of arcs that ran backward in any iterate.
+        The largest number of backward arcs in any iterate.
     boundary : complex128 (B,)
         The last iterate.
 
@@ -94,12 +94,12 @@ class Trajectory:
 
     @property
     def rises(self) -> Real:
-        """By how much E_C rises in each iteration; negative where it falls."""
+        """Increase of E_C in each iteration; negative if it falls."""
         return np.diff(self.energies)
 
     @property
     def rate(self) -> float:
-        """By which factor do the steps shrink at the end? The median over the last tenth."""
+        """Factor by which the steps shrink at the end: the median over the last tenth."""
         ratios = self.steps[1:] / np.maximum(self.steps[:-1], 1e-300)
         tail = self.steps[1:] > 1e-12
         ratios = ratios[tail]
@@ -107,7 +107,7 @@ class Trajectory:
 
 
 class BoundaryOperator:
-    """K of a surface, applied without being formed."""
+    """The operator K of a surface, applied without forming the matrix."""
 
     def __init__(self, mesh: DiskMesh) -> None:
         if not len(mesh.interior):
@@ -120,27 +120,27 @@ class BoundaryOperator:
 
     @property
     def size(self) -> int:
-        """How many boundary vertices are there?"""
+        """Number of boundary vertices."""
         return len(self.mesh.boundary)
 
     def extension(self, f_b: NDArray[Any]) -> NDArray[Any]:
-        """Eq. 22: the harmonic values inside."""
+        """Return the harmonic interior values (Eq. 22)."""
         return self._bordered.dirichlet(f_b)
 
     def ring(self, f_i: NDArray[Any]) -> NDArray[Any]:
-        """Eq. 23: the boundary values that follow."""
+        """Return the next boundary values (Eq. 23)."""
         return self._ring.solve(-(self.L_bi @ f_i))
 
     def __call__(self, f_b: NDArray[Any]) -> NDArray[Any]:
-        """K f_b."""
+        """Return K f_b."""
         return self.ring(self.extension(f_b))
 
     def energy(self, f_i: Complex, f_b: Complex) -> float:
-        """E_C (Eq. 7) of a map that is harmonic inside."""
+        """Return E_C (Eq. 7) of a map that is harmonic in the interior."""
         return self._bordered.conformal_energy(f_i, f_b)
 
     def leading_eigenpairs(self, count: int = LEADING) -> tuple[Real, Real]:
-        """The largest eigenvalues of K, descending (k,), and eigenvectors (n_b, k), matrix-free."""
+        """Return the largest eigenvalues of K, descending (k,), and eigenvectors (n_b, k)."""
         n = self.size
         count = min(count, n - 1)
 
@@ -162,27 +162,27 @@ class BoundaryOperator:
 
     @property
     def S(self) -> Real:
-        """L_bb - G, dense."""
+        """The dense matrix L_bb - G."""
         return self._bordered.S
 
     @cached_property
     def dense(self) -> Real:
-        """K itself, I - L_bb^-1 S."""
+        """The dense matrix K = I - L_bb^-1 S."""
         return np.eye(self.size) - self._ring.solve(self.S)
 
     def spectrum(self) -> Real:
-        """All eigenvalues, descending, by a dense symmetric solver."""
+        """All eigenvalues in descending order, from a dense symmetric solver."""
         L_bb = self.L_bb.toarray()
         return 1 - linalg.eigh(self.S, L_bb, eigvals_only=True)
 
     def start(self) -> Complex:
-        """CEM's start on the circle (Eqs. 13 to 18)."""
+        """CEM's initial boundary on the circle (Eqs. 13 to 18)."""
         mesh = self.mesh
         return on_circle(pole_start(mesh.V, mesh.F, self._bordered.solved_boundary))
 
 
 def trajectory(K: BoundaryOperator, iterations: int, *, inversion: bool) -> Trajectory:
-    """How does the bare iteration (22), (23) or (30), (24), (25) go from CEM's start?"""
+    """Run the bare iteration (22), (23) or (30), (24), (25) from CEM's start."""
     f_b = K.start()
     f_i = K.extension(f_b)
     energies, steps = [K.energy(f_i, f_b)], []
@@ -204,7 +204,7 @@ def _largest_gap(f_b: Complex) -> float:
 
 
 def premises(K: BoundaryOperator) -> list[Check]:
-    """Is the surface well-conditioned (Definition 1), and is L an M-matrix (Lemma 2)?
+    """Return the checks of Definition 1 (well-conditioned surface) and Lemma 2 (M-matrix).
 
     The signs of boundary edges count as well as those of interior ones: Lemma 2 needs both.
     """
@@ -241,7 +241,7 @@ def premises(K: BoundaryOperator) -> list[Check]:
 
 
 def positive_weights(K: BoundaryOperator) -> tuple[int, int]:
-    """How many interior and boundary edges have a weight L_ij that is not negative?"""
+    """Return the numbers of interior and boundary edges with a non-negative weight L_ij."""
     mesh = K.mesh
     L = sparse.coo_array(K.L)
     bad = (L.row < L.col) & (L.data > -SIGNIFICANT * float(np.abs(L.data).max()))
@@ -255,9 +255,9 @@ def positive_weights(K: BoundaryOperator) -> tuple[int, int]:
 def statements(
     K: BoundaryOperator, plain: Trajectory, inverse: Trajectory, *, dense: bool
 ) -> list[Check]:
-    """Which statements of Section 4 hold for this K and these two trajectories, (23) and (30)?
+    """Return the checks of Section 4 for this K and the trajectories (23) and (30).
 
-    `dense` forms K, for the statements on its entries and on its whole spectrum.
+    With `dense`, K is formed to check the statements on its entries and its whole spectrum.
     """
     values, vectors = K.leading_eigenpairs()
     ones = np.ones(K.size)
@@ -320,7 +320,7 @@ def _dense_statements(K: BoundaryOperator, leading: Real) -> list[Check]:
         Check("K > 0", "Theorem 2", smallest > 0, smallest, "its smallest entry"),
         Check("all other eigenvalues inside", "Corollary 1", inside < 1, inside, "largest modulus"),
         _within(
-            "centralisation puts 0 for 1 and keeps the others",
+            "centralisation replaces 1 by 0 and keeps the others",
             "Remark 2",
             float(np.abs(deflated - kept).max()),
             "largest change of another eigenvalue",
@@ -356,11 +356,11 @@ def _trajectory_statements(which: str, path: Trajectory) -> list[Check]:
 
 
 def predicted_rate(values: Real) -> float:
-    """By which factor should the steps of (23) shrink, from the eigenvalues of K alone?
+    """Return the factor by which steps of (23) should shrink, from the eigenvalues of K.
 
-    On a surface of revolution K acts on Fourier modes, with kappa_m on the m-th: kappa_1 =
+    On a surface of revolution K acts on Fourier modes, with eigenvalue kappa_m on mode m: kappa_1 =
     lambda_2 = lambda_3, kappa_3 = lambda_6 = lambda_7. A displacement of the angles in mode m is
     multiplied by (kappa_(m-1) + kappa_(m+1)) / (2 kappa_1); centralisation damps m = 1, so m = 2 is
-    the slowest: (1 + lambda_6 / lambda_2) / 2. Elsewhere it is an estimate.
+    the slowest: (1 + lambda_6 / lambda_2) / 2. On other surfaces it is an estimate.
     """
     return 0.5 * (1 + float(values[5] / values[1])) if len(values) > 5 else float("nan")

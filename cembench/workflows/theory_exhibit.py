@@ -1,4 +1,4 @@
-"""Section 4 of the paper on a surface, as an exhibit of a run."""
+"""Exhibit of the tests of Section 4 of the paper on a surface."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ from cembench.workflows.theory_plot import write_theory_plot
 def examine_theory(
     mesh: DiskMesh, rival: Algorithm | None, iterations: int, run: Path, command: str
 ) -> Exhibit:
-    """Put Section 4 to the test on a surface and lay what was found into a run.
+    """Test Section 4 on a surface, and add the exhibit to a run.
 
-    `rival` is the algorithm whose energy is shown beside, `command` what makes the exhibit again.
+    `rival` is the algorithm whose energy is shown for comparison, `command` the command that makes
+    the exhibit again.
     """
     name = f"theory-{mesh.name}"
-    folder = exhibit_folder(run, name)  # complains now of what it could not write in the end
+    folder = exhibit_folder(run, name)  # fail now, not after the computation
     found = theory_facts(mesh, rival, iterations)
     facts = dict(found.facts)
     write_theory_plot(

@@ -1,4 +1,4 @@
-"""What of the paper's Section 4 holds on one surface, as data."""
+"""Results of testing the paper's Section 4 on a surface, as data."""
 
 from __future__ import annotations
 
@@ -24,34 +24,34 @@ from cembench.workflows.theory import (
     trajectory,
 )
 
-#: The algorithm whose course is shown beside CEM's, where it is installed.
+#: The algorithm whose energies are compared with CEM's, if installed.
 RIVAL = "direct-cem"
-#: The least E_C, with the weights that K has: those of the mesh's own edges.
+#: Parameters for the least E_C with the weights of K, those of the mesh's own edges.
 RIVAL_PARAMETERS = {"delaunay": False, "back": 0.0}
-#: After how many iterations the table of energies looks.
+#: Numbers of iterations in the table of energies.
 LOOKS = (0, 20, 200)
-#: K is formed, for the statements on its entries, up to so many boundary vertices.
+#: Maximum number of boundary vertices for which K is formed.
 DENSE = 1200
 
 
 @dataclass(frozen=True)
 class TheoryFacts:
-    """Premises and statements of Section 4 on a surface, and what they were judged by.
+    """Premises and statements of Section 4 on a surface, with the data behind them.
 
     Attributes
     ----------
     facts : mapping
-        Everything as plain data, as `cembench theory --json` prints it.
+        All results as plain data, as printed by `cembench theory --json`.
     premises, statements : tuple of Check
-        Each with a figure, what it means, and whether it holds.
+        Each check has a figure, its meaning, and whether it holds.
     trajectories : mapping
         The bare iterations (23) and (30) of CEM, by name.
     others : mapping
         Energies of another algorithm's iterations, by its title.
     spectrum : list of float
-        Eigenvalues of K: all of them where K is small enough to be formed, else the leading ones.
+        Eigenvalues of K: all of them if K is small enough to be formed, else the leading ones.
     missing : str
-        Why there is no other algorithm; empty where there is one.
+        Why there is no other algorithm; empty if there is one.
 
     """
 
@@ -65,14 +65,19 @@ class TheoryFacts:
 
 
 def theory(surface: SurfaceInput, *, iterations: int = 200) -> TheoryFacts:
-    """Put Section 4 of the paper to the test on a disk.
+    """Test the statements of Section 4 of the paper on a disk.
 
     Parameters
     ----------
     surface : mesh, path, name or pair of arrays (V, F)
         A topological disk.
     iterations : int
-        Iterations of the bare maps (23) and (30).
+        Number of iterations of the bare maps (23) and (30).
+
+    Returns
+    -------
+    TheoryFacts
+        The premises and statements, each with the figure that decides it.
 
     Raises
     ------
@@ -92,7 +97,7 @@ def theory(surface: SurfaceInput, *, iterations: int = 200) -> TheoryFacts:
 
 
 def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> TheoryFacts:
-    """Return the facts, with the energies of `rival` beside those of CEM."""
+    """Return the results, with the energies of `rival` besides those of CEM."""
     K = BoundaryOperator(mesh)
     dense = K.size <= DENSE
     paths = {
@@ -109,7 +114,7 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
         "vertices": mesh.n,
         "boundary_vertices": K.size,
         "premises_hold": all(check.holds for check in given),
-        # The first claims nothing: see the check's source.
+        # Statements that the paper does not claim are not counted.
         "statements_hold": all(c.holds for c in said if c.source != "not claimed"),
         "premises": [asdict(check) for check in given],
         "statements": [asdict(check) for check in said],
@@ -128,7 +133,7 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
 
 
 def _certificate(mesh: DiskMesh, paths: Mapping[str, Trajectory], start: Any) -> dict[str, Any]:
-    """The modulus of the surface with four boundary points, and how far CEM's maps are from it."""
+    """Return the modulus of the surface with four boundary points, and the errors of CEM's maps."""
     try:
         found = certify(mesh)
     except AlgorithmFailed as error:
@@ -147,7 +152,7 @@ def _certificate(mesh: DiskMesh, paths: Mapping[str, Trajectory], start: Any) ->
 
 
 def _rises(path: Any) -> dict[str, float | int]:
-    """How often E_C rises by more than rounding, and by how much together and at most."""
+    """Return how often E_C rises by more than rounding, and the total and largest rise."""
     rises = path.rises[path.rises > TOLERANCE * abs(path.energies[0])]
     return {
         "count": len(rises),
@@ -159,7 +164,7 @@ def _rises(path: Any) -> dict[str, float | int]:
 def _rival_history(
     rival: Algorithm | None, mesh: DiskMesh
 ) -> tuple[dict[str, tuple[float, ...]], str]:
-    """The energies of the algorithm beside CEM; or why there are none."""
+    """Return the energies of the rival algorithm, or why there are none."""
     if rival is None or not isinstance(mesh, rival.mesh_type):
         return {}, f"{RIVAL} is not installed here." if rival is None else ""
     try:
@@ -167,12 +172,12 @@ def _rival_history(
     except AlgorithmFailed as error:
         return {}, f"{rival.title} failed: {error}."
     if not result.energy_history:
-        return {}, f"{rival.title} tells no energies."
+        return {}, f"{rival.title} reports no energies."
     return {rival.title: result.energy_history}, ""
 
 
 def _energies(paths: Any, others: Any) -> list[dict[str, Any]]:
-    """E_C at the start, after 20 and after 200 iterations, and the lowest; None where none is."""
+    """Return E_C at the start, after 20 and 200 iterations, and the lowest; None if missing."""
     curves = {name: path.energies.tolist() for name, path in paths.items()}
     curves |= {name: list(history) for name, history in others.items()}
     rows = []

@@ -1,4 +1,4 @@
-"""Section 4 in three plots: the spectrum of K, E_C by iteration, and how the steps shrink."""
+"""Three plots for Section 4: the spectrum of K, E_C by iteration, and the step lengths."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from cembench.core.atomic import write
 from cembench.workflows.theory import Trajectory
 
-#: Colours that differ in lightness too: (23), (30); other algorithms, which none of the former is.
+#: Colours, which also differ in lightness: for (23) and (30), and for other algorithms.
 COLOURS = ("#1f5f99", "#c8553d")
 OTHERS = ("#3f7d4e", "#8a5a9e", "#b8860b", "#5f6b73", "#0f8b8d", "#a0405f")
-#: An axis of fewer numbers has ticks at 2 and 5 too.
+#: An axis with fewer values has ticks at 2 and 5 too.
 DECADES = 300
-#: Below this an energy's excess over the lowest is rounding.
+#: Below this, the excess of an energy over the lowest is rounding.
 LEAST = 1e-12
 
 
@@ -31,20 +31,20 @@ def write_theory_plot(
     others: Mapping[str, Sequence[float]],
     rate: float,
 ) -> None:
-    """Draw the figure of a surface into a PNG file.
+    """Draw the plots of a surface, and write them to a PNG file.
 
     Parameters
     ----------
     path : Path
-        Where to write.
+        The PNG file.
     title : str
         The surface's name.
     eigenvalues : sequence of float
-        Of K, descending, the first being 1.
+        Eigenvalues of K in descending order; the first is 1.
     trajectories : mapping
-        Of the bare iteration, by the name of the step.
+        Trajectories of the bare iteration, by the name of the step.
     others : mapping
-        E_C by iteration of other algorithms, by their titles.
+        Energies E_C by iteration of other algorithms, by title.
     rate : float
         The predicted factor from step to step.
 
@@ -66,7 +66,7 @@ def _draw_spectrum(axes: Axes, values: np.ndarray) -> None:
     few = len(values) < DECADES
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())  # else words stand over each other
+    axes.xaxis.set_minor_formatter(NullFormatter())  # otherwise labels overlap
     axes.yaxis.set_minor_formatter(NullFormatter())
 
 

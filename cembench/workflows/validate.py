@@ -1,4 +1,4 @@
-"""Judge a solver: is it right, and is it better and faster than what there is?"""
+"""Validate a solver: contract, correctness, quality and speed."""
 
 from __future__ import annotations
 
@@ -29,31 +29,49 @@ def validate(
     timeout: float = 120.0,
     parameters: Mapping[str, Any] | None = None,
 ) -> Validation:
-    """Examine a solver as `cembench validate` does.
+    """Check whether a solver is correct, and compare it with baselines.
+
+    This is `cembench validate`; docs/write_a_solver.md explains the stages.
 
     Parameters
     ----------
     plugin : path or str
         ``FILE.py``, ``FILE.py:NAME``, ``module:name`` or a registered name.
     against : sequence of str, optional
-        Baselines; default: the usual one of the solver's target.
+        Names of the baselines; default: the usual one for the solver's target.
     surfaces : sequence of meshes, paths, names or pairs of arrays
-        What is compared on; default: the usual six.
+        Surfaces to compare on; default: the six standard ones.
     rounds : int
-        Rounds of timing.
+        Number of timing rounds.
     up_to : int
-        Triangles up to which the growth of the seconds is measured; 0: not at all.
+        Triangles of the largest mesh for the growth of time; 0: skip that stage.
     checks_only : bool
-        Contract and correctness only, without timing.
+        Whether to check contract and correctness only, without timing.
     timeout : float
-        Seconds that a call may take.
+        Time limit of a call, in seconds.
     parameters : mapping, optional
-        Of the solver.
+        Parameters of the solver.
 
     Returns
     -------
     Validation
-        ``.valid``, ``.findings``, and figures beside the baselines.
+        ``.valid``, ``.findings``, and the comparisons with the baselines.
+
+    Raises
+    ------
+    RegistryError
+        The solver or a baseline is unknown, or its file cannot be imported.
+    MeshError
+        A surface is damaged, or the solver does not take it.
+    ParameterError
+        A parameter is unknown or out of range, or a baseline cannot be compared.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> found = cembench.validate("harmonic-circle", checks_only=True)
+    >>> found.algorithm, found.valid
+    ('harmonic-circle', True)
 
     """
     algorithm, registry, plugins = load_solver(os.fspath(plugin))
@@ -73,12 +91,12 @@ def validate(
 
 
 def write_validation(found: Validation, folder: Path) -> dict[str, str]:
-    """Lay a validation into a folder, as JSON and as a page; where is each?
+    """Write a validation to a folder as JSON and HTML; return the paths.
 
     Raises
     ------
     RecordError
-        The folder cannot be written to.
+        The folder cannot be written.
 
     """
     from cembench.report.render.html import FILE, write_html  # needs an extra

@@ -1,4 +1,4 @@
-"""A page on which a surface and its map can be turned."""
+"""An interactive page with a surface and its map."""
 
 from __future__ import annotations
 
@@ -22,25 +22,25 @@ def map_page(
     algorithm: str,
     notices: Sequence[str] = (),
 ) -> str:
-    """Compose the page of one map: the view, a picture for browsers without WebGL, the figures.
+    """Return the page of a map: a 3-D view, a picture for browsers without WebGL, the figures.
 
     Parameters
     ----------
     mesh : TriangleMesh
         The surface.
     z : complex128 (n,)
-        Its map.
+        The map.
     outcome : Outcome
-        What the check found.
+        Result of the check.
     algorithm : str
-        The title of what mapped it.
+        Title of the algorithm.
     notices : sequence of str
-        What a reader should know.
+        Remarks for the reader.
 
     Returns
     -------
     str
-        HTML that asks for no other file.
+        HTML that needs no other file.
 
     """
     title = f"{mesh.name}: {algorithm}"
@@ -55,7 +55,7 @@ def map_page(
 
 
 def metric_facts(outcome: Outcome) -> list[tuple[str, str]]:
-    """Return the figures of a map as pairs of a title and a number with its unit."""
+    """Return the figures of a map as pairs of a title and a number with unit."""
     return [
         (metric.title, f"{metric.text(outcome.metrics[metric.name], precise=True)} {metric.unit}")
         for metric in METRICS

@@ -117,7 +117,7 @@ def test_a_fault_of_our_own_is_asked_to_be_reported_with_its_traceback(cli, monk
     monkeypatch.setattr("tempfile.tempdir", str(cli.folder))
     code, out, err = cli("list")
     assert (code, out) == (FAULT, "")
-    assert "a fault of its own: EOFError: in the middle" in err
+    assert "internal error in cembench: EOFError: in the middle" in err
     (kept,) = cli.folder.iterdir()
     assert str(kept) in err
     assert "raise EOFError" in kept.read_text()
@@ -164,7 +164,7 @@ def test_status_of_a_read_only_run(tmp_path):
         place.chmod(0o755)
     assert (code, err) == (0, "")
     assert "     2  ok" in out
-    assert "it is read-only" in out
+    assert "the folder is read-only" in out
 
 
 @pytest.mark.parametrize(

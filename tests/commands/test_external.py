@@ -29,7 +29,7 @@ def face(cli):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (("map", "f.obj", "--program", "target=disk"), "goes with --command COMMAND"),
+        (("map", "f.obj", "--program", "target=disk"), "needs --command COMMAND"),
         (
             ("map", "f.obj", "--command", "x {input} {output}", "--program", "colour=red"),
             "one of: ",
@@ -40,7 +40,10 @@ def face(cli):
             ("map", "f.obj", "--command", "x {input} {output}", "--program", "circle=a"),
             "is not a number",
         ),
-        (("map", "f.obj", "--command", "x {input} {output}", "-a", "cem"), "name two algorithms"),
+        (
+            ("map", "f.obj", "--command", "x {input} {output}", "-a", "cem"),
+            "both name an algorithm",
+        ),
         (("map", "f.obj", "--command", "cem {input} {output}"), "--program name=NAME"),
         (("map", "f.obj", "--command", "x {output}"), "where the mesh file goes"),
         (("validate",), "a program with --command COMMAND"),

@@ -71,7 +71,7 @@ def test_what_is_out_of_range_is_refused(cli, option):
 def test_rounds_are_fixed_or_until_precise_but_not_both(cli):
     code, out, err = cli("run", *SMALL, "--rounds", 6, "--precision", "5%")
     assert (code, out) == (2, "")
-    assert "give one of both" in err
+    assert "give only one of them" in err
 
 
 @pytest.mark.parametrize(

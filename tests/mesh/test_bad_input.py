@@ -100,7 +100,7 @@ def test_bad_usage(arguments, message, cli, tmp_path):
 
 def test_run_needs_something_to_run_on(cli):
     code, _, err = cli("run")
-    assert (code, "nothing to run on" in err) == (2, True)
+    assert (code, "no surface to run on" in err) == (2, True)
 
 
 def test_two_surfaces_of_one_name(cli, tmp_path):
@@ -108,7 +108,7 @@ def test_two_surfaces_of_one_name(cli, tmp_path):
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "same.obj").write_text(obj(size * np.asarray(V), F))
     code, _, err = cli("run", "--mesh", tmp_path / "a/same.obj", "--mesh", tmp_path / "b/same.obj")
-    assert (code, "two surfaces are called 'same'" in err) == (2, True)
+    assert (code, "two different surfaces are called 'same'" in err) == (2, True)
 
 
 def test_a_tube_goes_to_the_algorithms_that_take_holes(cli, tmp_path):

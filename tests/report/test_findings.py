@@ -62,7 +62,7 @@ def test_of_few_rounds_no_winner_is_named(evidence):
     on_one = without(evidence, lambda r: r.mesh.paper_row != "Liu's Neutral Face")
     few = replace(on_one, records=tuple(map(first_round, on_one.records)))
     found = findings(few, {}, [])
-    assert "which of the two, these rounds do not tell" in found.sentence
+    assert "these rounds do not show which of the two" in found.sentence
     assert "1 round: too few for an interval" in found.figures[0].words
     timed = (always_faster, average_rates, average_savings, more_than_80_percent)
     tested = [claim(few, {}) for claim in (*timed, table_2_follows)]

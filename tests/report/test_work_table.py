@@ -35,7 +35,10 @@ def test_counts_stand_by_surface_and_ratios_to_cem_below(counted):
     rows = {row[0].text: row for row in table.rows}
     assert rows["Liu's Neutral Face"][place["QIEM", "factored"]].number == 8
     assert rows["Liu's Neutral Face"][place["QIEM", "factor, M"]].number == 2
-    assert rows["Liu's Neutral Face"][place["LDM", "factor, M"]].why == "the library does not tell"
+    assert (
+        rows["Liu's Neutral Face"][place["LDM", "factor, M"]].why
+        == "the library does not report it"
+    )
     assert rows["flat-disk"][place["CEM", "factored"]].why == "not counted"
     mean, count = table.rows[-2:]
     assert [mean[place["QIEM", title]].number for title in ("factored", "solved")] == [

@@ -47,5 +47,5 @@ def test_a_damaged_description_is_named(tmp_path):
 
 
 def test_a_row_has_a_value_for_each_column():
-    with pytest.raises(ValidationError, match="a row has not 2 values"):
+    with pytest.raises(ValidationError, match="a row does not have 2 values"):
         ExhibitTable(title="steps", columns=("step", "off"), rows=((1, 0.1), (None,)))

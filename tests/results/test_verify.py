@@ -116,7 +116,7 @@ def test_files_that_are_gone_or_unsigned_are_told_only_when_all_is_verified(stor
     code, _, err = cli("status", "run", "--verify")
     assert code == 0
     assert "has no digest" in err
-    assert "cannot be computed again" in err
+    assert "cannot be recomputed" in err
 
 
 def test_damaged_maps_and_surfaces_are_findings(store):
@@ -156,7 +156,7 @@ def test_show_recomputes_the_figures_that_it_shows(store, cli):
     other_map(store)
     code, out, err = cli("show", f"{name}/cem", "--run", "run")
     assert (code, "conformal energy" in out) == (1, True)
-    assert "the map gives other figures" in err
+    assert "the map gives different figures" in err
     assert cli("show", f"{name}/harmonic-circle", "--run", "run")[0] == 0
 
 

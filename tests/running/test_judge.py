@@ -116,5 +116,5 @@ def test_circles_out_of_the_disk_or_over_each_other_are_told():
 
     assert told(one, 0) == []
     middles = HOLED_FLAT[one].mean(), HOLED_FLAT[other].mean()
-    assert told(one, 1 - middles[0]) == ["the circles of 1 of 3 holes reach out of the disk"]
+    assert told(one, 1 - middles[0]) == ["the circles of 1 of 3 holes reach outside the disk"]
     assert told(one, middles[1] - middles[0] + 0.01) == ["circles of holes overlap"]

@@ -45,7 +45,7 @@ def test_a_hole_that_is_no_circle_is_told_but_no_fault():
     uv[loop] = middle + 0.999 * (uv[loop] - middle) + 0.02 * np.conj(uv[loop] - middle)
     outcome, _ = mapped(uv)
     assert outcome.status == "ok"
-    assert "1 of 3 holes are no circles" in outcome.notes[0].text
+    assert "1 of 3 holes are not circles" in outcome.notes[0].text
     assert outcome.metrics["boundary_circularity"] > 0.01
 
 

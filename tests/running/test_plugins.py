@@ -30,7 +30,7 @@ def plugin(tmp_path):
 @pytest.mark.parametrize(
     ("text", "cause"),
     [
-        ("import os; os._exit(0)", "the process that did it ended with code 0"),
+        ("import os; os._exit(0)", "the importing process ended with code 0"),
         ("print('last words', flush=True); import os; os._exit(3)", "code 3: last words"),
         ("import os, signal; os.kill(os.getpid(), 37)", "ended by signal 37"),
         ("raise KeyboardInterrupt", "KeyboardInterrupt: "),
@@ -45,7 +45,7 @@ def test_what_ends_the_import_of_a_plugin_is_told(plugin, text, cause):
 
 
 def test_a_plugin_that_is_never_done_importing_is_told(plugin):
-    with pytest.raises(RegistryError, match=r"that took more than 0\.5 s\. Repair it"):
+    with pytest.raises(RegistryError, match=r"the import took more than 0\.5 s\. Repair it"):
         load_with_plugins([plugin("while True: pass")], 0.5)
 
 

@@ -109,7 +109,7 @@ def test_a_precision_is_part_of_what_a_cell_is_and_a_fixed_number_is_as_before()
     assert len({precise.key, other.key, fixed.key}) == 3
     assert "precision" not in fixed.model_dump()
     assert type(precise).model_validate_json(precise.model_dump_json()) == precise
-    with pytest.raises(ValueError, match="a number of rounds, or a precision"):
+    with pytest.raises(ValueError, match="either a number of rounds or a precision"):
         fixed.model_copy(update={}).model_validate(fixed.model_dump() | {"precision": 0.1})
 
 

@@ -171,7 +171,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("--geometry-image", "a.tif"), "allowed: .npy, .exr, .png"),
         (("--geometry-image", "no/a.npy"), "there is no folder no"),
         (("--remesh", "a.fbx"), "is unknown; allowed here"),
-        (("--html", "a.obj"), "--html writes a page; name it with .html"),
+        (("--html", "a.obj"), "use the suffix .html"),
         (("--html", "no/a.html"), "there is no folder no"),
         (("-o", "a.obj", "--uv", "square"), "'square' is not one of"),
         (("-a", "lscm", "--remesh", "a.obj"), "is not onto the disk"),

@@ -95,9 +95,9 @@ def test_a_run_over_a_set_has_one_round_and_keeps_what_the_set_gave(cli, folder,
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (["--limit", "3", "--surfaces", "flat-disk"], "--limit is of --set"),
+        (["--limit", "3", "--surfaces", "flat-disk"], "--limit needs --set"),
         (["--set", "EMPTY"], "gives no surface"),
-        (["--set", "EMPTY", "--repair"], "--repair is of --mesh"),
+        (["--set", "EMPTY", "--repair"], "--repair works with --mesh"),
         (["--set", "nowhere"], "there is no set 'nowhere'"),
     ],
 )

@@ -130,7 +130,7 @@ def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
         return solver.__cembench__
 
     assert _rival_history(rival((0.2, 0.1)), mesh) == ({"Rival": (0.2, 0.1)}, "")
-    assert _rival_history(rival(()), mesh)[1] == "Rival tells no energies."
+    assert _rival_history(rival(()), mesh)[1] == "Rival reports no energies."
     assert _rival_history(rival((), failing=True), mesh)[1] == "Rival failed: no luck."
     assert _rival_history(None, mesh) == ({}, "direct-cem is not installed here.")
 

@@ -1,1 +1,1 @@
-"""What a report says of a run: one table or figure a file, all of it out of the run's records."""
+"""The contents of a report, one table or figure per file, computed from a run's records."""

@@ -1,4 +1,4 @@
-"""Which maps are as good as the best: only among them is it told which algorithm is fastest."""
+"""Which maps are about as good as the best; only among those is the fastest algorithm named."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ AS_GOOD, DEGREES = 1.25, 0.25
 
 
 def as_good(angles: Sequence[float], best: Sequence[float]) -> bool:
-    """Whether maps are about as good as the best ones, on each surface.
+    """Whether maps are about as good as the best ones on every surface.
 
-    Both are mean angle errors in degrees, one a surface.
+    Both are mean angle errors in degrees, one per surface.
     """
     return all(a <= max(AS_GOOD * b, b + DEGREES) for a, b in zip(angles, best, strict=True))

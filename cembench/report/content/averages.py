@@ -1,8 +1,8 @@
-"""How do rates of speedup average? The two readings of the paper's means.
+"""Averages of speedup rates, in two readings of the paper's means.
 
 A rate is Eq. 33, t / t_CEM - 1. The paper averages rates arithmetically (8.5, 17.2, 4.1), where one
-large ratio counts as much as many small ones, and turns that mean into a saving. The geometric
-mean of the ratios and the mean of the savings treat every model alike.
+large ratio counts as much as many small ones, and converts that mean to a saving. The geometric
+mean of the ratios and the mean of the savings weight every model equally.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from cembench.report.content.evidence import REFERENCE
 from cembench.report.content.printed_beside_measured import Footer
 from cembench.results import paper
 
-#: What the paper states in words under Table 2.
+#: Figures in the paper's text below Table 2.
 STATED_RATE = {"qiem": 8.5, "fdm": 17.2, "ldm": 4.1}
 STATED_SAVING = {"qiem": 0.89, "fdm": 0.94, "ldm": 0.80}
 COMPARED = tuple(a for a in paper.ALGORITHMS if a != REFERENCE)
 
 
 def mean_rate(rates: Sequence[float]) -> float:
-    """The arithmetic mean of the rates, as the paper takes it."""
+    """Return the arithmetic mean of the rates, as in the paper."""
     return float(np.mean(rates))
 
 
 def geometric_rate(rates: Sequence[float]) -> float:
-    """The geometric mean of the ratios 1 + rate, minus one."""
+    """Return the geometric mean of the ratios 1 + rate, minus one."""
     return float(np.exp(np.mean(np.log1p(rates))) - 1)
 
 
 def saving_of_mean(rates: Sequence[float]) -> float:
-    """The share of time that the mean rate saves, 1 - 1/(1 + mean), as the paper takes it."""
+    """Return the share of time that the mean rate saves, 1 - 1/(1 + mean), as in the paper."""
     return 1 - 1 / (1 + mean_rate(rates))
 
 
 def mean_saving(rates: Sequence[float]) -> float:
-    """The mean over the models of the share of time saved on each, 1 - 1/(1 + rate)."""
+    """Return the mean over the models of the share of time saved, 1 - 1/(1 + rate)."""
     return float(np.mean([1 - 1 / (1 + rate) for rate in rates]))
 
 
@@ -46,11 +46,11 @@ def _rate(number: float) -> str:
 
 
 def percent(number: float) -> str:
-    """A share in whole percent."""
+    """Return a share as a whole percentage."""
     return f"{100 * number:.0f} %"
 
 
-#: Label, function and form of each reading, the paper's own first.
+#: Label, function and format of each reading, the paper's own first.
 READINGS = (
     Footer("mean rate (as the paper)", mean_rate, _rate),
     Footer("geometric mean of ratios - 1", geometric_rate, _rate),
@@ -60,7 +60,7 @@ READINGS = (
 
 
 def printed_rates(algorithm: str, models: Sequence[str] | None = None) -> list[float]:
-    """The paper's Table 2 for these models, default all, misprints replaced by Table 1's ratio."""
+    """Return Table 2's rates for these models (default: all), misprints replaced from Table 1."""
     rates = []
     for model in paper.table(2) if models is None else models:
         rate = corrected_rate(model, algorithm)
@@ -70,7 +70,7 @@ def printed_rates(algorithm: str, models: Sequence[str] | None = None) -> list[f
 
 
 def corrected_rate(model: str, algorithm: str) -> float | None:
-    """A rate of Table 2; where it is a misprint, the one that follows from Table 1."""
+    """Return a rate of Table 2, or for a misprint the one that follows from Table 1."""
     if (2, model, algorithm) not in paper.ERRATA:
         return paper.table(2)[model][algorithm]
     times = paper.table(1)[model]

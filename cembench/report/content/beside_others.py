@@ -1,7 +1,7 @@
-"""Cembench's algorithms beside libraries and programs of others, surface by surface.
+"""Comparison of cembench's algorithms with external libraries and programs, by surface.
 
-Maps of one target stand together, in the order of E_C / A; targets are never ranked with each
-other. An external program's seconds have columns of their own.
+Maps with the same target are listed together, sorted by E_C / A; targets are never ranked against
+each other. The seconds of an external program have separate columns.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from cembench.results.records import Record
 
 
 def beside_others(evidence: Evidence) -> Table | None:
-    """A line a surface and algorithm; None where all of a run is cembench's own or a plug-in's."""
+    """Return a table with a row per surface and algorithm; None without external algorithms."""
     if not any(record.external for record in evidence.records):
         return None
     policy = evidence.policies[0]
@@ -49,9 +49,9 @@ def beside_others(evidence: Evidence) -> Table | None:
             Column("solve from", numeric=False),
         ),
         tuple(rows),
-        "E_C is divided by the area of the image, whose size is free but for disks; compare it "
-        "within a target. Seconds of a call in the process, and of an external program: the wall "
-        "clock of its process, of that on a small mesh, and the solve time.",
+        "E_C is divided by the area of the image, because only disks have a fixed size; compare it "
+        "within a target. Seconds are those of a call in the process; for an external program, the "
+        "wall clock of its process, that on a small mesh, and the solve time.",
         (*marks_explained(shown), *notes),
     )
 

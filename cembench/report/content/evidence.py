@@ -1,4 +1,4 @@
-"""What a run knows, arranged as a report asks for it."""
+"""The data of a run, arranged for reports."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from cembench.results.store import Store
 REFERENCE = frame.REFERENCE
 DISK = "disk"
 Row = Mapping[str, Any]
-#: What else than surface and policy tells two cells of an algorithm apart: names with values.
+#: Parameters that distinguish two cells of an algorithm, besides surface and policy.
 Variant = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class AlgorithmSeries:
-    """An algorithm with one choice of parameters: a column of the tables, a colour of the plots.
+    """An algorithm with one choice of parameters: a column of tables and a colour of plots.
 
-    `label` tells it apart from the same algorithm with other parameters in the same run.
+    `label` distinguishes it from the same algorithm with other parameters in the same run.
     """
 
     algorithm: str
@@ -43,14 +43,14 @@ class AlgorithmSeries:
     target: str
     variant: Variant
     label: str
-    #: Is it the choice of parameters that most cells of the run have? Tables show that one.
+    #: Whether most cells of the run have this choice of parameters; tables show that one.
     main: bool = True
     #: The parameters of the variant, by name.
     parameters: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def name(self) -> str:
-        """The algorithm's name for the first choice of parameters, which the tables show."""
+        """The algorithm's name for the main choice of parameters, which tables show."""
         return self.algorithm if self.main else self.label
 
 
@@ -69,25 +69,25 @@ class MeasuredSurface:
 
     @property
     def title(self) -> str:
-        """The paper's name of the model, or its own."""
+        """The paper's name of the model, or the surface's own name."""
         return self.paper_row or self.name
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """A run, read once; every table, figure and claim is computed from it.
+    """The data of a run, from which every table, figure and claim is computed.
 
     Raises
     ------
     RecordError
-        From :meth:`of`: the folder holds no run, or one without a single record.
+        Raised by :meth:`of` if the folder holds no run, or a run without records.
 
     """
 
     store: Store
     records: tuple[Record, ...]
     exhibits: tuple[Exhibit, ...]
-    #: Records left out because the same cell was measured again later.
+    #: Number of records left out because the cell was measured again later.
     superseded: int = 0
 
     @classmethod
@@ -97,25 +97,25 @@ class Evidence:
         records = store.records()
         if not records:
             raise RecordError(
-                f"{run} holds no record: no cell of it is finished. `cembench status {run}` says "
-                "what was asked for; the same `cembench run` again goes on with it."
+                f"{run} holds no record: none of its cells is finished. `cembench status {run}` "
+                "shows what was requested; run the same `cembench run` again to resume it."
             )
         kept = _latest(records)
         return cls(store, tuple(kept), tuple(read_exhibits(run)), len(records) - len(kept))
 
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
-        """The records as flat rows, by key."""
+        """The records as flat rows, by key of the cell."""
         return {row["key"]: row for row in frame.rows(self.records)}
 
     @cached_property
     def policies(self) -> tuple[str, ...]:
-        """How systems were solved in this run, "reuse" first."""
+        """The linear-algebra policies of this run, "reuse" first."""
         return tuple(sorted({r.cell.solves for r in self.records}, key=lambda p: p != "reuse"))
 
     @cached_property
     def surfaces(self) -> tuple[MeasuredSurface, ...]:
-        """The paper's models in its order, then other surfaces from small to large."""
+        """The paper's models in the paper's order, then other surfaces by size."""
         order = list(paper.table(1))
         found: dict[str, MeasuredSurface] = {}
         for record in self.records:
@@ -138,23 +138,23 @@ class Evidence:
 
     @property
     def models(self) -> tuple[MeasuredSurface, ...]:
-        """The surfaces that are, or stand for, models of the paper."""
+        """The surfaces that are, or stand in for, models of the paper."""
         return tuple(s for s in self.surfaces if s.paper_row)
 
     @cached_property
     def one_each(self) -> tuple[MeasuredSurface, ...]:
-        """One surface for each model of the paper: the model itself before what stands for it."""
+        """One surface for each model of the paper, the model itself preferred over a stand-in."""
         real_first = sorted(self.models, key=lambda s: s.origin != "model")
         chosen = {s.paper_row: s for s in reversed(real_first)}
         return tuple(s for s in self.models if chosen[s.paper_row] is s)
 
     @cached_property
     def set_aside(self) -> tuple[MeasuredSurface, ...]:
-        """The stand-ins that averages leave out, since the run has the model or another one."""
+        """The stand-ins left out of averages, because the run has the model or another stand-in."""
         return tuple(s for s in self.models if s not in self.one_each)
 
     def standing_for(self, model: str) -> MeasuredSurface | None:
-        """The surface that is, or stands for, this model of the paper; None if none does."""
+        """Return the surface that is, or stands in for, this model; None if there is none."""
         return next((s for s in self.one_each if s.paper_row == model), None)
 
     @property
@@ -164,7 +164,7 @@ class Evidence:
 
     @cached_property
     def series(self) -> tuple[AlgorithmSeries, ...]:
-        """Every algorithm of the run: the paper's in its order, then others by name."""
+        """Every algorithm of the run: the paper's in the paper's order, then others by name."""
         variants: dict[str, Counter[Variant]] = {}
         about: dict[str, Record] = {}
         parameters: dict[tuple[str, Variant], Mapping[str, Any]] = {}
@@ -191,7 +191,7 @@ class Evidence:
 
     @property
     def disk_series(self) -> tuple[AlgorithmSeries, ...]:
-        """Those that map to the unit disk: only they are compared with one another."""
+        """The series that map to the unit disk; only these are compared with each other."""
         return tuple(s for s in self.series if s.target == DISK)
 
     @cached_property
@@ -203,14 +203,14 @@ class Evidence:
 
     @cached_property
     def looks(self) -> dict[str, SeriesStyle]:
-        """Colour, marker and dash of each series, by its label: the same in every plot."""
+        """Colour, marker and dash of each series by its label, the same in every plot."""
         found = looks([s.name for s in self.series])
         return {s.label: found[s.name] for s in self.series}
 
     def find(
         self, surface: MeasuredSurface, series: AlgorithmSeries, policy: str | None = None
     ) -> Record | None:
-        """The record of an algorithm on a surface; without a policy, the first that ended ok."""
+        """Return an algorithm's record on a surface; without a policy, the first that is ok."""
         held = [
             self._index.get((surface.mesh_hash, series.algorithm, series.variant, p))
             for p in ([policy] if policy else self.policies)
@@ -219,25 +219,25 @@ class Evidence:
         return next((r for r in there if r.outcome.status == "ok"), there[0] if there else None)
 
     def series_of(self, algorithm: str) -> AlgorithmSeries | None:
-        """The main series of an algorithm; None where the run has none."""
+        """Return the main series of an algorithm; None if the run has none."""
         return next((s for s in self.series if s.algorithm == algorithm and s.main), None)
 
     def row(self, record: Record) -> dict[str, Any]:
-        """A record as a flat row, compared with the reference."""
+        """Return a record as a flat row, compared with the reference."""
         return self.rows[record.cell.key]
 
     def rate(self, record: Record) -> float | None:
-        """The rate of speedup of CEM over a record's algorithm (Eq. 33); None without both times.
+        """Return the speedup of CEM over a record's algorithm (Eq. 33); None without both times.
 
-        It is the median ratio within rounds; CEM with its main parameters, the same surface and
-        way of solving.
+        It is the median ratio within rounds, for CEM with its main parameters on the same surface
+        and with the same policy.
         """
         base = self.base(record)
         found = None if base is None else compare(record, base)
         return None if found is None else found.speedup
 
     def base(self, record: Record) -> Record | None:
-        """CEM's record that a record's times are compared with; None for CEM itself."""
+        """Return CEM's record for comparing times; None for CEM itself."""
         reference = self.series_of(REFERENCE)
         base = reference and self._index.get(
             (record.cell.mesh_hash, REFERENCE, reference.variant, record.cell.solves)
@@ -245,7 +245,7 @@ class Evidence:
         return None if not base or base.cell.key == record.cell.key else base
 
     def name_of(self, surface: MeasuredSurface) -> str:
-        """A file name and anchor for a surface, unlike that of any other of the run."""
+        """Return a file name and anchor for a surface, unique in the run."""
         return self._names[surface.mesh_hash]
 
     @cached_property
@@ -253,14 +253,14 @@ class Evidence:
         return distinct_slugs({s.mesh_hash: s.name for s in self.surfaces})
 
     def why_not(self, record: Record | None) -> str:
-        """Why is there no figure of this cell?"""
+        """Return why there is no figure for this cell."""
         if record is None:
             return "not in this run"
         cause = record.outcome.cause
         return record.outcome.status + (f": {cause}" if cause else "")
 
     def mesh(self, surface: MeasuredSurface) -> TriangleMesh | None:
-        """The surface itself, or None where the run did not keep it."""
+        """Return the mesh of a surface; None if the run did not save it."""
         record = next(r for r in self.records if r.cell.mesh_hash == surface.mesh_hash)
         mesh = self.store.mesh(record.cell)
         if mesh is not None and (mesh.n, mesh.m) != (surface.vertices, surface.faces):
@@ -269,7 +269,7 @@ class Evidence:
         return mesh
 
     def uv(self, record: Record | None) -> NDArray[np.complex128] | None:
-        """The map of a record that ended ok, or None; no picture shows an atlas."""
+        """Return the map of a record that ended ok, else None; atlases are not drawn."""
         if record is None or record.outcome.status != "ok" or record.target == "atlas":
             return None
         uv = self.store.uv(record.cell)
@@ -281,7 +281,7 @@ class Evidence:
 
 
 def model_surface(model: str) -> str:
-    """What is the registered surface called that stands for a model? The model's name if none."""
+    """Return the name of the registered stand-in for a model, or the model's name."""
     from cembench.registry import load_registry
 
     surfaces = load_registry().surfaces.values()
@@ -304,7 +304,7 @@ def _difference(choice: Variant, main: Variant) -> str:
 
 
 def _latest(records: Sequence[Record]) -> list[Record]:
-    """Of records that differ in code or rounds alone: one that ended ok first, then the later."""
+    """Drop records that differ only in code or rounds; ok ones are preferred, then later ones."""
     best: dict[tuple[str, str, Variant, str], Record] = {}
     for record in records:
         cell = record.cell

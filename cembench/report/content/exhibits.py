@@ -1,4 +1,4 @@
-"""What verbs have laid into the run beside its cells, as sections of the report."""
+"""Sections for the exhibits that commands added to a run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from cembench.report.document import (
 from cembench.results.exhibits import Exhibit, ExhibitTable, place_of
 from cembench.results.records import MeshOrigin
 
-#: The paper's figures that are exhibits, what they show, and the verb that makes them.
+#: The paper's figures that are exhibits, what they show, and the command that makes them.
 EXPECTED = (
     ("Figure 1", "the steps of Koebe's method", "holes"),
     ("Figure 7", "a surface with holes and its map to a disk with circular holes", "holes"),
@@ -33,7 +33,7 @@ EXPECTED = (
 
 
 def exhibit_gaps(evidence: Evidence) -> list[Gap]:
-    """The paper's figures that an exhibit would show, where the run has none."""
+    """Return gaps for the paper's figures whose exhibit is missing in the run."""
     return [
         Gap(
             f"{figure}: {what}",
@@ -46,12 +46,12 @@ def exhibit_gaps(evidence: Evidence) -> list[Gap]:
 
 
 def figures_of(exhibit: Exhibit) -> list[str]:
-    """The paper's figures that an exhibit names: one, or several with commas."""
+    """Return the figures of the paper that an exhibit reproduces, as a list."""
     return [name.strip() for name in exhibit.figure.split(",") if name.strip()]
 
 
 def exhibit_sections(evidence: Evidence, folder: Path) -> list[Section]:
-    """A section for each exhibit; its pictures are copied into the report."""
+    """Return a section for each exhibit; its pictures are copied into the report."""
     names = distinct_slugs({digest(exhibit.name): exhibit.name for exhibit in evidence.exhibits})
     return [
         _section(evidence, exhibit, f"exhibit-{names[digest(exhibit.name)]}", folder)

@@ -1,4 +1,4 @@
-"""What did not end ok, and what was asked for and is not there."""
+"""Cells that did not end ok or were not finished."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from cembench.report.document import Column, Table, Text, Value, words
 
 
 def not_ok(evidence: Evidence) -> Table | Text:
-    """A line for each cell without a valid map; one sentence where there is none."""
+    """Return a table of cells without a valid map, or a sentence if there is none."""
     rows = []
     for record in evidence.records:
         outcome, cell = record.outcome, record.cell
@@ -29,7 +29,7 @@ def not_ok(evidence: Evidence) -> Table | Text:
             words(cell.algorithm),
             words(cell.solves),
             words("missing"),
-            words("asked for, not finished: the same `cembench run` again goes on"),
+            words("requested but not finished: run the same `cembench run` again to resume"),
         )
         for cell in absent
     ]
@@ -42,5 +42,5 @@ def not_ok(evidence: Evidence) -> Table | Text:
         tuple(Column(heading, numeric=False) for heading in headings),
         (*rows, *missing),
         "Such cells are gaps in the tables, count as infinitely slow in performance profiles, and "
-        "are left out of averages, which say their n.",
+        "are left out of averages, which state their n.",
     )

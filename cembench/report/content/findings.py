@@ -1,4 +1,4 @@
-"""What a run found, in one sentence and three figures: the first that a reader sees."""
+"""The findings at the head of a report: one sentence and three figures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cembench.results.records import Record
 
 @dataclass(frozen=True)
 class _Standing:
-    """An algorithm that mapped every surface: its seconds and angle errors, one a surface."""
+    """An algorithm that mapped every surface, with its seconds and angle errors by surface."""
 
     series: AlgorithmSeries
     records: tuple[Record, ...]
@@ -40,10 +40,10 @@ class _Standing:
 def findings(
     evidence: Evidence, inspections: Mapping[str, Inspection], claims: Sequence[Claim]
 ) -> Findings | None:
-    """Say who is fastest among maps as good, who has the best angles, and what holds or ended ok.
+    """Return the fastest of the equally good algorithms, the best angles, and the success.
 
-    Compared are maps to the disk, by the run's first way of solving, on all surfaces that every one
-    of them mapped. None where nothing ended ok.
+    Only maps to the disk under the run's first policy are compared, on the surfaces that all of the
+    algorithms mapped. None if nothing ended ok.
     """
     standings, n = _standings(evidence)
     if not standings:
@@ -53,7 +53,7 @@ def findings(
     ranked = sorted(good, key=lambda s: s.seconds)
     on = "one surface" if n == 1 else f"{n} surfaces"
     figures = []
-    sentence = f"Of one algorithm, {best.series.label}, on {on}: nothing to compare it with."
+    sentence = f"Only {best.series.label} mapped {on}: there is nothing to compare it with."
     if len(ranked) > 1:
         first, second = ranked[:2]
         compared = _compared(second, first)
@@ -64,7 +64,7 @@ def findings(
         fastest = (
             f"{first.series.label} is the fastest"
             if sure
-            else f"{names} are the fastest (which of the two, these rounds do not tell)"
+            else f"{names} are the fastest (these rounds do not show which of the two)"
         )
         rest = len(standings) - len(good)
         less = f" ({rest} with larger angle errors left out)" if rest else ""
@@ -72,8 +72,8 @@ def findings(
         sentence += f"; {best.series.label} has the smallest angle errors."
     elif len(standings) > 1:
         sentence = (
-            f"On {on} {best.series.label} has the smallest angle errors, and no other algorithm "
-            "comes near."
+            f"On {on}, {best.series.label} has the smallest angle errors, and no other algorithm "
+            "comes close."
         )
     figures.append(
         Finding(
@@ -90,7 +90,7 @@ def _best_angles(standings: Sequence[_Standing]) -> list[float]:
 
 
 def _standings(evidence: Evidence) -> tuple[list[_Standing], int]:
-    """Return the main series that mapped all the surfaces that most of them mapped; how many."""
+    """Return the main series that mapped the surfaces that most mapped, and their number."""
     policy = evidence.policies[0]
     held: dict[str, dict[str, Record]] = {}
     for series in evidence.disk_series:
@@ -122,7 +122,7 @@ def _has_figures(record: Record) -> bool:
 
 
 def _compared(slower: _Standing, faster: _Standing) -> Comparison | None:
-    """Compare two algorithms over all surfaces: the geometric mean of the ratios in each round."""
+    """Compare two algorithms by the geometric mean over surfaces of the ratios in each round."""
     ratios = [paired_ratios(a, b) for a, b in zip(slower.records, faster.records, strict=True)]
     rounds = min(map(len, ratios))
     if not rounds:
@@ -140,7 +140,8 @@ def _times(first: _Standing, second: _Standing, compared: Comparison) -> Finding
     )
     return Finding(
         f"{compared.ratio:.2f} times",
-        f"as fast as {second.series.label}, the next fastest, is {first.series.label}; {told}",
+        f"the speed of {second.series.label}, the next fastest, is reached by "
+        f"{first.series.label}; {told}",
     )
 
 
@@ -150,7 +151,7 @@ def _holding(claims: Sequence[Claim]) -> Finding:
     partly = f"; {counts['holds in part']} in part" if counts["holds in part"] else ""
     few = f"; {counts['too few rounds']} have too few rounds" if counts["too few rounds"] else ""
     return Finding(
-        f"{counts['holds']} of {tested}", f"claims of the paper that were tested hold{partly}{few}"
+        f"{counts['holds']} of {tested}", f"tested claims of the paper hold{partly}{few}"
     )
 
 
@@ -162,7 +163,7 @@ def _ended(evidence: Evidence) -> Finding:
 def _picture(
     evidence: Evidence, inspections: Mapping[str, Inspection], label: str
 ) -> Figure | None:
-    """The largest surface that has a picture by the algorithm with the best angles."""
+    """Return a picture by the algorithm with the best angles, of the largest surface with one."""
     reference = evidence.series_of(REFERENCE)
     for wanted in (label, reference.label if reference else label):
         for surface in sorted(evidence.surfaces, key=lambda s: -s.faces):

@@ -1,4 +1,4 @@
-"""One look at a surface and its maps: pictures of all of them, and every corner's angle."""
+"""Pictures and angle distributions of a surface and its maps."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from cembench.results.records import Record
 
 #: Pixels of one panel of a picture.
 SIDE = 420
-#: Degrees of a bin of the histograms, and where they end.
+#: Width of a histogram bin and its upper end, in degrees.
 BIN, LAST = 0.1, 10.0
-#: Recomputed angles may differ from the record's mean by this share, from rounding.
+#: Tolerance of recomputed angles relative to the record's mean, for rounding.
 ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
 class Angles:
-    """How the angular distortions of a map are distributed.
+    """The distribution of a map's angular distortions.
 
     Parameters
     ----------
@@ -46,9 +46,9 @@ class Angles:
     below_one : float
         Share of the corners that change by less than one degree.
     corners : int
-        How many there are.
+        Number of corners.
     agrees : bool
-        Whether their mean is the one in the record.
+        Whether their mean agrees with the record.
 
     """
 
@@ -60,7 +60,7 @@ class Angles:
 
 @dataclass(frozen=True)
 class Inspection:
-    """What was seen of a surface; empty where the run did not keep it.
+    """Pictures and angles of a surface; empty if the run did not save it.
 
     `checkerboards` and `angles` are by the label of the series.
     """
@@ -71,20 +71,20 @@ class Inspection:
     curvature: Figure | None = None
     mesh: Figure | None = None
     angles: Mapping[str, Angles] = field(default_factory=lambda: MappingProxyType({}))
-    #: The surface and its maps to be turned; empty where there are none.
+    #: The interactive scene of the surface and its maps; empty without maps.
     scene: bytes = b""
 
     @property
     def why_not(self) -> str:
-        """Why are there no pictures?"""
+        """Why there are no pictures."""
         return (
             f"the run does not hold the surface {self.surface.name}: it was measured before runs "
-            "kept their surfaces"
+            "stored their surfaces"
         )
 
 
 def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) -> Inspection:
-    """Draw a surface with every map that ended ok, and take its angles."""
+    """Draw a surface with every map that ended ok, and compute its angles."""
     mesh = evidence.mesh(surface)
     if mesh is None:
         return Inspection(surface, kept=False)
@@ -113,7 +113,7 @@ def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) 
 
 
 def _about(series: AlgorithmSeries, record: Record) -> str:
-    """Say what is to be known of a map in a line below its view."""
+    """Return a line about a map, to show below its view."""
     metrics = record.outcome.metrics
     error, folds = metrics.get("angle_error_mean_deg"), metrics.get("flipped_triangles")
     target = "" if series.target == DISK else f" (not a map to the disk: {series.target})"
@@ -130,7 +130,7 @@ def _angles(mesh: TriangleMesh, uv: NDArray[np.complex128], record: Record) -> A
 
 
 class _Drawer:
-    """Draws one surface; what is seen of it in space is found out once for all maps."""
+    """Draws one surface with its maps; the view in space is computed once."""
 
     def __init__(
         self, evidence: Evidence, surface: MeasuredSurface, mesh: TriangleMesh, folder: Path
@@ -175,7 +175,7 @@ class _Drawer:
                 "curvature",
                 "mean curvature",
                 f"{of}, coloured by the mean curvature of the surface: orange where it bulges "
-                "outwards, blue where inwards.",
+                "outwards, blue where it bulges inwards.",
                 f"{of}, coloured by mean curvature",
                 coloured,
             ),

@@ -1,4 +1,4 @@
-"""Beside Table 1: how many factorisations and solves a map takes, on whatever machine."""
+"""Table of the factorisations and solves of a map, which do not depend on the machine."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from cembench.results.records import LinearAlgebraWork
 
 CAPTION = (
     "Counted in the checked call by the linear algebra that all algorithms share: numeric "
-    "factorisations of sparse matrices, real right-hand sides that were solved for (a complex one "
-    "counts twice, half a solve half), and millions of numbers in the largest factor. What an "
-    "algorithm does without that linear algebra is not in it, nor are dense factorisations."
+    "factorisations of sparse matrices, real right-hand sides solved (a complex one counts as two, "
+    "a forward or backward solve alone as half), and millions of nonzeros in the largest factor. "
+    "Other work of an algorithm, including dense factorisations, is not counted."
 )
 
 
 def work_tables(evidence: Evidence) -> list[Table]:
-    """Return a table for each way of solving whose records hold counts."""
+    """Return a table for each policy whose records hold counts."""
     return [
         _table(evidence, policy)
         for policy in evidence.policies
@@ -33,7 +33,7 @@ def work_tables(evidence: Evidence) -> list[Table]:
 def work_of(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
 ) -> LinearAlgebraWork | None:
-    """Return what an algorithm asked for on a surface; None where it is not known."""
+    """Return the linear algebra of an algorithm on a surface; None if unknown."""
     record = evidence.find(surface, series, policy)
     work = record.outcome.work if record else None
     return work if work is not None and work.numeric else None
@@ -62,7 +62,7 @@ def _table(evidence: Evidence, policy: str) -> Table:
                 Value(f"{work.right_hand_sides:g}", work.right_hand_sides, surface.origin),
                 Value(f"{work.entries / 1e6:.3g}", work.entries / 1e6, surface.origin)
                 if work.entries
-                else missing("the library does not tell"),
+                else missing("the library does not report it"),
             ]
             if base is not None and base.right_hand_sides and work.right_hand_sides:
                 factored, solved = ratios[series.label]
@@ -76,7 +76,7 @@ def _table(evidence: Evidence, policy: str) -> Table:
         counts += [Value(str(len(factored)), len(factored), "derived"), words(""), words("")]
     return Table(
         f"linear-algebra-work-{policy}",
-        "Factorisations and solves of a map, and how they stand to those of CEM",
+        "Factorisations and solves of a map, compared with those of CEM",
         tuple(columns),
         (*rows, tuple(means), tuple(counts)),
         f"{CAPTION} Here {POLICIES.get(policy, policy)}.",

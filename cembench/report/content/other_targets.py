@@ -1,4 +1,4 @@
-"""Maps to other targets than the disk: they are never in one table with disks unmarked."""
+"""Maps to targets other than the disk, which are never mixed with disks unmarked."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from cembench.report.content.evidence import DISK, Evidence
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.document import Column, Table, Value, words
 
-#: What means the same for every target.
+#: Metrics that have the same meaning for every target.
 _COMPARABLE = tuple(
     metric
     for metric in METRICS
@@ -17,7 +17,7 @@ _COMPARABLE = tuple(
 
 
 def other_targets(evidence: Evidence) -> Table | None:
-    """A line a surface and algorithm; None where all algorithms map to the disk."""
+    """Return a table by surface and algorithm; None if all algorithms map to the disk."""
     rows = []
     policy = evidence.policies[0]
     for surface in evidence.surfaces:
@@ -66,6 +66,6 @@ def other_targets(evidence: Evidence) -> Table | None:
             *(Column(metric.heading) for metric in _COMPARABLE),
         ),
         tuple(rows),
-        f"E_C is divided by the area of the image, whose size is free here; angles compare with "
-        f"those of disks, but a free boundary makes the problem an easier one. Solves: {policy}.",
+        f"E_C is divided by the area of the image, whose size is free here. Angles can be compared "
+        f"with those of disks, but a free boundary makes the problem easier. Solves: {policy}.",
     )

@@ -1,7 +1,7 @@
-"""One table of the paper becomes up to three: its own, and what the paper does not have.
+"""Split a table of the paper into up to three: its own, other algorithms, other surfaces.
 
-The paper's four algorithms on its models stand beside what was printed. Other algorithms that map
-to the disk, and other surfaces, are in tables of their own that say so.
+The paper's four algorithms on its models are shown with the printed figures. Other algorithms that
+map to the disk, and other surfaces, have separate tables.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cembench.report.content.printed_beside_measured import (
 from cembench.report.document import Table
 from cembench.results import paper
 
-#: The quantities of one algorithm; the second argument is its column in the paper, or None.
+#: Returns the quantities of an algorithm; the second argument is its column in the paper, or None.
 Quantities = Callable[[AlgorithmSeries | None, str | None], Sequence[Quantity]]
 
 
@@ -36,7 +36,7 @@ def three_kinds(
     algorithms: Sequence[str] = paper.ALGORITHMS,
     notes: Sequence[str] = (),
 ) -> list[Table]:
-    """The paper's table `number`, then other algorithms, then other surfaces, as far as there."""
+    """Return the paper's table `number`, then other algorithms and other surfaces, if any."""
     tail = policy_suffix(policy, evidence) if policy else ""
     add = in_policy(evidence, policy) if policy else ""
     name = f"table-{number}{tail}"

@@ -1,4 +1,4 @@
-"""How much of a time is book-keeping: factors kept (reuse) against factored anew (backslash)?"""
+"""Times under both linear-algebra policies: reuse and backslash."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ BOTH = ("reuse", "backslash")
 
 
 def has_both(evidence: Evidence) -> bool:
-    """Did the run measure both ways of solving?"""
+    """Whether the run measured both policies."""
     return all(policy in evidence.policies for policy in BOTH)
 
 
 def both_gap(evidence: Evidence) -> Gap:
-    """What is missing in a run of one policy."""
+    """Return the gap of a run with only one policy."""
     other = next(policy for policy in BOTH if policy not in evidence.policies)
     return Gap(
-        "Factors kept against factored anew",
-        f"this run solved systems in one way: {', '.join(evidence.policies)}.",
+        "Factorisations reused or repeated",
+        f"this run has only one linear-algebra policy: {', '.join(evidence.policies)}.",
         f"the same `cembench run` with --solves reuse,backslash (lacking here: {other})",
     )
 
@@ -33,7 +33,7 @@ def both_gap(evidence: Evidence) -> Gap:
 def seconds_under(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
 ) -> tuple[Value, float | None]:
-    """A cell's seconds under a policy, as a value and as a number."""
+    """Return a cell's seconds under a policy, as a value and as a number."""
     record = evidence.find(surface, series, policy)
     if record is None or record.outcome.status != "ok" or record.outcome.median_seconds is None:
         key = record.cell.key if record else ""
@@ -44,7 +44,7 @@ def seconds_under(
 
 
 def policies_table(evidence: Evidence) -> Table:
-    """Seconds under both policies side by side, and their ratio, for every algorithm."""
+    """Return a table of seconds under both policies and their ratio, for every algorithm."""
     columns = [Column("surface", numeric=False)]
     for series in evidence.series:
         columns += [Column(title, series.label) for title in (*BOTH, "ratio")]
@@ -61,7 +61,7 @@ def policies_table(evidence: Evidence) -> Table:
                 ratios[series.label].append(b / a)
                 cells.append(Value(f"{b / a:.2f}", b / a, "derived"))
             else:
-                cells.append(missing("not both were measured"))
+                cells.append(missing("not measured under both policies"))
         rows.append(tuple(cells))
     means, counts = [words("geometric mean")], [words("n, surfaces counted")]
     for series in evidence.series:
@@ -72,17 +72,17 @@ def policies_table(evidence: Evidence) -> Table:
         counts += [words(""), words(""), Value(str(len(found)), len(found), "derived")]
     return Table(
         "reuse-against-backslash",
-        "Seconds with factors kept (reuse) and factored anew at every solve (backslash)",
+        "Seconds with factorisations reused (reuse) or repeated at every solve (backslash)",
         tuple(columns),
         (*rows, tuple(means), tuple(counts)),
-        "The ratio is what an implementation saves by keeping a factor while its matrix stands, "
-        "whatever the algorithm. The paper's MATLAB factored anew.",
+        "The ratio shows what an implementation saves by reusing a factorisation, "
+        "whatever the algorithm. The paper's MATLAB code factored at every solve.",
         footer_rows=2,
     )
 
 
 def speedups_table(evidence: Evidence) -> Table:
-    """The average rates of speedup of CEM under both policies."""
+    """Return a table of CEM's average rates of speedup under both policies."""
     series = [s for s in evidence.disk_series if s.algorithm != REFERENCE and s.main]
     columns = [Column("CEM over", numeric=False)]
     for policy in BOTH:
@@ -108,15 +108,15 @@ def speedups_table(evidence: Evidence) -> Table:
         rows.append(tuple(cells))
     return Table(
         "speedup-by-policy",
-        "How much of the speedup of CEM is the algorithm, and how much keeping factors",
+        "Speedup of CEM under both policies: the algorithm, and the reuse of factorisations",
         tuple(columns),
         tuple(rows),
-        "Rates of speedup (Eq. 33) on the surfaces that are or stand for models of the paper.",
+        "Rates of speedup (Eq. 33) on the surfaces that are or stand in for models of the paper.",
     )
 
 
 def policies_plot(evidence: Evidence) -> Plot:
-    """The ratios as points over the surfaces."""
+    """Return a plot of the ratios by surface."""
     drawn = []
     for series in evidence.series:
         names, values = [], []
@@ -127,8 +127,8 @@ def policies_plot(evidence: Evidence) -> Plot:
         drawn.append(Bars(series.label, names, values, "both", evidence.looks[series.label]))
     return Plot(
         "reuse-against-backslash",
-        "What factoring anew costs",
+        "Cost of repeated factorisation",
         (PlotPanel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
-        "Seconds with a factorisation at every solve over seconds with factors kept.",
-        "A line for each algorithm over the surfaces; iterative ones lie high.",
+        "Ratio of seconds with a factorisation at every solve to seconds with reused ones.",
+        "A line for each algorithm over the surfaces; those of iterative algorithms are high.",
     )

@@ -1,4 +1,4 @@
-"""What was measured beside what the paper printed: the form that Tables 1 to 4 share."""
+"""Printed and measured figures side by side, the common form of Tables 1 to 4."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ Number = float | int | None
 
 @dataclass(frozen=True)
 class Quantity:
-    """A pair of columns: a figure of one algorithm, printed and measured.
+    """A pair of columns with a figure of one algorithm, printed and measured.
 
     Parameters
     ----------
     heading : str
-        Over the pair.
+        Heading of the pair.
     series : Series or None
-        Whose figure it is; None where the run does not have the algorithm.
+        The series; None if the run does not have the algorithm.
     measured : function of a record
-        The figure, or None where the record has none.
+        Returns the figure, or None if the record has none.
     show : function of a number
-        How a measured figure is written.
+        Formats a measured figure.
     column : (int, str) or None
-        Where it is printed: the number of the paper's table and the name of its column.
+        Its place in the paper: the table's number and the column's name.
     digits : int
-        Digits after the point in print.
+        Printed digits after the decimal point.
     timed : bool
-        Whether it depends on how steady the times were.
+        Whether it depends on the stability of the times.
 
     """
 
@@ -48,7 +48,7 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Footer:
-    """A line of aggregates: of the numbers of a column, None where there are none."""
+    """A row of aggregates over the numbers of each column; None for none."""
 
     label: str
     of: Callable[[Sequence[float]], float]
@@ -56,7 +56,7 @@ class Footer:
 
 
 def significant(number: float, digits: int = 3) -> str:
-    """A number with so many significant digits, never in powers of ten where that is avoidable."""
+    """Return a number with this many significant digits, without an exponent if possible."""
     if number == 0 or not 1e-5 <= abs(number) < 10**6:
         return f"{number:.{digits}g}"
     whole = len(f"{abs(number):.0f}") if abs(number) >= 1 else 0
@@ -69,7 +69,7 @@ def significant(number: float, digits: int = 3) -> str:
 
 
 def paper_value(table: int, model: str, column: str, digits: int) -> Value:
-    """A figure as the paper prints it; a misprint with a dagger and what is wrong with it."""
+    """Return a figure as printed in the paper; a misprint has a dagger and an explanation."""
     if model not in paper.table(table):
         return missing("the paper has no such model", "")
     number = paper.table(table)[model][column]
@@ -83,7 +83,7 @@ def paper_value(table: int, model: str, column: str, digits: int) -> Value:
 def here(
     evidence: Evidence, surface: MeasuredSurface, quantity: Quantity, policy: str | None
 ) -> Value:
-    """A figure as it was measured, or why there is none."""
+    """Return a measured figure, or why there is none."""
     if quantity.series is None:
         return missing("the run does not have this algorithm")
     record = evidence.find(surface, quantity.series, policy)
@@ -115,10 +115,10 @@ def table_beside(
     notes: Sequence[str] = (),
     absent: str = "",
 ) -> Table:
-    """One row a surface, two columns a quantity that the paper prints, one for others.
+    """Return a table with one row per surface, and two columns per quantity printed in the paper.
 
-    Footers are taken over each column on its own, each of the paper's models counting once; a last
-    line says over how many numbers.
+    Other quantities have one column. Footers are computed per column, counting each of the paper's
+    models once; a last row gives the number of values.
     """
     columns = [Column("surface", numeric=False), Column("faces")]
     for quantity in quantities:
@@ -175,7 +175,7 @@ def _footer_rows(
 
 
 def _places(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> dict[str, str]:
-    """Where each cause of a gap, a misprint or an unsteady time holds, in words."""
+    """Return the places of each cause of a gap, misprint or unstable time, as text."""
     found: dict[str, list[str]] = {}
     for row in rows:
         for column, value in zip(columns, row, strict=True):
@@ -186,7 +186,7 @@ def _places(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> dic
 
 
 def _sizes(surfaces: Sequence[MeasuredSurface]) -> list[str]:
-    """Surfaces that have another size than the model whose row they are in."""
+    """Return the surfaces whose size differs from that of the model in their row."""
     odd = [
         f"{s.title}: {s.faces:,} here, {paper.faces(s.paper_row):,} in print"
         for s in surfaces
@@ -196,28 +196,28 @@ def _sizes(surfaces: Sequence[MeasuredSurface]) -> list[str]:
 
 
 def absent_models(evidence: Evidence) -> list[str]:
-    """Models of the paper that no surface of the run is or stands for."""
+    """Return the models of the paper without a surface in the run."""
     there = {s.paper_row for s in evidence.models}
     return [model for model in paper.table(1) if model not in there]
 
 
 def metric(name: str) -> Callable[[Record], Number]:
-    """The figure of this name out of a record; None where it is infinite or not there."""
+    """Return a function that gets this metric from a record; None if infinite or missing."""
     return lambda record: record.outcome.metrics.get(name)
 
 
 def in_policy(evidence: Evidence, policy: str) -> str:
-    """What a title adds where a run solves in several ways."""
+    """Return the suffix of a title in a run with several policies."""
     return "" if len(evidence.policies) == 1 else f", solves: {policy}"
 
 
 def policy_suffix(policy: str, evidence: Evidence) -> str:
-    """What a name adds where a run solves in several ways: the first has none."""
+    """Return the suffix of a name in a run with several policies; none for the first."""
     return "" if policy == evidence.policies[0] else f"-{policy}"
 
 
-#: What a table's notes say of where its numbers come from, by what is in it.
+#: Notes that explain a table's policy.
 POLICIES: Mapping[str, str] = {
-    "reuse": "a factor is kept while its matrix stands, for every algorithm alike",
-    "backslash": "every solve factors anew, as the paper's MATLAB did",
+    "reuse": "every algorithm reuses a factorisation as long as its matrix does not change",
+    "backslash": "every solve factors again, as the paper's MATLAB code did",
 }

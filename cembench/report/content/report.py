@@ -38,11 +38,11 @@ from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section
 from cembench.report.plots import Plot, write_plot
 from cembench.results.records import MeshOrigin
 
-#: Is told what is drawn next: words, how many steps are done, how many there are.
+#: Receives progress: a text, the number of finished steps, and their total.
 Progress = Callable[[str, int, int], None]
 Inspections = Mapping[str, Inspection]
 
-#: The paper's figures that show one model with one map.
+#: The paper's figures that show one model with its map.
 PICTURES = (
     ("Figure 2", "Left Hand"),
     ("Figure 3", "Liu's Neutral Face"),
@@ -53,12 +53,12 @@ PICTURES = (
 
 
 PAPER = "Conformal surface parameterizations: the paper's tables and figures, measured"
-#: The plot at the head: how good maps are against what they cost, or on how many surfaces.
+#: Names of plots for the head, the first that is there: accuracy against time, or its profiles.
 FIRST_PLOTS = ("accuracy-against-time", "accuracy-profiles")
-#: The plot that a report about many surfaces shows with its profiles of accuracy.
+#: Name of the plot shown with the accuracy profiles in a report on many surfaces.
 PROFILE = "performance-profile"
 
-#: What is said of surfaces by their origin.
+#: Words for surfaces by origin.
 _KINDS: Mapping[MeshOrigin, str] = {
     "model": "of the paper's models",
     "stand-in": "stand-ins for models of the paper",
@@ -69,7 +69,7 @@ _KINDS: Mapping[MeshOrigin, str] = {
 def build_report(
     evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
 ) -> Report:
-    """Compute everything that a report of this run holds, and draw its figures into `folder`."""
+    """Compute the contents of a run's report, and draw its figures into `folder`."""
     many = is_many(evidence)
     shown = hardest(evidence, evidence.policies[0]) if many else evidence.surfaces
     n = len(shown) + 2
@@ -119,17 +119,17 @@ def build_report(
 
 
 def _until(evidence: Evidence) -> str:
-    """Until which precision cells were measured, if they were."""
+    """Return the precision that cells were measured to, if any."""
     goals = sorted({r.cell.precision for r in evidence.records if r.cell.precision is not None})
     if not goals:
         return ""
     wanted = " or ".join(f"±{100 * goal:g} %" for goal in goals)
     unstable = sum(bool(evidence.row(record)["unstable"]) for record in evidence.records)
-    return f" (until {wanted} was reached, or the time used up; {unstable} unstable cells)"
+    return f" (until {wanted} or the time limit was reached; {unstable} unstable cells)"
 
 
 def facts(evidence: Evidence) -> list[tuple[str, str]]:
-    """What stands at the head of a report."""
+    """Return the facts at the head of a report."""
     statuses = Counter(record.outcome.status for record in evidence.records)
     dates = sorted(record.started_at[:10] for record in evidence.records)
     rounds = sorted({len(r.outcome.rounds) for r in evidence.records if r.outcome.rounds})
@@ -179,7 +179,7 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
     )
     items: list[Item] = [
         Text(
-            "Every number is measured here unless it is marked otherwise. Where numbers come from: "
+            "Every number is measured here unless it is marked otherwise. Origins of numbers: "
             f"{marks}. A dagger marks a misprint, an exclamation mark an unstable time."
         )
     ]
@@ -187,8 +187,8 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
         items.append(
             Text(
                 "No model of the paper is in this run. Its rows are measured on stand-ins with the "
-                "same number of triangles and boundary vertices: times are of like size, energies "
-                "and angles are of other surfaces."
+                "same number of triangles and boundary vertices: times are similar, but energies "
+                "and angles belong to other surfaces."
             )
         )
     items.append(not_ok(evidence))
@@ -228,7 +228,7 @@ def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Sect
 def _pictures(
     evidence: Evidence, inspections: Inspections, figure: str, model: str
 ) -> list[Figure]:
-    """CEM's pictures of a model, as the paper shows them."""
+    """Return CEM's pictures of a model, as in the paper."""
     surface = evidence.standing_for(model)
     series = evidence.series_of(REFERENCE)
     if surface is None or series is None:
@@ -257,7 +257,7 @@ def _beyond(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
         [performance_profile(evidence), accuracy_against_time(evidence), time_by_phase(evidence)],
         folder,
     )
-    if not evidence.models:  # else it stands below Table 2
+    if not evidence.models:  # otherwise it is below Table 2
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
     if policies.has_both(evidence):
@@ -271,7 +271,7 @@ def _beyond(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
 
 
 def _own_title(evidence: Evidence) -> str:
-    """Name a run of surfaces that are not the paper's by what is in it."""
+    """Return a title for a run on surfaces that are not the paper's."""
     algorithms = len({series.algorithm for series in evidence.series})
     surfaces = evidence.surfaces
     named = [surface.title for surface in surfaces]
@@ -280,7 +280,7 @@ def _own_title(evidence: Evidence) -> str:
 
 
 def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Section) -> Section:
-    """What is measured on surfaces that are not the paper's: without its columns and claims."""
+    """Return the section for other surfaces, without the paper's columns and claims."""
     items: list[Item] = [
         figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
         for surface in evidence.surfaces
@@ -294,7 +294,7 @@ def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Sec
 
 
 def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
-    """What maps cost, over all surfaces; the profiles of time stand with those of accuracy."""
+    """Return the section on cost over all surfaces; time profiles are with those of accuracy."""
     kept = [item for item in beyond.items if isinstance(item, Table | Figure)]
     items: list[Item] = [item for item in kept if item.name != PROFILE]
     items += _drawn([cost_by_faces(evidence)], folder)
@@ -303,7 +303,7 @@ def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
 
 
 def _first_plot(section: Section) -> Figure | None:
-    """The plot for the head of the report; it stands in this section."""
+    """Return the plot for the head of the report, from this section."""
     figures = [item for item in section.items if isinstance(item, Figure)]
     return next((f for f in figures if f.name in FIRST_PLOTS), figures[0] if figures else None)
 

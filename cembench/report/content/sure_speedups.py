@@ -1,4 +1,4 @@
-"""How sure are the speedups of Table 2, one by one, together, and on other surfaces?"""
+"""Statistical certainty of the speedups in Table 2: singly, together, and over surfaces."""
 
 from __future__ import annotations
 
@@ -16,19 +16,18 @@ from cembench.results.comparison import Comparison, compare, paired_ratios
 from cembench.results.many import FEWEST_SURFACES, average_interval, corrected, sign_test
 
 CAPTION = (
-    "Three questions. 'One by one': on how many surfaces does the 95 % interval of the ratio "
-    "within rounds exclude 1? 'Together': on how many can that be said when none of the {n} "
-    "verdicts of this table may be wrong, with 95 % (Holm)? 'Over surfaces': does CEM win on more "
-    "surfaces than chance would let it (two-sided sign test), and what is the geometric mean of "
-    "t / t_CEM, with the 95 % interval over surfaces and rounds (hierarchical bootstrap, seed 0), "
-    "which tells where it would lie on other surfaces like these? A surface counts once, a model "
-    "before what stands for it."
+    "'One by one': the number of surfaces on which the 95 % interval of the ratio within rounds "
+    "excludes 1. 'Together': the number when all of the {n} verdicts of this table must be right "
+    "with 95 % (Holm). 'Over surfaces': whether CEM wins on more surfaces than by chance "
+    "(two-sided sign test), and the geometric mean of t / t_CEM with a 95 % interval over surfaces "
+    "and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. Each model counts "
+    "once, and is preferred over its stand-in."
 )
 
 
 @dataclass(frozen=True)
 class _Compared:
-    """An algorithm beside CEM: a comparison and the ratios of the rounds for each surface."""
+    """An algorithm compared with CEM: a comparison and the rounds' ratios for each surface."""
 
     series: AlgorithmSeries
     found: Sequence[Comparison]
@@ -36,7 +35,7 @@ class _Compared:
 
 
 def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
-    """Say how sure the speedups over CEM are; none where no rounds can be compared."""
+    """Return tables on the certainty of speedups over CEM; empty without comparable rounds."""
     compared = [c for series in evidence.disk_series if (c := _compared(evidence, series, policy))]
     if not compared:
         return []
@@ -56,7 +55,7 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
     return [
         Table(
             name=f"sure-speedups{policy_suffix(policy, evidence)}",
-            title=f"How sure the speedups are{in_policy(evidence, policy)}",
+            title=f"Certainty of the speedups{in_policy(evidence, policy)}",
             columns=columns,
             rows=tuple(rows),
             caption=CAPTION.format(n=number),
@@ -99,9 +98,9 @@ def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ..
 
 
 def _verdicts(found: Sequence[Comparison]) -> list[Value]:
-    """Count the surfaces on which CEM is faster, slower, or neither for sure."""
+    """Return the numbers of surfaces on which CEM is faster, slower, or undecided."""
     counts = Counter(one.verdict for one in found)
-    faster, slower = counts["slower"], counts["faster"]  # a verdict is of the other algorithm
+    faster, slower = counts["slower"], counts["faster"]  # the verdict is about the other algorithm
     return [_count(faster), _count(slower), _count(len(found) - faster - slower)]
 
 

@@ -1,4 +1,4 @@
-"""A page a surface: every algorithm's picture side by side, and all figures of merit."""
+"""The page of a surface: pictures of all algorithms, and all figures of merit."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.results.external_words import seconds_words
 from cembench.results.records import Record
 
-#: Degrees up to which the histograms of a page go.
+#: Upper end of the histograms on a page, in degrees.
 SHOWN = 5.0
 _METRICS = metrics_shown("overview", "page")
 
@@ -35,7 +35,7 @@ _METRICS = metrics_shown("overview", "page")
 def surface_page(
     evidence: Evidence, surface: MeasuredSurface, seen: Inspection
 ) -> tuple[Section, Plot | None]:
-    """The page without its plot, which goes where :func:`with_plot` puts it, and the plot."""
+    """Return the page without its plot, which :func:`with_plot` inserts, and the plot."""
     name = evidence.name_of(surface)
     items: list[Item] = [Text(_about(surface)), *notices(evidence, surface)]
     if seen.checkerboards:
@@ -44,9 +44,9 @@ def surface_page(
                 f"{name}-maps",
                 "The surface and its image by each algorithm, under one checkerboard",
                 tuple(seen.checkerboards.values()),
-                "Squares stay squares where a map is conformal. Where they would be large on the "
-                "surface they are divided 3 by 3, in both panels alike. Folded triangles are red. "
-                "Images are turned so that what is up on the surface is up in them.",
+                "Squares stay squares where a map is conformal. Squares that would be large on the "
+                "surface are divided 3 by 3 in both panels. Folded triangles are red. Images are "
+                "rotated to match the upright surface.",
                 seen.scene,
             )
         )
@@ -55,7 +55,7 @@ def surface_page(
             Gallery(f"{name}-surface", "Mean curvature and mesh", (seen.curvature, seen.mesh))
         )
     if not seen.kept:
-        command = "the command of the run, again: it adds the surfaces and measures nothing twice"
+        command = "repeat the command of the run: it adds the surfaces and measures nothing twice"
         items.append(Gap("Pictures", f"{seen.why_not}.", command))
     items.append(figures_table(evidence, surface, name))
     section = Section(f"surface-{name}", surface.title, tuple(items), page=True)
@@ -75,13 +75,13 @@ def _about(surface: MeasuredSurface) -> str:
 
 
 def notices(evidence: Evidence, surface: MeasuredSurface) -> list[Text]:
-    """What was noticed of the mesh when it was read."""
+    """Return the notices about the mesh."""
     record = next(r for r in evidence.records if r.cell.mesh_hash == surface.mesh_hash)
     return [Text(f"Note: {notice}.") for notice in record.mesh.notices]
 
 
 def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Table:
-    """All figures of merit of every algorithm on one surface, a line a cell."""
+    """Return a table of all figures of merit on one surface, one row per cell."""
     columns = [
         Column("algorithm", numeric=False),
         Column("solves", numeric=False),
@@ -117,11 +117,12 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
         tuple(columns),
         tuple(rows),
         "Seconds are the median of the rounds, ±% is half the width of its 95 % interval; "
-        "dilatation is the largest over the smallest stretch of a triangle, in the mean and at "
-        "most; |mu| is the Beltrami coefficient's modulus, its mean by the surface's area. E_C of "
-        "a disk changes with its Moebius image: 'E_C, gauge' is that of the one whose mean by area "
-        "lies at 0, and compares between methods, as area SD does, the standard deviation of "
-        "log area ratios (of disks in that gauge). Memory is what the call adds.",
+        "dilatation is the ratio of the largest to the smallest stretch of a triangle, its mean "
+        "and its maximum; |mu| is the modulus of the Beltrami coefficient, with its mean by the "
+        "surface's area. E_C of a disk changes under Moebius maps: 'E_C, gauge' is that of the "
+        "image whose mean by area is 0, and can be compared between methods, like area SD, the "
+        "standard deviation of log area ratios (for disks, in that gauge). Memory is the increase "
+        "during the call.",
         tuple(dict.fromkeys(causes)),
     )
 
@@ -161,7 +162,7 @@ def _line(
 
 
 def _absent(record: Record, metric: Metric) -> str:
-    """Why a record has no such figure: the map has none, or it is older than the figure."""
+    """Return why a record lacks a figure: the map has none, or the record is older."""
     free = record.target in ("free boundary", "atlas")
     if free and metric.name == "common_gauge_energy":
         return "the map does not go to the disk"
@@ -169,7 +170,7 @@ def _absent(record: Record, metric: Metric) -> str:
 
 
 def _plot(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, name: str) -> Plot | None:
-    """Histograms, the energies of the iterations and the phases, as far as there are any."""
+    """Return the plot of histograms, energies by iteration and phases, as available."""
     panels: list[PlotPanel] = []
     curves = [
         histogram(s.label, seen.angles[s.label], evidence.looks[s.label], SHOWN, "line")

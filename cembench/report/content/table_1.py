@@ -1,4 +1,4 @@
-"""Table 1: what does a map cost, in seconds, and how many iterations does CEM take?"""
+"""Table 1: seconds of a map, and iterations of CEM."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ from cembench.report.document import Table
 
 CAPTION = (
     "Seconds from the arrays V and F in memory to the map: the median of the rounds here, and what "
-    "the paper printed of MATLAB programs on a laptop of 2.60 GHz. Machines, languages and "
-    "libraries differ: compare within a column pair only how the algorithms stand to each other. "
+    "the paper printed for MATLAB programs on a laptop of 2.60 GHz. Machines, languages and "
+    "libraries differ, so compare only the ratios between algorithms, not printed with measured "
+    "seconds. "
 )
 
 
 def table_1(evidence: Evidence) -> list[Table]:
-    """Seconds and iterations; a table for each way of solving that the run has."""
+    """Return the table of seconds and iterations for each policy of the run."""
     tables = []
     for policy in evidence.policies:
         caption = CAPTION + f"Here {POLICIES.get(policy, policy)}."

@@ -1,4 +1,4 @@
-"""Table 2: the rate of speedup of CEM over the others (Eq. 33), and its averages."""
+"""Table 2: the rates of speedup of CEM over the others (Eq. 33), and their averages."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.records import Record
 
 CAPTION = (
-    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 where CEM takes half the time, negative where "
-    "CEM is slower. Here it is the median of the ratios within rounds. "
+    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 if CEM takes half the time, negative if CEM is "
+    "slower. Here it is the median of the ratios within rounds. "
 )
 
 
 def table_2(evidence: Evidence) -> list[Table]:
-    """Rates of speedup with their averages in both readings; a set for each way of solving."""
+    """Return the rates of speedup and their averages in both readings, for each policy."""
     tables: list[Table] = []
     for policy in evidence.policies:
         tables += three_kinds(
@@ -45,7 +45,9 @@ def table_2(evidence: Evidence) -> list[Table]:
             caption=CAPTION + f"Here {POLICIES.get(policy, policy)}.",
             footers=READINGS,
             algorithms=COMPARED,
-            notes=("averages over the printed column take its numbers as printed, misprint too",),
+            notes=(
+                "averages of the printed column use its numbers as printed, including the misprint",
+            ),
         )
         if evidence.models:
             tables.append(averages_table(evidence, policy))
@@ -67,7 +69,7 @@ def _quantities(
 
 
 def averages_table(evidence: Evidence, policy: str) -> Table:
-    """Both readings of the averages: stated, over all printed models, over the run's, measured."""
+    """Return both readings of the averages: stated, printed for all or these models, measured."""
     columns = [Column("reading", numeric=False)]
     for algorithm in COMPARED:
         columns += [
@@ -106,10 +108,10 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
         columns=tuple(columns),
         rows=(*rows, tuple(counts)),
         caption=(
-            "The mean of rates lets single large ratios dominate; the geometric mean and the mean "
-            "of the savings count every model alike. 'Printed, these' are the printed rates of "
-            "the models that were measured here too. A model counts once: where it was measured "
-            "itself, its stand-in does not count."
+            "In the mean of rates, single large ratios dominate; the geometric mean and the mean "
+            "of the savings weight every model equally. 'Printed, these' are the printed rates of "
+            "the models that were measured here too. Each model counts once: if it was measured "
+            "itself, its stand-in is left out."
         ),
         notes=(
             "the misprint (Knit Cap Man, FDM) is replaced by the 28.07 that Table 1 gives",
@@ -125,7 +127,7 @@ def _stated(number: float) -> str:
 
 
 def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[float], ...]:
-    """Printed for all models; printed for those measured; measured."""
+    """Return the rates printed for all models, printed for those measured, and measured."""
     measured, there = measured_rates(evidence, algorithm, policy)
     return printed_rates(algorithm), printed_rates(algorithm, there), measured
 
@@ -133,7 +135,7 @@ def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[fl
 def measured_rates(
     evidence: Evidence, algorithm: str, policy: str
 ) -> tuple[list[float], list[str]]:
-    """The rates of speedup of CEM over an algorithm, one for each model; and which these are."""
+    """Return the rates of speedup of CEM over an algorithm by model, and the models."""
     rates, models = [], []
     series = evidence.series_of(algorithm)
     for surface in evidence.one_each if series else ():

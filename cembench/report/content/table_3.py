@@ -8,14 +8,14 @@ from cembench.report.content.printed_beside_measured import Quantity, metric
 from cembench.report.document import Table
 
 CAPTION = (
-    "E_C = E_D - A (Eq. 7), zero for a conformal map, A being the area that the image of the "
-    "boundary encloses (Eq. 8). It does not depend on the machine, but on the mesh: on a stand-in "
-    "it is another number than on the paper's model."
+    "E_C = E_D - A (Eq. 7) is zero for a conformal map; A is the area enclosed by the image of the "
+    "boundary (Eq. 8). It does not depend on the machine, but on the mesh: a stand-in has a "
+    "different value than the paper's model."
 )
 
 
 def table_3(evidence: Evidence) -> list[Table]:
-    """Conformal energies; how systems are solved does not change them."""
+    """Return the table of conformal energies, which do not depend on the policy."""
     return three_kinds(evidence, 3, "conformal energy", _quantities, caption=CAPTION)
 
 

@@ -1,4 +1,4 @@
-"""Table 4: by how many degrees the angles change, mean and standard deviation."""
+"""Table 4: mean and standard deviation of the angular distortion in degrees."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from cembench.report.document import Table
 
 CAPTION = (
     "Angular distortion: the absolute difference between the angle on the surface and on the disk, "
-    "in degrees, over all corners of all triangles. It depends on the mesh: on a stand-in it is "
-    "another number than on the paper's model."
+    "in degrees, over all corners of all triangles. It depends on the mesh: a stand-in has a "
+    "different value than the paper's model."
 )
 
 
 def table_4(evidence: Evidence) -> list[Table]:
-    """Mean and standard deviation of angular distortions."""
+    """Return the table of means and standard deviations of angular distortions."""
     return three_kinds(
         evidence, 4, "angular distortion in degrees, mean and SD", _quantities, caption=CAPTION
     )

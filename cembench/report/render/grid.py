@@ -1,4 +1,4 @@
-"""The one kind of table that a terminal of 80 columns shows: columns, and rows of words."""
+"""The common table for terminals of 80 columns."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from rich.text import Text
 
 @dataclass(frozen=True)
 class GridColumn:
-    """A column: its heading, whether figures stand at its right side, how wide it may become.
+    """A column: its heading, its alignment, and its largest width.
 
-    A column that wraps breaks its words into lines; others are shortened to `room` characters.
+    A wrapping column breaks into lines; other columns are shortened to `room` characters.
     """
 
     heading: str = ""
@@ -25,17 +25,17 @@ class GridColumn:
 
 
 def names(heading: str, room: int | None = None) -> GridColumn:
-    """Return a column of names, shortened where they are longer than `room`."""
+    """Return a column of names, shortened to `room` characters."""
     return GridColumn(heading, room=room)
 
 
 def figures(*headings: str) -> list[GridColumn]:
-    """Return columns of figures."""
+    """Return right-aligned columns of figures."""
     return [GridColumn(heading, figures=True) for heading in headings]
 
 
 def words(*headings: str) -> list[GridColumn]:
-    """Return columns of words that wrap."""
+    """Return columns of text that wraps."""
     return [GridColumn(heading, wraps=True) for heading in headings]
 
 
@@ -52,15 +52,15 @@ def grid(
     Parameters
     ----------
     columns : sequence of GridColumn
-        If none has a heading, there is no line of headings.
+        The columns; if none has a heading, there is no heading row.
     rows : iterable of sequences of str or Text
-        As long as `columns`.
+        The rows, with one entry per column.
     title : str
-        Above it, at the left.
+        Title above the table, at the left.
     gap : int
         Spaces between columns.
     styles : iterable of str
-        Of the rows, in turn, again and again.
+        Styles of the rows, used cyclically.
 
     """
     table = Table(

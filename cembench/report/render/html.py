@@ -1,9 +1,9 @@
-"""A report as one page that needs nothing beside it.
+"""Render a report as one self-contained HTML page.
 
-Style, script, pictures, data and Plotly's script are parts of the file, and its content security
-policy forbids every request. Without JavaScript all of it stands one under the other; with it,
-sections that ask for a page are pages, tables sort, plots and pictures zoom, and a number opens its
-record. Nothing here depends on which sections a report has.
+Style, script, pictures, data and Plotly's script are embedded, and the content security policy
+forbids every request. Without JavaScript everything is on one long page. With it, sections marked
+as pages are pages, tables sort, plots and pictures zoom, and a number opens its record. Nothing
+here depends on which sections a report has.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ from cembench.report.pictures import (
 )
 
 FILE = "index.html"
-#: Every verdict with the sign before it, so that it is told without colour too.
+#: The sign before each verdict, so that it does not rely on colour alone.
 VERDICTS: Mapping[str, str] = {
     "holds": "✓",
     "holds in part": "◐",
@@ -65,14 +65,14 @@ VERDICTS: Mapping[str, str] = {
     "too few rounds": "…",
     "not tested here": "○",
 }
-#: Bytes up to which a figure's data is a part of the page; beyond, only the file beside it.
+#: Maximum bytes of embedded data of a figure; larger data is only linked.
 DATA_BYTES = 200_000
 _PIXELS = (".png", ".jpg", ".jpeg", ".webp")
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 
 
 def write_html(report: Report, folder: Path) -> Path:
-    """Write `index.html`, the whole report in one file; where is it?
+    """Write `index.html`, the whole report in one file, and return its path.
 
     Pictures and data are read from the files that the figures name, relative to `folder`. The same
     report gives the same bytes.
@@ -80,7 +80,7 @@ def write_html(report: Report, folder: Path) -> Path:
     Raises
     ------
     RenderError
-        A figure names a file that is not there or is no picture.
+        A figure names a file that does not exist or is not a picture.
     RecordError
         The page cannot be written.
 
@@ -90,7 +90,7 @@ def write_html(report: Report, folder: Path) -> Path:
 
 
 def render(report: Report, folder: Path) -> str:
-    """The page as text."""
+    """Return the page as text."""
     anchors = _Anchors()
     sections = [_section(section, anchors, None) for section in report.sections]
     everything = [s for top in sections for s in _all_sections(top)]
@@ -126,11 +126,11 @@ def render(report: Report, folder: Path) -> str:
     )
 
 
-# --- sections, and where everything stands ---------------------------------------------------
+# --- sections and anchors --------------------------------------------------------------------
 
 
 class _Anchors:
-    """A name in the page for everything that can be pointed to; no two are equal."""
+    """Unique names in the page for everything that can be linked to."""
 
     def __init__(self) -> None:
         self._names: dict[int, str] = {}
@@ -146,7 +146,7 @@ class _Anchors:
 
 
 def _section(section: Section, anchors: _Anchors, above: Section | None) -> dict[str, Any]:
-    """A section with its runs of like items, its pages apart from what stands in it."""
+    """Return a section for the template, with items grouped by kind and its pages separate."""
     anchor = anchors.of(section)
     parts = [_section(part, anchors, section) for part in section.sections]
     return {
@@ -166,7 +166,7 @@ def _all_sections(top: Mapping[str, Any]) -> Iterator[Mapping[str, Any]]:
 
 
 def _in_order(pages: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Each page with the one before and the one after it."""
+    """Return each page with its predecessor and successor."""
     return [
         {**page, "before": before, "after": after}
         for before, page, after in zip([None, *pages], pages, [*pages[1:], None], strict=False)
@@ -174,7 +174,7 @@ def _in_order(pages: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 
 def _runs(items: Sequence[Item]) -> list[tuple[str, list[Item]]]:
-    """Neighbours of one kind together: so all claims in a row have one filter."""
+    """Group neighbouring items of the same kind, so that consecutive claims share a filter."""
     return [(kind.__name__.lower(), list(run)) for kind, run in groupby(items, type)]
 
 
@@ -194,9 +194,9 @@ class _Cell:
 def _table(
     table: Table, records: Mapping[str, Mapping[str, Any]], anchor: str
 ) -> Mapping[str, Any]:
-    """What the template prints of a table: heads, rows, footers, remarks and the legend.
+    """Return a table for the template: heads, rows, footers, remarks and the legend.
 
-    A column whose figures are all of one origin has its mark in the head, others in each cell.
+    A column with figures of a single origin has its mark in the head, others in each cell.
     """
     body = table.rows[: len(table.rows) - table.footer_rows]
     columns = list(zip(*body, strict=True)) or [()] * len(table.columns)
@@ -242,7 +242,7 @@ def _table(
 
 
 def _sortable(number: float | None) -> str:
-    """A number with all its digits as the page's script reads it; empty for a gap."""
+    """Return a number with all digits for the page's script; empty for a gap."""
     if number is None or math.isnan(number):
         return ""
     return repr(float(number)).replace("inf", "Infinity")
@@ -254,14 +254,14 @@ def _common_origin(values: Sequence[Value]) -> Any:
 
 
 def _groups(columns: Sequence[Column]) -> list[tuple[str, int]]:
-    """Headings over columns with how many each spans; none where no column has a group."""
+    """Return the group headings with their numbers of columns; empty without groups."""
     if not any(column.group for column in columns):
         return []
     return [(name, len(list(run))) for name, run in groupby(columns, lambda c: c.group)]
 
 
 def _letters(place: int) -> str:
-    """a, b, ..., z, aa, ab, ...: the marks of remarks."""
+    """Return the mark of a remark: a, b, ..., z, aa, ab, ..."""
     rest, last = divmod(place, 26)
     return (_letters(rest - 1) if rest else "") + chr(ord("a") + last)
 
@@ -270,7 +270,7 @@ def _letters(place: int) -> str:
 
 
 def _embed_all(figures: Sequence[Figure], folder: Path) -> dict[int, Embedded | None]:
-    """The picture of each figure, by identity; all together keep within one budget."""
+    """Return the picture of each figure by identity, all within one budget of pixels."""
     rasters = [folder / file for f in figures if (file := _pixel_file(f)) is not None]
     cap = pixel_cap([size_of(path) for path in rasters])
     with ThreadPoolExecutor() as pool:
@@ -279,7 +279,7 @@ def _embed_all(figures: Sequence[Figure], folder: Path) -> dict[int, Embedded | 
 
 
 def _embed(figure: Figure, folder: Path, cap: float) -> Embedded | None:
-    """A plot as its drawing, if that is small; anything else as pixels."""
+    """Return a plot as a vector graphic if it is small, and anything else as pixels."""
     vector = next((file for file in figure.files if file.suffix.lower() == ".svg"), None)
     raster = _pixel_file(figure)
     found = None
@@ -295,7 +295,7 @@ def _pixel_file(figure: Figure) -> PurePosixPath | None:
 
 
 def _thumbnail(section: Section, folder: Path) -> Embedded | None:
-    """The first picture of a page, small, for the list of pages."""
+    """Return a thumbnail of a page's first picture, for the list of pages."""
     one = Report(title="", command="", facts=(), sections=(section,))
     pictures = (_pixel_file(figure) for figure in figures_of(one) if figure.plot is None)
     file = next((file for file in pictures if file is not None), None)
@@ -305,7 +305,7 @@ def _thumbnail(section: Section, folder: Path) -> Embedded | None:
 
 
 def _plot(figure: Figure) -> Markup:
-    """A Plotly figure as JSON that can stand in a script element."""
+    """Return a Plotly figure as JSON that is safe in a script element."""
     plot = json.loads(to_json_plotly(dict(figure.plot or {})))
     plot.get("layout", {}).pop("template", None)
     return _script_json({"data": plot.get("data", []), "layout": plot.get("layout", {})})
@@ -317,7 +317,7 @@ def _script_json(content: Any) -> Markup:
 
 
 def _data(folder: Path, file: PurePosixPath) -> str:
-    """The address of some data: the data itself, or the file beside the page if that is large."""
+    """Return a link to data: the data itself, or its file if it is large."""
     try:
         content = (folder / file).read_bytes()
     except OSError as error:
@@ -331,14 +331,14 @@ def _data(folder: Path, file: PurePosixPath) -> str:
 
 
 def _record(key: str, row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A record's row: what it is of, and every figure of it that there is."""
+    """Return a record for the template: its cell and all available figures."""
     title = " · ".join(str(row[name]) for name in ("mesh", "algorithm") if row.get(name))
     shown = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
     return {"title": title or key, "fields": [(n, _entries(v)) for n, v in shown.items()]}
 
 
 def _entries(value: Any) -> list[tuple[str, str]]:
-    """A field as words, one line a name where it is a mapping."""
+    """Return a field as text, with one line per name for a mapping."""
     if isinstance(value, Mapping):
         return [(str(name), _words(inner)) for name, inner in value.items()]
     return [("", _words(value))]
@@ -374,7 +374,7 @@ def environment() -> jinja2.Environment:
 
 
 def _prose(words: str) -> Markup:
-    """Words of a report as it writes them: `code` between backticks, symbols such as E_C."""
+    """Return a report's text as HTML: `code` between backticks, symbols such as E_C."""
     text, *rest = re.split(r"`([^`\n]+)`", words)
     pairs = zip(rest[::2], rest[1::2], strict=True)
     return _symbols(text) + Markup("").join(
@@ -388,7 +388,7 @@ def _symbols(words: str) -> Markup:
 
 
 def policy(scripts: Sequence[bytes]) -> str:
-    """What may the page do? Run the scripts it was written with, and ask nobody for anything."""
+    """Return the content security policy: only the page's own scripts run, without requests."""
     hashes = [base64.b64encode(hashlib.sha256(s).digest()).decode() for s in scripts if s]
     allowed = " ".join(f"'sha256-{value}'" for value in hashes)
     return (
@@ -398,7 +398,7 @@ def policy(scripts: Sequence[bytes]) -> str:
 
 
 def template_text(name: str) -> str:
-    """Return a part of a page that is no template: style or script."""
+    """Return a part of the page that is not a template: style or script."""
     return (_TEMPLATES / name).read_text()
 
 
@@ -409,5 +409,5 @@ def _plotly_source() -> bytes:
 
 @cache
 def _squeezed(source: bytes) -> str:
-    """A script as compressed text, which a browser unpacks when the first plot is looked at."""
+    """Return a script as compressed text, which the browser unpacks for the first plot."""
     return base64.b64encode(gzip.compress(source, 9, mtime=0)).decode() if source else ""

@@ -1,7 +1,7 @@
-"""A report as LaTeX: ``report.tex``, and every table as a file of its own.
+"""Render a report as LaTeX: ``report.tex``, and every table as a separate file.
 
-``pdflatex report.tex`` in the report's folder compiles as it is, with packages that every
-distribution has.
+``pdflatex report.tex`` in the report's folder compiles it with packages that every
+LaTeX distribution has.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from cembench.report.document import (
     tex_of,
 )
 
-#: What a character of text becomes; everything else that is not Latin loses its accents or is "?".
+#: Replacements of characters; other non-Latin characters lose their accents or become "?".
 _CHARACTERS = {
     "\\": r"\textbackslash{}", "{": r"\{", "}": r"\}", "$": r"\$", "&": r"\&", "#": r"\#",
     "%": r"\%", "_": r"\_", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}",
@@ -42,9 +42,9 @@ _CHARACTERS = {
     "\u03bb": r"$\lambda$", "\u00b5": r"$\mu$", "\u00b2": r"\textsuperscript{2}",
     "\u00b3": r"\textsuperscript{3}", "\n": " ", "\u00a0": "~",
 }  # fmt: skip
-#: Rows of a table that fit on a page; longer ones are continued.
+#: Maximum rows of a table on a page; longer tables are continued.
 ROWS = 38
-#: Characters above which a column of words is broken into lines, and parts of the line it gets.
+#: Characters above which a column of text is wrapped, and its share of the line width.
 LONG = 36
 
 PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
@@ -66,7 +66,7 @@ PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
 
 
 def write_latex(report: Report, folder: Path) -> Path:
-    """Write ``report.tex`` and ``tables/*.tex``; where is the first?"""
+    """Write ``report.tex`` and ``tables/*.tex``; return the path of the first."""
     for table in tables_of(report):
         _write(folder / tex_of(table), table_lines(table))
     lines = [f"% Made by: {escape(report.command)}", PREAMBLE]
@@ -96,7 +96,7 @@ def _findings(report: Report) -> list[str]:
 
 
 def escape(text: str) -> str:
-    """Text in which every character prints as it is, as far as the fonts have it."""
+    """Return text escaped for LaTeX, as far as the fonts have its characters."""
     return "".join(_character(c) for c in text)
 
 
@@ -135,7 +135,7 @@ def _item(item: Item) -> list[str]:
         return _figures(item.figures, item.title, item.caption, f"fig:{item.name}")
     if isinstance(item, Gap):
         how = rf" Made by: \texttt{{{escape(item.command)}}}." if item.command else ""
-        return [rf"\textbf{{Not here: {escape(item.title)}.}} {escape(item.why)}{how}"]
+        return [rf"\textbf{{Missing: {escape(item.title)}.}} {escape(item.why)}{how}"]
     return _claim(item)
 
 
@@ -155,7 +155,7 @@ def _claim(claim: Claim) -> list[str]:
 
 
 def _figures(figures: Sequence[Figure], title: str, caption: str, label: str) -> list[str]:
-    """One figure over the whole line, several two in a line, over pages where they are many."""
+    """Return one figure over the full width, or several in pairs, over pages if there are many."""
     alone = len(figures) == 1
     width = r"0.95\linewidth" if alone else r"0.47\linewidth"
     lines = []
@@ -175,14 +175,14 @@ def _figures(figures: Sequence[Figure], title: str, caption: str, label: str) ->
 
 
 def _printable(figure: Figure) -> str:
-    """The form of a figure that pdflatex takes, lines rather than pixels."""
+    """Return the format of a figure for pdflatex, preferring vector graphics."""
     forms = {path.suffix: path for path in figure.files}
     chosen = next((forms[f] for f in (".pdf", ".png", ".jpg", ".jpeg") if f in forms), None)
     return str(chosen or figure.files[0])
 
 
 def table_lines(table: Table) -> list[str]:
-    """The table as floats; needs the packages booktabs and graphicx."""
+    """Return the table as floats, which need the packages booktabs and graphicx."""
     body = table.rows[: len(table.rows) - table.footer_rows]
     footer = table.rows[len(body) :]
     portions = [body[k : k + ROWS] for k in range(0, len(body), ROWS)] or [()]
@@ -198,7 +198,7 @@ def table_lines(table: Table) -> list[str]:
             r"\centering\small",
             rf"\caption{{{escape(table.title)}{more}}}",
             "" if k else rf"\label{{tab:{table.name}}}",
-            # As wide as the line at most, never enlarged.
+            # At most as wide as the line, never enlarged.
             r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
             rf"\begin{{tabular}}{{{_alignment(table)}}}",
             r"\toprule",
@@ -224,7 +224,7 @@ def _alignment(table: Table) -> str:
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
-    """The groups over their columns, with a rule below each, then the titles."""
+    """Return the groups above their columns, with a rule below each, then the titles."""
     titles = [
         escape(c.title + (f" [{c.unit}]" if c.unit else "")) if c.title else "" for c in columns
     ]

@@ -1,4 +1,4 @@
-"""A report as Markdown: ``report.md``, a page a surface, and the records that numbers link to."""
+"""Render a report as Markdown: ``report.md``, a page per surface, and the linked records."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from cembench.report.document import (
 )
 from cembench.report.render.tables_csv import heading
 
-#: Digits of a record's key that links carry.
+#: Number of digits of a record's key in links.
 KEY = 12
 _SPECIAL = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#"})
 
 
 def write_markdown(report: Report, folder: Path) -> Path:
-    """Write ``report.md`` with what it links to; where is it?"""
+    """Write ``report.md`` and the files it links to; return its path."""
     pages: list[Section] = []
     lines = [f"# {escape(report.title)}", "", *_findings(report)]
     lines += [f"Made by `{report.command}`.", ""]
@@ -49,7 +49,7 @@ def write_markdown(report: Report, folder: Path) -> Path:
 
 
 def escape(text: str) -> str:
-    """Text in which no character means anything to Markdown."""
+    """Return text escaped for Markdown."""
     return text.translate(_SPECIAL).replace("\n", " ")
 
 
@@ -105,7 +105,7 @@ def _item(item: Item, depth: int, up: PurePosixPath) -> list[str]:
         return [*lines, escape(item.caption)]
     if isinstance(item, Gap):
         how = f" Made by: `{item.command}`." if item.command else ""
-        return [f"> **Not here: {escape(item.title)}.** {escape(item.why)}{how}"]
+        return [f"> **Missing: {escape(item.title)}.** {escape(item.why)}{how}"]
     return _claim(item, title)
 
 
@@ -136,7 +136,7 @@ def _figure(figure: Figure, up: PurePosixPath) -> list[str]:
 
 
 def table_lines(table: Table, up: PurePosixPath) -> list[str]:
-    """The table with its caption, notes and a link to its CSV."""
+    """Return the table with its caption, notes and a link to its CSV."""
     heads = [escape(heading(column)) for column in table.columns]
     rule = ["---:" if column.numeric else ":---" for column in table.columns]
     lines = [_cells(heads), _cells(rule)]

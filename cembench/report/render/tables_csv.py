@@ -1,4 +1,4 @@
-"""A report's tables as CSV: what is printed, and behind it the full number and its origin."""
+"""Render a report's tables as CSV: numbers with full precision, origins and remarks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cembench.report.document import Column, Report, Table, csv_of, tables_of
 
 
 def write_tables_csv(report: Report, folder: Path) -> list[Path]:
-    """Write every table; which files are they?"""
+    """Write every table; return the paths of the files."""
     paths = []
     for table in tables_of(report):
         path = folder / csv_of(table)
@@ -21,10 +21,10 @@ def write_tables_csv(report: Report, folder: Path) -> list[Path]:
 
 
 def table_csv(table: Table) -> str:
-    """A line a row; numbers with full precision.
+    """Return a table as CSV, with numbers in full precision.
 
-    A numeric column is followed by one with the origins of its numbers and one with what is to be
-    known of them; a gap is empty, its cause is there.
+    A numeric column is followed by one with the origins of its numbers and one with remarks; a gap
+    is empty, and its cause is in the remarks.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
@@ -46,6 +46,6 @@ def table_csv(table: Table) -> str:
 
 
 def heading(column: Column) -> str:
-    """Group, title and unit in one."""
+    """Return group, title and unit as one heading."""
     named = " ".join(part for part in (column.group, column.title) if part)
     return f"{named} [{column.unit}]" if column.unit else named

@@ -1,4 +1,4 @@
-"""Records as tables on a terminal of 80 columns."""
+"""Tables of records for a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -37,16 +37,16 @@ _STYLES = {"ok": "green", "skipped": "yellow"}
 
 
 def status_style(status: str) -> str:
-    """The colour of a status."""
+    """Return the colour of a status."""
     return _STYLES.get(status, "bold red")
 
 
 def results_table(records: Iterable[Record]) -> RenderableType:
-    """One line a cell, surfaces apart, policies of solving in tables of their own.
+    """Return the results, one row per cell, grouped by surface, with a table per policy.
 
-    Mean and SD are of the angles' errors in degrees; seconds are the median of the rounds, and
-    beside them stands half the width of its 95 % interval in percent, with a ! where that is wide.
-    The causes of what did not end ok stand below.
+    Mean and SD are of the angle errors in degrees. Seconds are the median of the rounds, followed
+    by half the width of its 95 % interval in percent, with a ! if that is wide. The causes of cells
+    that did not end ok are listed below.
     """
     ordered = list(records)
     policies = list(dict.fromkeys(record.cell.solves for record in ordered))
@@ -87,7 +87,7 @@ def _cells_table(records: Sequence[Record]) -> Table:
 
 
 def _name(record: Record) -> str:
-    """Return an algorithm's name with its marks: another target, and whose code it is."""
+    """Return an algorithm's name with marks for another target and for external code."""
     marks = ("" if record.target == "disk" else "*") + mark_of(record)
     return f"{record.cell.algorithm} {marks}".rstrip()
 
@@ -112,7 +112,7 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
     noted = [r.neighbours for record in records for r in record.outcome.rounds if r.neighbours]
     busy = sum(neighbours.busy for neighbours in noted)
     if busy:
-        told = f"The machine was busy beside {busy} of {len(noted)} processes; close other programs"
+        told = f"The machine was busy during {busy} of {len(noted)} processes; close other programs"
         remarks.append(Text(f"{told}, or add --repeat-busy.", style="yellow"))
     for record in records:
         name = f"{record.cell.mesh} / {record.cell.algorithm}"
@@ -125,10 +125,10 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
 
 
 def speedups_table(records: Sequence[Record], reference: str) -> RenderableType | None:
-    """How much faster is the reference than the others (Eq. 33), and how sure is that?
+    """Return the speedups of the reference over the others (Eq. 33), with their intervals.
 
-    Where no cell has rounds enough for an interval that is said once, and a surface has one line.
-    None where there is nothing to compare.
+    If no cell has enough rounds for an interval, a remark says so, and each surface has one row.
+    None if there is nothing to compare.
     """
     known = references(records, reference)
     compared = []
@@ -146,7 +146,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> RenderableType 
     )
     if all(found.verdict == "too few rounds" for _, found in compared):
         told = (
-            f"How sure these are is not known: that takes {DEFAULT_ROUNDS} rounds "
+            f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
             f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
         )
         return Group(heading, _bare_speedups(compared), Text(told, style="dim"))
@@ -155,7 +155,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> RenderableType 
 
 
 def _corrected_words(found: Sequence[Comparison]) -> list[Text]:
-    """What the verdicts of a table rest on, and what they would be each alone."""
+    """Return a remark on the correction of the verdicts, and its effect."""
     tested = [one for one in found if one.interval is not None]
     if len(tested) < 2:
         return []
@@ -163,16 +163,16 @@ def _corrected_words(found: Sequence[Comparison]) -> list[Text]:
         one.verdict != alone.verdict for one, alone in zip(corrected(tested), tested, strict=True)
     )
     told = (
-        f"Verdicts hold together with 95 % (Holm, {len(tested)} comparisons); "
-        "intervals are single ones."
+        f"All verdicts together hold with 95 % (Holm, {len(tested)} comparisons); "
+        "each interval holds by itself."
     )
     if lost:
-        told += f" Each alone, {lost} more would be called different; more rounds decide them."
+        told += f" Taken alone, {lost} more would be called different; more rounds would decide."
     return [Text(told, style="dim")]
 
 
 def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str) -> Table:
-    """A line a comparison."""
+    """Return a table with one row per comparison."""
     several = _several_policies(compared)
     rows = []
     together = corrected([found for _, found in compared])
@@ -193,7 +193,7 @@ def _sure_speedups(compared: Sequence[tuple[Record, Comparison]], reference: str
 
 
 def _bare_speedups(compared: Sequence[tuple[Record, Comparison]]) -> Table:
-    """A line a surface, a column an algorithm."""
+    """Return a table with one row per surface and one column per algorithm."""
     several = _several_policies(compared)
     algorithms = list(dict.fromkeys(_name(record) for record, _ in compared))
     lines: dict[tuple[str, str], dict[str, str]] = {}
@@ -213,9 +213,9 @@ def _several_policies(compared: Sequence[tuple[Record, Comparison]]) -> bool:
 
 
 def changes_table(changes: Sequence[Change]) -> RenderableType:
-    """What became faster or slower from one run to another: the ratio of the seconds.
+    """Return the changes from one run to another, as ratios of seconds.
 
-    The ratio is free of the drift that the reference kernel shows, where both runs timed it.
+    The ratio is corrected for the drift of the reference kernel, if both runs timed it.
     """
     rows = []
     together = corrected([change.comparison for change in changes])
@@ -246,15 +246,15 @@ def changes_table(changes: Sequence[Change]) -> RenderableType:
 
 
 def _drift_words(changes: Sequence[Change]) -> str:
-    """What the machine did between two runs, and whether the ratios are free of it."""
+    """Return a remark on the machine's drift between two runs, and its correction."""
     known = [change.drift for change in changes if change.drift is not None]
     if not known:
         return (
-            "How far the machine drifted between the runs is not known: not both timed the "
-            "reference kernel."
+            "The machine's drift between the runs is unknown: not both runs timed the reference "
+            "kernel."
         )
-    told = "Ratios are over the reference kernel's, which every round times (rank-sum test, 5 %)"
-    told += f": it took {min(known):.2f}"
+    told = "Seconds are divided by those of the reference kernel (rank-sum test, 5 %)"
+    told += f", which took {min(known):.2f}"
     told += f" to {max(known):.2f}" if f"{min(known):.2f}" != f"{max(known):.2f}" else ""
     told += " times as long in the later run."
     if len(known) < len(changes):
@@ -263,7 +263,7 @@ def _drift_words(changes: Sequence[Change]) -> str:
 
 
 def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> RenderableType:
-    """What would be run: cell, triangles, what is there already, and what the rest will cost."""
+    """Return the plan: cells, triangles, what is recorded already, and the estimated cost."""
     rows = []
     for cell, faces, state, cost in lines:
         costs = ("-", "-", "-")
@@ -289,7 +289,7 @@ def _figure(record: Record, metric: Metric) -> str:
 
 
 def figures_table(record: Record) -> Table:
-    """All figures of one record, a line each."""
+    """Return all figures of one record, one row each."""
     outcome, facts = record.outcome, record.mesh
     about = (
         f"{record.cell.mesh}: {facts.vertices:,} vertices, {facts.faces:,} "
@@ -327,7 +327,7 @@ def figures_table(record: Record) -> Table:
 
 
 def _printed(record: Record) -> str:
-    """What the paper says of this surface, and of this algorithm on it; printed, not measured."""
+    """Return the paper's printed figures for this surface and algorithm, as text."""
     row, name = record.mesh.paper_row, record.cell.algorithm
     what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
     printed = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
@@ -343,7 +343,7 @@ def _given(record: Record) -> str:
 
 
 def algorithms_table(algorithms: Sequence[Algorithm], *, verbose: bool) -> RenderableType:
-    """What algorithms are there; with `verbose` also what each is faithful to and decides."""
+    """Return the algorithms; with `verbose` also their parameters, sources and notes."""
     if not verbose:
         rows = [[a.name, a.target, a.mesh_type.__name__, _parameters(a)] for a in algorithms]
         columns = words("algorithm", "maps to", "from", "parameters (defaults)")
@@ -360,7 +360,7 @@ def algorithms_table(algorithms: Sequence[Algorithm], *, verbose: bool) -> Rende
 
 
 def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableType:
-    """What surface families are there?"""
+    """Return the surface families; with `verbose` also their parameters and sources."""
     more = ["about"] if verbose else []
     rows = [
         [s.name, s.title, _parameters(s), *([_flowing(s.notes)] if verbose else [])]
@@ -370,7 +370,7 @@ def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> RenderableT
 
 
 def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
-    """Counts of surfaces, do they meet the paper's Table 2, and how hard are they to flatten?"""
+    """Return counts of surfaces, their agreement with Table 2, and their conformal-factor span."""
     rows: list[list[str | Text]] = []
     for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
         mesh, check = facts.mesh, row_check(facts.mesh)
@@ -394,7 +394,7 @@ def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
 
 
 def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
-    """What can be fetched, and is it there already?"""
+    """Return the datasets, with those already fetched marked."""
     rows = []
     for d, here in datasets:
         size = "-" if d.size is None else bytes_text(d.size)
@@ -410,7 +410,7 @@ def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> RenderableType:
 
 
 def bytes_text(size: int) -> str:
-    """Return a number of bytes as a person reads it.
+    """Return a number of bytes in a readable form.
 
     >>> bytes_text(45_743), bytes_text(2_555_599)
     ('46 kB', '2.6 MB')
@@ -419,7 +419,7 @@ def bytes_text(size: int) -> str:
 
 
 def _flowing(text: str) -> str:
-    """Let paragraphs of a docstring wrap at the terminal's width."""
+    """Join the lines of paragraphs, so that the terminal wraps them."""
     return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
 
 

@@ -1,4 +1,4 @@
-"""A run over many surfaces on a terminal: a line an algorithm."""
+"""A run over many surfaces on a terminal, one row per algorithm."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from rich.text import Text
 from cembench.report.render.grid import figures, grid, names
 from cembench.results.records import Record
 
-#: With more surfaces than this, nobody reads a line a cell, or looks at each surface's page.
+#: With more surfaces than this, runs are summarised instead of shown cell by cell.
 MANY = 24
-#: So many causes are told.
+#: Maximum number of causes listed.
 TOLD = 8
 
 
 def many_table(records: Sequence[Record]) -> RenderableType:
-    """Of how many surfaces each algorithm has a valid map, how good they are, and what failed."""
+    """Return valid maps, angle errors, seconds and failures by algorithm."""
     by_algorithm: dict[str, list[Record]] = {}
     for record in records:
         by_algorithm.setdefault(record.cell.algorithm, []).append(record)

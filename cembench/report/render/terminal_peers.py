@@ -1,4 +1,4 @@
-"""Ours beside libraries and programs of others, on a terminal of 80 columns."""
+"""Comparison with external libraries and programs, for a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from cembench.report.render.terminal import status_style
 from cembench.results.external_words import mark_of, marks_explained
 from cembench.results.records import Record
 
-#: The longest name of an algorithm that is shown whole; eighty columns have no more.
+#: Maximum characters of an algorithm's name; 80 columns have no room for more.
 _ROOM = 25
 
 
 def peers_table(records: Sequence[Record]) -> RenderableType:
-    """One table a surface: targets apart, within one in the order of E_C / A."""
+    """Return one table per surface, grouped by target and sorted by E_C / A."""
     parts: list[RenderableType] = []
     ordered = sorted(records, key=_place)
     for name in dict.fromkeys(record.cell.mesh for record in records):
@@ -67,7 +67,7 @@ def _of_surface(records: Sequence[Record]) -> Table:
 
 
 def _end(record: Record) -> str:
-    """Return the status, or how many folds there are."""
+    """Return the status, or the number of folds."""
     folds = record.outcome.metrics.get("flipped_triangles")
     return f"{folds:,} folds" if folds else record.outcome.status
 

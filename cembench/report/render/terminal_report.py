@@ -1,4 +1,4 @@
-"""A report's tables on a terminal of 80 columns."""
+"""A report's tables for a terminal of 80 columns."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from rich.text import Text
 from cembench.report.document import ORIGINS, Column, Report, Table, Value, marked, tables_of
 from cembench.report.render.grid import GridColumn, grid, names
 
-#: The tables that `report` and `reproduce` show, and those that stand in where there are none.
+#: Tables that `report` and `reproduce` show, and those shown if these are missing.
 SHOWN = ("table-1", "table-2", "table-3", "table-4")
 _BESIDE = ("printed", "here")
-#: Characters of a line, and the fewest that are left for a surface's name.
+#: Width of a line, and minimum width of a surface's name, in characters.
 WIDTH, NAME = 80, 12
 
 
 def paper_tables(report: Report) -> RenderableType:
-    """What was found, and the paper's four tables, what was printed above what was measured.
+    """Return the findings and the paper's four tables, printed figures above measured ones.
 
     A run without the paper's surfaces has no such tables.
     """
@@ -54,7 +54,7 @@ def _findings(report: Report) -> list[RenderableType]:
 
 
 def _folded(table: Table) -> RenderableType:
-    """A line a row and kind: "printed" and "here" stand below each other, not side by side."""
+    """Return a table with "printed" and "here" in rows below each other, not side by side."""
     places = [k for k, column in enumerate(table.columns) if column.numeric and column.group]
     groups = list(dict.fromkeys(table.columns[k].group for k in places))
     kinds = [k for k in _BESIDE if any(table.columns[p].title == k for p in places)]
@@ -78,7 +78,7 @@ def _folded(table: Table) -> RenderableType:
 
 
 def _width(table: Table, group: str) -> int:
-    """Characters of the longest entry of a group, and of the longest word over it."""
+    """Return the width of the longest entry of a group, or of the longest word above it."""
     entries = [
         marked(row[k], column)
         for k, column in enumerate(table.columns)

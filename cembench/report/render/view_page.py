@@ -1,4 +1,4 @@
-"""One surface and its map to be turned, as a page that needs nothing beside it."""
+"""A self-contained page with a 3-D view of one surface and its map."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from cembench.core.extras import Extra, require
 
 
 def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[str, str]]) -> str:
-    """Compose the page.
+    """Return the page as HTML.
 
     Parameters
     ----------
     title : str
         The page's heading.
     scene : bytes
-        What :func:`cembench.drawing.view_scene.view_scene` packed.
+        Scene packed by :func:`cembench.drawing.view_scene.view_scene`.
     picture : bytes
         A PNG file, for browsers without WebGL.
     facts : sequence of pairs of str
-        What stands below: names and words.
+        Names and texts shown below.
 
     Raises
     ------
     MissingExtra
-        What lays pages down is not installed.
+        The libraries for pages are not installed.
 
     """
     check_pages_can_be_made()
@@ -54,7 +54,7 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
 
 
 def check_pages_can_be_made() -> None:
-    """Raise :class:`MissingExtra` where the libraries of a page are not installed."""
+    """Raise :class:`MissingExtra` if the libraries for pages are not installed."""
     require(Extra.REPORT, "a surface to turn in a page", "jinja2", "markupsafe")
 
 
@@ -64,7 +64,7 @@ def write_view_page(path: Path, page: str) -> None:
     Raises
     ------
     RenderError
-        It cannot be written.
+        The page cannot be written.
 
     """
     write_bytes(path, page.encode(errors="backslashreplace"), error=RenderError, parents=False)

@@ -10,7 +10,7 @@
   };
   const all = (selector, within = document) => [...within.querySelectorAll(selector)];
 
-  // --- light and dark: as the system has it, until the reader says otherwise --------------------
+  // --- light and dark: the system's setting, until the reader chooses ----------------------------
 
   const THEME = "cembench-theme";
   const system = matchMedia("(prefers-color-scheme: dark)");
@@ -31,7 +31,7 @@
     label();
   }
 
-  // --- pages and records, by what stands after the # ---------------------------------------------
+  // --- pages and records, by the part of the address after # --------------------------------------
 
   let title = "";
   let before = "";      // the hash under an opened record
@@ -124,7 +124,7 @@
     }, { passive: true });
   }
 
-  // --- tables: up, down, and as they were; gaps last, footers where they are -----------------------
+  // --- tables: ascending, descending, and original order; gaps last, footers fixed -----------------
 
   function prepareTable(table) {
     const body = table.tBodies[0];
@@ -169,7 +169,7 @@
     });
   }
 
-  // --- remarks on a figure, where the pointer, the focus or a finger is ----------------------------
+  // --- remarks on a figure, at the pointer, the focus or a touch -----------------------------------
 
   function prepareRemarks() {
     const tip = element("div", { id: "tip", hidden: true });
@@ -195,12 +195,12 @@
     document.addEventListener("focusin", marks(show));
     document.addEventListener("click", marks((mark, event) => { event.preventDefault(); show(mark); }));
     document.addEventListener("pointerout", (event) => {
-      // A pointer that rests elsewhere leaves what scrolls away beneath it: no business of the owner's.
+      // When an element scrolls away under a resting pointer, the pointer leaves it: ignore that.
       const left = event.pointerType === "mouse" && (owner?.contains(event.target) || tip.contains(event.target));
       if (left && !tip.contains(event.relatedTarget)) hide();
     });
     document.addEventListener("focusout", hide);
-    // The browser itself scrolls to what the keyboard reaches: that must not take its remark away.
+    // The browser scrolls to the element with the keyboard focus; that must not hide its remark.
     const follow = () => { if (owner?.matches(":focus")) show(owner); else hide(); };
     document.addEventListener("scroll", follow, { passive: true, capture: true });
     document.addEventListener("keydown", (event) => { if (event.key === "Escape") hide(); });
@@ -230,7 +230,7 @@
     });
   }
 
-  // --- plots: the picture stands until Plotly, unpacked for the first of them, has drawn -----------
+  // --- plots: the picture is shown until Plotly, unpacked for the first one, has drawn -------------
 
   let library = null;
 
@@ -270,7 +270,7 @@
     };
   }
 
-  // Where the window is narrow, panels that stand side by side stand one under the other.
+  // In a narrow window, panels are stacked instead of side by side.
   const BAR = 28;  // pixels of the buttons over a plot
   const isAxis = (name) => /^[xy]axis/.test(name);
   const typeset = (words) => words.replace(/\b([A-Za-z])_([A-Z]+)\b/g, "<i>$1</i><sub>$2</sub>");
@@ -297,13 +297,13 @@
       autosize: true,
       margin: { ...layout.margin, t: (layout.margin?.t ?? 10) + BAR },
       legend: { ...layout.legend, orientation: "h", x: 0, xanchor: "left", yanchor: "top" },
-      // A finger that moves over a plot scrolls the page; zooming is a button then.
+      // On touch screens, moving a finger over a plot scrolls the page; a button zooms.
       ...(matchMedia("(pointer: coarse)").matches ? { dragmode: false } : {}),
     };
   }
 
-  // What is known only of a plot that stands: a logarithmic axis of less than a decade or two gets
-  // marks within decades, and the legend goes below the lowest words of the axes.
+  // Only known once a plot is drawn: a logarithmic axis of less than a decade or two gets
+  // marks within decades, and the legend goes below the lowest labels of the axes.
   async function settle(board) {
     await window.Plotly.relayout(board, Object.fromEntries(
       Object.entries(board._fullLayout)
@@ -364,7 +364,7 @@
     all("figure.plot").forEach((figure) => watch.observe(figure));
   }
 
-  // --- pictures, enlarged; the next one is seen through the same window ---------------------------
+  // --- enlarged pictures; the next one keeps the zoom and position --------------------------------
 
   function prepareViewer() {
     const pictures = all("figure.picture");

@@ -1,4 +1,4 @@
-/* A surface and its image under one checkerboard, to be turned. WebGL 2, nothing else.
+/* An interactive view of a surface and its image under one checkerboard, in plain WebGL 2.
    Each <div class="view"> holds one block of cembench.drawing.view_scene as text (base64).
    Without WebGL the class "off" is set, and what stands beside the view remains. */
 (() => {
@@ -90,7 +90,7 @@
     return N;
   }
 
-  /* Values at vertices, `width` each, at the triangles' corners in turn. */
+  /* Return values at vertices, `width` each, for the triangles' corners in order. */
   function atCorners(values, F, width) {
     const found = new Float32Array(F.length * width);
     for (let i = 0; i < F.length; i++) {
@@ -99,7 +99,7 @@
     return found;
   }
 
-  /* A matrix by columns, from one by rows. */
+  /* Return a matrix in column order from one in row order. */
   const columns = (m) => [m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]];
   const times = (a, b) => [0, 1, 2].flatMap((i) => [0, 1, 2].map((j) =>
     a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j] + a[3 * i + 2] * b[6 + j]));
@@ -161,7 +161,7 @@
       const tools = [
         button("\u2212", "Zoom out", () => this.zoomBy(1 / 1.25)),
         button("+", "Zoom in", () => this.zoomBy(1.25)),
-        button("\u21ba", "As at first", () => this.reset()),
+        button("\u21ba", "Reset the view", () => this.reset()),
       ];
       this.told = make("p", { className: "told" });
       this.box.append(
@@ -279,7 +279,7 @@
       gl.vertexAttribPointer(where, width, gl.FLOAT, false, 0, 0);
     }
 
-    /* What depends on the algorithm and on the colours. */
+    /* Data that depends on the algorithm and on the colours. */
     load() {
       const { arrays, head, F, chosen } = this;
       const uv = arrays[`uv${chosen}`];
@@ -343,7 +343,7 @@
     }
   }
 
-  /* A view is made when it comes into sight: a browser keeps few contexts. */
+  /* A view is made when it becomes visible, because browsers keep few contexts. */
   function prepareViews() {
     const watch = new IntersectionObserver((seen) => {
       for (const { isIntersecting, target } of seen) {

@@ -1,6 +1,6 @@
-"""What the paper printed: its Tables 1 to 4 as data, and what is known to be wrong in them.
+"""The paper's printed Tables 1 to 4 as data, with known misprints.
 
-An empty cell of a table, a dash in print, is None. The source is "An Efficient Energy Minimization
+An empty cell, printed as a dash, is None. The source is "An Efficient Energy Minimization
 for Conformal Parameterizations", Tables 1-4, twenty models each.
 """
 
@@ -17,7 +17,7 @@ Row: TypeAlias = "MappingProxyType[str, float | None]"
 
 SOURCE = "An Efficient Energy Minimization for Conformal Parameterizations, Tables 1-4"
 
-#: The algorithms that the tables compare, by the names they have here, in the order of the columns.
+#: The algorithms of the tables under their names in cembench, in the order of the columns.
 ALGORITHMS = ("qiem", "fdm", "ldm", "cem")
 
 _FILES = {
@@ -27,7 +27,7 @@ _FILES = {
     4: "table4_angular_distortion_degrees.csv",
 }
 
-#: Printed cells that contradict the rest of the paper: (table, model, column) -> why.
+#: Printed cells that contradict the rest of the paper: (table, model, column) -> reason.
 ERRATA = MappingProxyType(
     {
         (2, "Knit Cap Man", "fdm"): (
@@ -40,12 +40,12 @@ ERRATA = MappingProxyType(
 
 @lru_cache(maxsize=4)
 def table(number: int) -> MappingProxyType[str, Row]:
-    """The rows of a table in the paper's order, by model; misprints as printed (:data:`ERRATA`).
+    """Return the rows of a table by model, in the paper's order, with misprints (:data:`ERRATA`).
 
     Raises
     ------
     KeyError
-        The paper's tables are 1, 2, 3 and 4.
+        The number is not 1, 2, 3 or 4.
 
     """
     text = (files(__name__) / _FILES[number]).read_text(encoding="utf-8")
@@ -57,7 +57,7 @@ def table(number: int) -> MappingProxyType[str, Row]:
 
 
 def faces(model: str) -> int:
-    """How many triangles has a model of the paper?"""
+    """Return the number of triangles of a model of the paper."""
     count = table(1)[model]["faces"]
     assert count is not None
     return int(count)

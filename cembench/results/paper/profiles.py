@@ -1,4 +1,4 @@
-"""Which surfaces does a profile name, and which algorithms?"""
+"""Profiles: the surfaces and algorithms that `--profile` selects."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from cembench.core.errors import RegistryError
 from cembench.registry import Registry
 from cembench.results import paper
 
-#: How many of the smallest models `quick` takes, and the most triangles in `standard`.
+#: Number of smallest models in `quick`, and the most triangles in `standard`.
 QUICK_MODELS = 8
 STANDARD_FACES = 210_000
 
 
 class Profile(StrEnum):
-    """Parts of the paper's list of models."""
+    """Selections from the paper's list of models."""
 
     quick = "quick"
     standard = "standard"
@@ -24,7 +24,7 @@ class Profile(StrEnum):
 
 
 def models(profile: Profile) -> list[str]:
-    """The models that the profile takes, smallest first."""
+    """Return the models of the profile, smallest first."""
     ordered = sorted(paper.table(1), key=paper.faces)
     chosen: dict[Profile, Callable[[], list[str]]] = {
         Profile.quick: lambda: ordered[:QUICK_MODELS],
@@ -35,12 +35,12 @@ def models(profile: Profile) -> list[str]:
 
 
 def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
-    """The registered surfaces that stand for the profile's models, smallest model first.
+    """Return the names of the stand-ins for the profile's models, smallest model first.
 
     Raises
     ------
     RegistryError
-        No surface stands for one of the models, or two do.
+        A model has no registered stand-in, or two.
 
     """
     standing: dict[str, list[str]] = {}
@@ -51,24 +51,23 @@ def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
     missing = [model for model in wanted if model not in standing]
     if missing:
         raise RegistryError(
-            f"profile {profile.value!r}: no surface stands for {', '.join(missing)}; "
+            f"profile {profile.value!r}: no surface stands in for {', '.join(missing)}; "
             "name --surfaces or --mesh instead, or declare one with "
             '@surface_family(..., paper_row="...").'
         )
     for model in wanted:
         if len(standing[model]) > 1:
             raise RegistryError(
-                f"two surfaces stand for {model}: {', '.join(standing[model])}; only one can. "
+                f"two surfaces stand in for {model}: {', '.join(standing[model])}; only one can. "
                 "Leave out a --plugin, or name --surfaces."
             )
     return [standing[model][0] for model in wanted]
 
 
 def algorithms_of(profile: Profile, registry: Registry) -> list[str]:
-    """The algorithms that a run of the profile takes if none are named.
+    """Return the default algorithms of a profile.
 
-    `quick` takes those of the paper's tables, so that it stays quick; the others take the usual
-    ones.
+    `quick` uses those of the paper's tables, to be quick; the others use the usual ones.
     """
     if profile is Profile.quick:
         return [name for name in paper.ALGORITHMS if name in registry.algorithms]
@@ -76,9 +75,9 @@ def algorithms_of(profile: Profile, registry: Registry) -> list[str]:
 
 
 def paper_parameters(algorithms: Iterable[str]) -> dict[str, Any]:
-    """Return the parameters with which the paper's tables are reproduced, as `plan_cells` has them.
+    """Return the parameters that reproduce the paper's tables, in the form `plan_cells` takes.
 
-    The public program of FDM has a slip that the printed figures contain; see docs/paper_models.md.
+    The printed figures of FDM contain an error of its public program; see docs/paper_models.md.
 
     >>> paper_parameters(["cem", "fdm"])
     {'fdm.public_program': True}

@@ -1,1 +1,1 @@
-"""External programs and foreign libraries, run and measured as algorithms."""
+"""Run and measure external programs and libraries as algorithms."""

@@ -1,7 +1,7 @@
-"""Call an external program: a process in a folder of its own, timed by the wall clock.
+"""Call an external program as a process in its own folder, timed by the wall clock.
 
-The process runs below the worker that calls it, so the worker's limits of time and memory, and what
-ends it, hold for all that the program starts (:mod:`cembench.running.process`).
+The process is a child of the worker that calls it, so the worker's time and memory limits apply to
+everything that the program starts (:mod:`cembench.running.process`).
 """
 
 from __future__ import annotations
@@ -33,47 +33,47 @@ from cembench.running.external.faults import ProgramFault
 from cembench.running.external.present import missing
 from cembench.running.external.small_mesh import small_mesh
 
-#: What the wall clock of a program is booked under.
+#: Phase name for the wall clock of a program.
 PHASE = "process"
-#: No file of a program grows beyond so many times the largest output that is read.
+#: Maximum size of a program's files, as a multiple of the largest output that is read.
 LARGEST_FILE = 8
-#: The end of what a program prints that is searched, and that is kept of a fault, in bytes.
+#: Bytes at the end of a program's output that are searched, and that are kept for a fault.
 SEARCHED, KEPT = 2**22, 4000
-#: Seconds that asking a program for its version may take.
+#: Time limit for asking a program for its version, in seconds.
 VERSION_SECONDS = 20.0
-#: Seconds between two looks at the memory of a program that is checked.
+#: Seconds between two looks at the memory of a checked program.
 LOOK_EVERY = 0.005
-#: How often a program is run on the small mesh at most.
+#: Maximum number of runs on the small mesh.
 STARTS = 3
 
 _folder_of_process: list[Path] = []
 
 
 def use_folder(folder: Path) -> None:
-    """Have the folders of this process's programs in this one, which somebody else removes."""
+    """Put the folders of this process's programs into this folder, which the caller removes."""
     _folder_of_process[:] = [folder]
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process ended, after how many seconds, with the end of what it printed."""
+    """The end of a process: code, seconds, and the last part of its output."""
 
     code: int
     seconds: float
     printed: str
-    #: Largest resident bytes of it and what it started; None where nobody looked.
+    #: Peak resident bytes of the process and its children; None if not watched.
     peak: int | None
 
 
 @dataclass
 class ProgramCalls:
-    """The calls of a program on one mesh, and what was found out about each."""
+    """The calls of a program on one mesh, with their measurements."""
 
     algorithm: Algorithm
     mesh: TriangleMesh
     arguments: Mapping[str, Any]
     threads: int
-    #: Of each call so far: the solve time that it printed, if it did.
+    #: The solve time printed by each call so far, if any.
     own: list[float | None] = field(default_factory=list)
     walls: list[float] = field(default_factory=list)
     bytes: tuple[int, int] = (0, 0)
@@ -82,16 +82,16 @@ class ProgramCalls:
     def __call__(
         self, mesh: TriangleMesh, *, watched: bool = False
     ) -> tuple[Parameterization | Atlas, Timing]:
-        """Run the program once on this surface; its map, and the wall clock of its process.
+        """Run the program once on this surface; return its map and its wall-clock timing.
 
-        With `watched` its memory is looked at, which a timed call is spared.
+        With `watched` its memory is measured, which is not done in timed calls.
 
         Raises
         ------
         NotThere
-            The program is not on this machine.
+            The program is not installed.
         ProgramFault
-            It crashed, or left no map.
+            The program crashed, or wrote no map.
 
         """
         found, ended = self._run(mesh, watched=watched)
@@ -101,12 +101,12 @@ class ProgramCalls:
         return found, Timing(total=ended.seconds, phases={PHASE: ended.seconds})
 
     def own_seconds(self, last: int) -> tuple[float, ...]:
-        """Return the solve times that the last calls printed; empty where one printed none."""
+        """Return the solve times that the last calls printed; empty if one printed none."""
         found = self.own[-last:]
         return tuple(one for one in found if one is not None) if None not in found else ()
 
     def start_seconds(self, times: int) -> float | None:
-        """Return the median wall clock on a small mesh; None where the program fails on that."""
+        """Return the median wall-clock seconds on a small mesh; None if the program fails on it."""
         small = small_mesh(self.mesh)
         try:
             sizes = self.bytes
@@ -117,25 +117,25 @@ class ProgramCalls:
         return lower_median(found)
 
     def facts(self) -> ProgramRun:
-        """Return the version, and the sizes of the files of the last call."""
+        """Return the version, and the file sizes of the last call."""
         return ProgramRun(
             version=self._version(), input_bytes=self.bytes[0], output_bytes=self.bytes[1]
         )
 
     def notices(self, start: float | None) -> list[Notice]:
-        """Return what a reader should know of the seconds of the last call."""
+        """Return remarks on the seconds of the last call."""
         told = []
         program = self.algorithm.program
         if start is None:
             told.append(
-                "it failed on a small mesh, so what starting it costs is not known: its wall clock "
-                "holds that too"
+                "it failed on a small mesh, so its start-up time is unknown and is part of its "
+                "wall-clock time"
             )
         if program is not None and program.seconds and self.own[-1] is None:
-            told.append(f"it printed no solve time that {program.seconds!r} finds")
+            told.append(f"it printed no solve time that matches {program.seconds!r}")
         if self.own[-1] is not None and self.own[-1] > self.walls[-1]:
             told.append(
-                f"it says that it solved for {self.own[-1]:.3g} s, but its process took "
+                f"it reports a solve time of {self.own[-1]:.3g} s, but its process took "
                 f"{self.walls[-1]:.3g} s in all"
             )
         return [Notice(NoticeKind.PROGRAM_SECONDS, one) for one in told]
@@ -198,7 +198,7 @@ class ProgramCalls:
 
 @contextmanager
 def _own_folder() -> Iterator[Path]:
-    """Make a folder for one call, gone afterwards with all that is in it."""
+    """Yield a temporary folder for one call."""
     above = _folder_of_process[0] if _folder_of_process else None
     if above is not None:
         above.mkdir(parents=True, exist_ok=True)
@@ -210,7 +210,7 @@ def _own_folder() -> Iterator[Path]:
 
 
 def _ended(words: Sequence[str], folder: Path, largest_file: int, *, watched: bool) -> Ended:
-    """Run a command to its end; what it prints goes to a file, so that nothing waits for a pipe."""
+    """Run a command to its end, with its output to a file, so that no pipe can block it."""
     log = folder.with_name(f"{folder.name}.log")
     try:
         with log.open("wb") as output, _files_at_most(largest_file):
@@ -244,7 +244,7 @@ def _end_of(log: Path) -> str:
 
 @contextmanager
 def _files_at_most(size: int) -> Iterator[None]:
-    """Let no file of a process that is started now grow beyond this size (not on Windows)."""
+    """Limit the file size of processes started in this block (not on Windows)."""
     try:
         import resource
     except ImportError:
@@ -260,7 +260,7 @@ def _files_at_most(size: int) -> Iterator[None]:
 
 
 def _watched(process: subprocess.Popen[bytes]) -> int | None:
-    """Look at the memory of a process and all that it starts until it ends: the largest sum."""
+    """Return the peak memory of a process and its children, watched until it ends."""
     peak = 0
     with suppress(psutil.Error):
         root = psutil.Process(process.pid)
@@ -273,7 +273,7 @@ def _watched(process: subprocess.Popen[bytes]) -> int | None:
 
 
 def _fault(ended: Ended) -> ProgramFault:
-    """Return what is wrong with a process that ended otherwise than with code 0."""
+    """Return the fault of a process that did not end with code 0."""
     import signal
 
     said = ended.printed[-KEPT:].strip()

@@ -1,4 +1,4 @@
-"""The files between us and a program: its mesh, and the UVs that it leaves."""
+"""Files exchanged with a program: the mesh it reads, and the UVs it writes."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from cembench.registry import Algorithm
 from cembench.results.records import FaultKind
 from cembench.running.external.faults import ProgramFault
 
-#: The largest file with UVs that is read: so many bytes, and so many for each vertex and triangle.
+#: Size limit of a file with UVs: bytes, and bytes per vertex and triangle.
 LARGEST_OUTPUT, LARGEST_SHARE = 2**24, 4096
 
 
 def write_input(path: Path, mesh: TriangleMesh) -> None:
-    """Write a mesh for a program, in the format that the suffix says.
+    """Write a mesh for a program, in the format of the suffix.
 
     MAT files hold ``v`` and ``f``, counted from 1, NPZ files ``V`` and ``F``, counted from 0.
     """
@@ -38,17 +38,17 @@ def write_input(path: Path, mesh: TriangleMesh) -> None:
 
 
 def largest_output(mesh: TriangleMesh) -> int:
-    """Return how many bytes the file with the UVs of a mesh may have."""
+    """Return the size limit, in bytes, of the file with the UVs of a mesh."""
     return LARGEST_OUTPUT + LARGEST_SHARE * (mesh.n + mesh.m)
 
 
 def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Parameterization | Atlas:
-    """Read what a program left, as the map of its target.
+    """Read a program's output as a map to its target.
 
     Raises
     ------
     ProgramFault
-        There is no such file, it is too large or damaged, or it holds another surface.
+        There is no such file, it is too large or damaged, or it holds a different surface.
 
     """
     _check_output(path, mesh)
@@ -75,7 +75,7 @@ def _check_output(path: Path, mesh: TriangleMesh) -> None:
         about = path.stat()
     except OSError:
         beside = sorted(p.name for p in path.parent.iterdir())
-        told = f"it left no file {path.name}; its folder holds: {', '.join(beside[:8]) or 'none'}"
+        told = f"it wrote no file {path.name}; its folder holds: {', '.join(beside[:8]) or 'none'}"
         raise ProgramFault(FaultKind.NO_OUTPUT, told) from None
     if not stat.S_ISREG(about.st_mode):
         raise ProgramFault(FaultKind.NO_OUTPUT, f"{path.name} is not a regular file")
@@ -90,7 +90,7 @@ def _check_output(path: Path, mesh: TriangleMesh) -> None:
 
 
 def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
-    """Return the UV of each vertex (n,), where all its corners have the same one."""
+    """Return the UV of each vertex (n,); raise if its corners have different ones."""
     uv = np.empty(mesh.n, dtype=np.complex128)
     uv[mesh.F] = corners
     finite = np.isfinite(corners)
@@ -105,7 +105,7 @@ def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray
 
 
 def _in_unit_circle(uv: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
-    """Move and scale an image so that its outer boundary fits the unit circle best."""
+    """Return an image shifted and scaled to fit its outer boundary to the unit circle."""
     if not (mesh.loops and np.isfinite(uv).all()):
         return uv
     outer = max(mesh.loops, key=lambda loop: abs(polygon_area(uv[loop])))

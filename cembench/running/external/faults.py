@@ -1,4 +1,4 @@
-"""What can go wrong with a program that is not ours, each with its kind."""
+"""Faults of external programs, each with its kind."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from cembench.results.records import FaultKind, Status
 
 
 class ProgramFault(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
-    """An external program did not do what was agreed upon; the message is the cause."""
+    """An external program did not do what was expected; the message is the cause."""
 
     def __init__(
         self, kind: FaultKind, detail: str, *, status: Status = "failed", said: str = ""
@@ -17,5 +17,5 @@ class ProgramFault(CembenchError):  # noqa: N818 - it is a result's status, not 
 
     @property
     def gave_up(self) -> bool:
-        """Whether the program itself ended with a code other than 0, which is a refusal."""
+        """Whether the program ended with a nonzero code, which counts as giving up."""
         return self.kind is FaultKind.GAVE_UP

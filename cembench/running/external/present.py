@@ -1,4 +1,4 @@
-"""Is what an algorithm needs on this machine, and what files is it made of?"""
+"""External programs and libraries: whether they are installed, and their files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cembench.results.records import External
 
 
 def external_of(algorithm: Algorithm) -> External | None:
-    """Return whose code an algorithm is, as a record names it; None for cembench's own."""
+    """Return the identity of external code for records; None for cembench's own."""
     if algorithm.program is not None:
         return External(kind="program", name=str(algorithm.program))
     if algorithm.library is not None:
@@ -27,27 +27,26 @@ def external_of(algorithm: Algorithm) -> External | None:
 
 
 def missing(algorithm: Algorithm) -> str | None:
-    """Return what an algorithm needs that is not there, and what brings it; None if all is."""
+    """Return which dependency of an algorithm is missing and how to install it, or None."""
     program, library = algorithm.program, algorithm.library
     if program is not None and executable(program) is None:
-        remedy = program.remedy or "Install it, put its folder into PATH, or name it with its path"
+        remedy = program.remedy or "Install it, add its folder to PATH, or give its full path"
         return f"there is no program {program.command[0]!r} on this machine. {remedy}"
     if library is not None and importlib.util.find_spec(library.module) is None:
         return (
-            f"the library {library.package} is not installed; `pip install {library.package}` "
-            "brings it"
+            f"the library {library.package} is not installed; run `pip install {library.package}`"
         )
     return None
 
 
 def executable(program: Program) -> Path | None:
-    """Return the file that a program's command starts."""
+    """Return the executable file of a program's command."""
     found = shutil.which(program.command[0])
     return None if found is None else Path(found)
 
 
 def library_version(library: Library) -> str | None:
-    """Return the installed version of a library; None where it does not tell."""
+    """Return the installed version of a library; None if it is unknown."""
     try:
         return version_of(library.package)
     except PackageNotFoundError:
@@ -56,16 +55,16 @@ def library_version(library: Library) -> str | None:
 
 @lru_cache(maxsize=64)
 def _digest(path: Path, size: int, changed: int) -> str:
-    """Return a file's SHA-256; a program of hundreds of megabytes is read once."""
+    """Return a file's SHA-256, cached because programs may have hundreds of megabytes."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def program_sources(program: Program) -> dict[str, str]:
-    """Return the SHA-256 of a program's declaration and of the files that its command names.
+    """Return the SHA-256 of a program's declaration and of the files in its command.
 
-    These are the started file and, for an interpreter, its script. What they load besides is not
-    seen.
+    These are the executable and, for an interpreter, its script. Files that they load are not
+    included.
     """
     declared = json.dumps(asdict(program), sort_keys=True).encode()
     found = {"declaration": hashlib.sha256(declared).hexdigest()}
@@ -75,6 +74,6 @@ def program_sources(program: Program) -> dict[str, str]:
             if path is not None and path.is_absolute() and path.is_file():
                 about = path.stat()
                 found[path.name] = _digest(path, about.st_size, about.st_mtime_ns)
-        except OSError:  # it may be executable and not readable
+        except OSError:  # it may be executable but not readable
             continue
     return found

@@ -1,4 +1,4 @@
-"""The mesh on which starting a program is measured: so small that solving costs nothing."""
+"""The small mesh for measuring a program's start-up time, on which solving costs nothing."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
-#: Rings of vertices, and vertices of each.
+#: Number of rings of vertices, and of vertices per ring.
 RINGS, AROUND = 4, 9
 
 
 def small_mesh(like: TriangleMesh) -> TriangleMesh:
-    """Return a shallow cap of 63 triangles, for a surface with holes 54 with one hole in them."""
+    """Return a shallow cap of 63 triangles; for a surface with holes, 54 triangles with a hole."""
     holed = isinstance(like, HoledMesh)
     angle = 2 * np.pi * (np.arange(AROUND)[None, :] + 0.5 * np.arange(RINGS)[:, None]) / AROUND
     radius = (np.arange(RINGS) + 1.0)[:, None] / RINGS * np.ones(AROUND)

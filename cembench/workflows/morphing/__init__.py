@@ -1,1 +1,1 @@
-"""Surface morphing (Section 6 of the paper): from conformal maps to a path between surfaces."""
+"""Surface morphing through conformal maps (Section 6 of the paper)."""

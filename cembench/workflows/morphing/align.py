@@ -1,8 +1,8 @@
-"""Moebius alignment: which conformal map of the disk to itself brings two surfaces together?
+"""Moebius alignment of the conformal maps of two surfaces to the disk.
 
-The conformal maps of the disk are z -> e^{i t} (z - a) / (1 - conj(a) z), three degrees of freedom:
+Conformal maps of the disk, z -> e^{i t} (z - a) / (1 - conj(a) z), have three degrees of freedom:
 the point a that goes to the centre, and the rotation t. The first landmark goes to the centre and
-further ones fix the rotation; without them the area's conformal centre and the curvature do so.
+further ones fix the rotation. Without landmarks, the conformal barycentre and the curvature do so.
 """
 
 from __future__ import annotations
@@ -22,28 +22,29 @@ Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 Real = NDArray[np.float64]
 
-#: Grid in polar coordinates on which two surfaces are compared: radii and directions.
+#: Polar grid on which two surfaces are compared: numbers of radii and directions.
 RADII, DIRECTIONS = 24, 256
-#: Radius of the outermost circle of that grid; nearer to the boundary maps depend on its cut.
+#: Radius of the outermost circle of that grid; closer to the boundary, maps depend on its cut.
 OUTERMOST = 0.95
 
 
 def to_centre(a: complex, turn: float = 0.0) -> Moebius:
-    """Which Moebius map of the unit disk carries a, |a| < 1, to 0, and then turns by an angle?"""
+    """Return the Moebius map of the unit disk that takes a, |a| < 1, to 0 and then rotates."""
     e = complex(np.exp(1j * turn))
     return Moebius(e, -e * a, -complex(a).conjugate(), 1.0)
 
 
 def best_turn(z: Complex, targets: Complex) -> float:
-    """By which angle must points be turned about 0 to lie nearest to their targets?"""
+    """Return the rotation angle about 0 that brings points closest to their targets."""
     return float(np.angle(np.vdot(z, targets)))
 
 
 def without_new_folds(mesh: DiskMesh, z: Complex) -> Complex:
-    """The map, repaired where a Moebius map folded it: it bends edges, and triangles stay straight.
+    """Return the map without the folds that a Moebius map caused.
 
-    That happens to large triangles near the boundary. They are laid flat by
-    :func:`cembench.conformal.folds.interior_without_folds`; elsewhere, and mostly, nothing changes.
+    A Moebius map bends edges, but triangles stay straight, so large triangles near the boundary may
+    fold. They are repaired by :func:`cembench.conformal.folds.interior_without_folds`; mostly
+    nothing changes.
     """
     if (signed_areas(z, mesh.F) > 0).all():
         return z
@@ -57,7 +58,7 @@ def without_new_folds(mesh: DiskMesh, z: Complex) -> Complex:
 
 
 def centred(mesh: DiskMesh, z: Complex, landmarks: Ints) -> Complex:
-    """The map with the first landmark at 0; without landmarks, the centre of the surface's area."""
+    """Return the map with the first landmark at 0, or else the conformal barycentre at 0."""
     if len(landmarks):
         return without_new_folds(mesh, to_centre(complex(z[landmarks[0]]))(z))
     share = vertex_areas(mesh)
@@ -73,7 +74,7 @@ def centred(mesh: DiskMesh, z: Complex, landmarks: Ints) -> Complex:
 def aligned(
     mesh: DiskMesh, z: Complex, landmarks: Ints, first: DiskMesh, z_first: Complex, others: Ints
 ) -> Complex:
-    """The map z of a surface, moved by a Moebius map so that it fits best to that of the first.
+    """Return the map of a surface, aligned with that of the first by a Moebius map.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def aligned(
 
 
 def vertex_areas(mesh: DiskMesh) -> Real:
-    """What area belongs to each vertex: a third of the triangles round it? Shape (n,)."""
+    """Return the vertex areas (n,): a third of the area of the adjacent triangles."""
     p, q, r = (mesh.V[mesh.F[:, c]] for c in range(3))
     area = np.linalg.norm(np.cross(q - p, r - p), axis=1) / 6
     total = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
@@ -113,9 +114,9 @@ def vertex_areas(mesh: DiskMesh) -> Real:
 
 
 def _portrait(mesh: DiskMesh, z: Complex) -> Real:
-    """The logarithm of the conformal factor on the polar grid, its mean removed.
+    """Return the logarithm of the conformal factor on the polar grid, without its mean.
 
-    Its Laplacian is the Gaussian curvature, so it tells noses from cheeks whatever the pose.
+    Its Laplacian is the Gaussian curvature, so it identifies features such as noses in any pose.
     """
     image = np.bincount(
         mesh.F.ravel(), weights=np.repeat(signed_areas(z, mesh.F) / 3, 3), minlength=mesh.n
@@ -135,14 +136,14 @@ def _grid() -> Complex:
 
 
 def _turn_by_curvature(picture: Real, model: Real) -> float:
-    """The turn of `picture` that correlates best with `model`, to a step of the grid."""
+    """Return the rotation of `picture` that correlates best with `model`, to one grid step."""
     spectra = np.conj(np.fft.rfft(picture, axis=1)) * np.fft.rfft(model, axis=1)
     correlation = _radii() @ np.fft.irfft(spectra, n=DIRECTIONS, axis=1)
     return float(2 * np.pi * np.argmax(correlation) / DIRECTIONS)
 
 
 def _refined(picture: Real, model: Real, turn: float) -> Moebius:
-    """The Moebius map from the model's disk to the picture's under which both differ least."""
+    """Return the Moebius map from the model's disk to the picture's with the least difference."""
     weights = np.repeat(_radii(), DIRECTIONS)
     grid, wanted = _grid(), model.ravel()
     # A centre column, and the first direction again behind the last, for the interpolation.

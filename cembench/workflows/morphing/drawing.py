@@ -1,4 +1,4 @@
-"""Pictures of a path: each frame from the front, the side and between, under one light."""
+"""Frames of a morph, drawn from several views under one light."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from cembench.workflows.morphing.path import position
 Real = NDArray[np.float64]
 Pictures = NDArray[np.uint8]
 
-#: The views there are, in the order of the paper's video.
+#: The available views, in the order of the paper's video.
 VIEWS = ("front", "side", "three-quarter")
 
 
 @dataclass(frozen=True)
 class Film:
-    """All that is needed to draw the frames of a path.
+    """The data for drawing the frames of a path.
 
     Parameters
     ----------
     F : int64 (m, 3)
         The triangles.
     stops : float64 (s, n, 3)
-        What the path goes through, moved and scaled so that every frame fits the panel.
+        The stops of the path, moved and scaled so that every frame fits the panel.
     times : float64 (frames,)
         The time of each frame, 0 to 1.
     rotations : float64 (views, 3, 3)
-        From where each panel looks, as :func:`cembench.drawing.camera.view_rotation`.
+        The view of each panel, see :func:`cembench.drawing.camera.view_rotation`.
     side : int
         Pixels along a panel's side.
 
@@ -57,7 +57,7 @@ class Film:
         views: Sequence[str] = VIEWS,
         side: int = 480,
     ) -> Self:
-        """The film of a path through these positions (n, 3) of the vertices of a mesh.
+        """Return the film of a path through these vertex positions (n, 3).
 
         Raises
         ------
@@ -82,21 +82,21 @@ class Film:
         return len(self.times), self.side, self.side * len(self.rotations), 3
 
     def in_window(self, frame: int, view: int) -> Real:
-        """Window coordinates (n, 3) of the vertices: x right, y up, -1 to 1, z to the viewer."""
+        """Return window coordinates (n, 3): x right and y up from -1 to 1, z to the viewer."""
         return position(self.stops, self.times[frame]) @ self.rotations[view].T
 
 
 def check_views(views: Sequence[str]) -> None:
-    """Raise :class:`ParameterError` where there is no such view, or none at all."""
+    """Raise :class:`ParameterError` if a view is unknown, or there is none."""
     for view in views or [""]:
         if view not in VIEWS:
             raise ParameterError(f"view {view!r} is unknown; allowed: {', '.join(VIEWS)}.")
 
 
 def draw_film(film: Film, tell: Callable[[int], object] = lambda frame: None) -> Pictures:
-    """How does each frame look? Pictures uint8 (frames, side, views side, 3).
+    """Draw each frame; return pictures, uint8 (frames, side, views * side, 3).
 
-    `tell` hears of each frame.
+    `tell` is called with each frame number.
     """
     pictures = np.empty(film.shape, dtype=np.uint8)
     for k in range(len(film.times)):

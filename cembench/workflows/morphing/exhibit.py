@@ -1,4 +1,4 @@
-"""A morph as exhibits of a run: its strip (Figure 13) and its registrations (Figure 14)."""
+"""Exhibits of a morph: its strip (Figure 13) and its registrations (Figure 14)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cembench.results.records import MeshOrigin
 from cembench.workflows.morphing.morph import Morph
 from cembench.workflows.morphing.pages import registration_page, strip_page
 
-#: The rows of the paper's tables whose surfaces Figures 13 and 14 show, in their order.
+#: The models of the paper in Figures 13 and 14, in their order.
 IN_THE_FIGURES = ("Liu's Wry Face", "Liu's Neutral Face", "Liu's Smile Face")
 
 
@@ -31,10 +31,10 @@ def lay_down(
     tell: Callable[[str], object] = lambda step: None,
     sides: tuple[int, int] = (240, 420),
 ) -> list[Path]:
-    """Write both exhibits into a run's folder; where are their descriptions?
+    """Write both exhibits to a run's folder; return the paths of their descriptions.
 
-    `figures` are the morph's metrics, `rows_of_paper` what each surface stands for in the paper,
-    empty for one that stands for nothing, `sides` the pixels of a picture on either page.
+    `figures` are the morph's metrics; `rows_of_paper` are the paper's models that the surfaces
+    stand in for, "" for none; `sides` are the pixels of a picture on each page.
     """
     in_paper = rows_of_paper == IN_THE_FIGURES
     origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
@@ -47,7 +47,7 @@ def lay_down(
         f"morph-{stem}",
         "strip.png",
         strip_page(morph, sides[0]),
-        f"From {names[0]} to {names[-1]}: the path at seven moments, from the front and aside.",
+        f"From {names[0]} to {names[-1]}: seven moments of the path, from the front and the side.",
     )
     board = _picture(
         run,
@@ -89,7 +89,7 @@ def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> E
 
 
 def registration_table(figures: dict[str, Any]) -> ExhibitTable:
-    """The metrics of the registrations, a row a surface."""
+    """Return a table of the registration metrics, one row per surface."""
     keys = {
         "surface": "surface",
         "landmark_error_share": "landmark error / size",

@@ -1,4 +1,4 @@
-"""Which vertices of several surfaces are one place: the tip of the nose, a corner of the eye?"""
+"""Landmarks: corresponding vertices of several surfaces, such as the tip of the nose."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from cembench.mesh.triangle_mesh import DiskMesh
 Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
-#: Two landmarks lie in a certain order about the first one when they are so many degrees away from
-#: being seen in one direction, or in opposite ones.
+#: The order of two landmarks about the first one is certain if their directions differ by this many
+#: degrees from equal or opposite ones.
 CLEAR_TURN = 15.0
 
 
 @dataclass(frozen=True)
 class Landmarks:
-    """Places that correspond; the first is the one that goes to the centre of the disk.
+    """Corresponding places on several surfaces; the first goes to the centre of the disk.
 
     Parameters
     ----------
     names : tuple of str
-        What they are called, k of them.
+        The k names.
     vertices : int64 (k, s)
-        The vertex on each of the s surfaces, counted from 0.
+        The vertex of each landmark on each of the s surfaces, counted from 0.
 
     """
 
@@ -44,11 +44,11 @@ class Landmarks:
 def read_landmarks(
     path: Path, meshes: Sequence[DiskMesh], known: Sequence[Mapping[str, int]]
 ) -> Landmarks:
-    """Read the landmarks of surfaces from a CSV file, a row each: name, then one cell a surface.
+    """Read landmarks from a CSV file with rows of a name and one entry per surface.
 
-    A cell is a vertex index counted from 0, or the name of a landmark that the surface has itself.
-    A first row that begins with ``name`` is a heading; empty rows and those after ``#`` are left
-    out.
+    An entry is a vertex index, counted from 0, or the name of a landmark that the surface has. A
+    first row that begins with ``name`` is a heading; empty rows and rows that begin with ``#`` are
+    skipped.
 
     Parameters
     ----------
@@ -57,13 +57,13 @@ def read_landmarks(
     meshes : sequence of DiskMesh
         The surfaces, in the order of the columns.
     known : sequence of mapping
-        The named landmarks that each surface has; empty for a mesh file.
+        The named landmarks of each surface; empty for a mesh file.
 
     Raises
     ------
     ParameterError
-        No such file, or a row with a cell too few or too many, a name that the surface does not
-        have, or whatever :func:`check_landmarks` refuses.
+        The file cannot be read, a row has too few or too many entries, a surface has no landmark
+        of that name, or :func:`check_landmarks` refuses them.
 
     """
     try:
@@ -92,7 +92,9 @@ def read_landmarks(
             [_vertex(*item, where=where) for item in zip(cells[1:], meshes, known, strict=True)]
         )
     if not names:
-        raise ParameterError(f"landmarks {path}: no row in it; leave out --landmarks for none.")
+        raise ParameterError(
+            f"landmarks {path}: the file has no rows; write at least one, or leave out --landmarks."
+        )
     found = Landmarks(tuple(names), np.array(rows, dtype=np.int64))
     check_landmarks(found, meshes)
     return found
@@ -112,7 +114,7 @@ def _vertex(cell: str, mesh: DiskMesh, known: Mapping[str, int], *, where: str) 
 
 
 def common_landmarks(meshes: Sequence[DiskMesh], known: Sequence[Mapping[str, int]]) -> Landmarks:
-    """Which named landmarks have all these surfaces? In the first one's order; perhaps none."""
+    """Return the named landmarks that all surfaces have, in the first one's order."""
     names = tuple(name for name in known[0] if all(name in others for others in known[1:]))
     rows = [[places[name] for places in known] for name in names]
     found = Landmarks(names, np.array(rows, dtype=np.int64).reshape(len(names), len(meshes)))
@@ -121,9 +123,10 @@ def common_landmarks(meshes: Sequence[DiskMesh], known: Sequence[Mapping[str, in
 
 
 def check_landmarks(landmarks: Landmarks, meshes: Sequence[DiskMesh]) -> None:
-    """Raise :class:`ParameterError` where landmarks cannot be right, whatever the maps are.
+    """Raise :class:`ParameterError` if landmarks are wrong for any map.
 
-    That is a name twice, a vertex that is not there, lies on the boundary or has two landmarks.
+    That is: a name is used twice, or a vertex does not exist, is on the boundary, or has two
+    landmarks.
     """
     for name in landmarks.names:
         if landmarks.names.count(name) > 1:
@@ -144,8 +147,8 @@ def check_landmarks(landmarks: Landmarks, meshes: Sequence[DiskMesh]) -> None:
                 )
             if v in on_boundary:
                 raise ParameterError(
-                    f"{where} lies on the boundary, which stays on the circle as the conformal map "
-                    "laid it; choose a vertex inside."
+                    f"{where} is on the boundary, whose image is fixed by the conformal map; "
+                    "choose an interior vertex."
                 )
             seen[v] = name
 
@@ -153,22 +156,22 @@ def check_landmarks(landmarks: Landmarks, meshes: Sequence[DiskMesh]) -> None:
 def check_order(
     names: Sequence[str], first: Complex, other: Complex, surfaces: tuple[str, str]
 ) -> None:
-    """Raise where two landmarks go round the first one the other way on the other surface.
+    """Raise if two landmarks have opposite orders around the first one on two surfaces.
 
     Parameters
     ----------
     names : sequence of str
         The landmarks' names.
     first, other : complex128 (k,)
-        Their places in the disk on two surfaces, the first landmark at 0.
+        Their positions in the disk on two surfaces, with the first landmark at 0.
     surfaces : tuple of str
         The surfaces' names.
 
     Raises
     ------
     ParameterError
-        The order about the first landmark contradicts itself: names were exchanged, or one surface
-        is a mirror image.
+        The orders around the first landmark contradict each other: names were exchanged, or one
+        surface is a mirror image.
 
     """
     turns = [np.imag(np.conj(z[:, None]) * z[None, :]) for z in (first, other)]

@@ -1,4 +1,4 @@
-"""How good is a registration, and how smooth is the path?"""
+"""Metrics of registrations and of the path."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from cembench.workflows.morphing.registration import Registration
 Ints = NDArray[np.int64]
 Real = NDArray[np.float64]
 
-#: Random points on each surface from which distances are taken, besides the vertices.
+#: Number of random points per surface, besides the vertices, for distances.
 SAMPLES = 50_000
 
 
 def size_of(V: Real) -> float:
-    """How large is a surface? The diagonal of its bounding box."""
+    """Return the size of a surface: the diagonal of its bounding box."""
     return float(np.linalg.norm(np.ptp(V, axis=0)))
 
 
 def mean_edge(mesh: DiskMesh) -> float:
-    """How long is an edge in the mean over the triangles' sides?"""
+    """Return the mean length of the triangles' sides."""
     corners = mesh.V[mesh.F]
     return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
 
@@ -37,7 +37,7 @@ def registration_metrics(
     here: Ints,
     there: Ints,
 ) -> dict[str, Any]:
-    """How good is a registration map, and the surface that it carries onto its target?
+    """Return the metrics of a registration map and of the carried surface.
 
     Parameters
     ----------
@@ -56,10 +56,10 @@ def registration_metrics(
     -------
     dict
         `landmark_error_share` is the largest distance in space of a carried landmark from its
-        target, as a share of the target's size (:func:`size_of`); distances are in mean edges of
-        the target and, `carried_to_target` or the other way, the mean and the largest over vertices
-        and random points. Energies and dilatations are those of the registration
-        map; None where a triangle is too thin for a number.
+        target, as a share of the target's size (:func:`size_of`). Distances are in mean edges of
+        the target, in both directions; the mean and the largest over vertices and random points
+        are given. Energies and dilatations are those of the registration map; None if a triangle
+        is too thin for a finite value.
 
     """
     stretch = dilatations(target, registration.uv)
@@ -82,23 +82,23 @@ def registration_metrics(
     sides = ("carried_to_target", "target_to_carried")
     figures["distance_mean_edges"] = max(figures[f"{side}_mean_edges"] for side in sides)
     figures["hausdorff_edges"] = max(figures[f"{side}_max_edges"] for side in sides)
-    if not np.isfinite(figures["dilatation_max"]):  # a triangle thin beyond what numbers hold
+    if not np.isfinite(figures["dilatation_max"]):  # a triangle so thin that the value overflows
         figures |= {"dilatation_mean": None, "dilatation_max": None}
     return figures
 
 
 def distances(carried: Real, F: Ints, target: DiskMesh) -> Real:
-    """How far are points of the carried surface from the target?"""
+    """Return the distances of points on the carried surface from the target."""
     return _to_surface(_samples(carried, F), target.V, target.F)
 
 
 def distances_back(target: DiskMesh, carried: Real, F: Ints) -> Real:
-    """How far are points of the target from the carried surface?"""
+    """Return the distances of points on the target from the carried surface."""
     return _to_surface(_samples(target.V, target.F), carried, F)
 
 
 def _samples(V: Real, F: Ints) -> Real:
-    """The vertices, and random points that are spread evenly over the area."""
+    """Return the vertices, and random points distributed evenly over the area."""
     rng = np.random.default_rng(0)
     p, q, r = (V[F[:, c]] for c in range(3))
     area = np.cumsum(np.linalg.norm(np.cross(q - p, r - p), axis=1))

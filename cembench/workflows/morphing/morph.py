@@ -1,4 +1,4 @@
-"""From conformal maps and landmarks to a path: alignment, registration, transport."""
+"""Compute a morph from conformal maps and landmarks: alignment, registration, transport."""
 
 from __future__ import annotations
 
@@ -20,30 +20,30 @@ from cembench.workflows.morphing.transport import locate
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
-#: What is done to the later surfaces before the path is drawn through them.
+#: How the later surfaces are moved before the path is drawn through them.
 Pose = Literal["similarity", "rigid", "keep"]
 
 
 @dataclass(frozen=True)
 class Morph:
-    """Surfaces that were registered, and the first one's vertices on all of them.
+    """Registered surfaces, with the first one's vertices carried onto all of them.
 
     Parameters
     ----------
     meshes : tuple of DiskMesh
-        The surfaces, s of them.
+        The s surfaces.
     landmarks : Landmarks
-        Which places correspond.
+        The corresponding places.
     maps : tuple of complex128 arrays
-        Conformal maps f_k of the surfaces, as the algorithm gave them.
+        Conformal maps f_k of the surfaces, as the algorithm returned them.
     aligned : tuple of complex128 arrays
-        The same after Moebius maps: m_1 f_1, and the others fitted to it.
+        The same after Moebius maps: m_1 f_1, and the others aligned with it.
     registrations : tuple of Registration
-        r_2, r_3, ...: maps of the later surfaces to the disk of m_1 f_1.
+        Maps r_2, r_3, ... of the later surfaces to the disk of m_1 f_1.
     carried : tuple of float64 (n, 3)
-        The first surface's vertices on each surface, so the first entry is the first surface.
+        The first surface's vertices on each surface; the first entry is the first surface itself.
     stops : tuple of float64 (n, 3)
-        The same after being posed: what the path goes through.
+        The same after posing: the stops of the path.
 
     """
 
@@ -56,14 +56,14 @@ class Morph:
     stops: tuple[Real, ...]
 
     def at(self, time: float) -> Real:
-        """Where are the first surface's vertices at a time from 0 to 1? Shape (n, 3)."""
+        """Return the first surface's vertices, float64 (n, 3), at a time from 0 to 1."""
         return position(self.stops, time)
 
     def metrics(self, frames: int) -> dict[str, Any]:
-        """How good are the registrations, and how smooth is the path in so many frames?
+        """Return the metrics of the registrations and of the path with this many frames.
 
         `largest_acceleration_share` is in sizes of the first surface over the whole time squared;
-        `largest_step_share` how far a vertex goes from one frame to the next, in sizes.
+        `largest_step_share` is the largest movement of a vertex between two frames, in sizes.
         """
         first, places = self.meshes[0], self.landmarks.vertices
         size = size_of(first.V)
@@ -93,7 +93,7 @@ def morph(
     upright: Complex | None = None,
     tell: Callable[[str], object] = lambda step: None,
 ) -> Morph:
-    """Register surfaces to the first one and carry its vertices onto them.
+    """Register surfaces to the first one, and carry its vertices onto them.
 
     Parameters
     ----------
@@ -106,19 +106,19 @@ def morph(
     lam, reach : float
         See :func:`cembench.workflows.morphing.registration.register`.
     pose : "similarity", "rigid" or "keep"
-        Whether a later surface is turned, moved and scaled to the first before the path is drawn;
+        How the later surfaces are fitted to the first before the path is drawn;
         the maps and the metrics of registrations do not depend on it.
     upright : complex128 (n,), optional
-        The first surface as the viewer sees it, right + i up: its map is turned the same way up.
+        The first surface as seen by the viewer, right + i up; its map is rotated to match.
     tell : callable
-        Is told what is being done.
+        Called with a text at each step.
 
     Raises
     ------
     ParameterError
-        Landmarks whose order about the first one contradicts itself.
+        The orders of the landmarks around the first one contradict each other.
     AlgorithmFailed
-        A registration that cannot be found without folds.
+        A registration without folds cannot be found.
 
     """
     places = landmarks.vertices
@@ -153,7 +153,7 @@ def morph(
 
 
 def _posed(on: Real, first: DiskMesh, landmarks: NDArray[np.int64], pose: Pose) -> Real:
-    """Brought to where the first surface is: by the landmarks if they are three, else by all."""
+    """Return the surface fitted to the first, by three or more landmarks, else by all vertices."""
     scale = pose == "similarity"
     if len(landmarks) >= 3:
         even = np.ones(len(landmarks))

@@ -1,4 +1,4 @@
-"""The pages of an exhibit: the strip of a morph, and registrations under a checkerboard."""
+"""Pictures of a morph: a strip of frames, and the registrations under a checkerboard."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Grid = Sequence[Sequence[Picture]]
 
 DPI = 100
 INK, TARGET, PLACE = "#22384d", "#ffffff", "#d11c21"
-#: Frames of a strip, and the views that are its rows.
+#: Number of frames of a strip, and the views of its rows.
 FRAMES, STRIP_VIEWS = 7, ("front", "three-quarter")
 
 
 def strip_page(morph: Morph, side: int = 240) -> bytes:
-    """How does the path look at seven moments? A PNG, a column each, from the front and aside."""
+    """Return a PNG of the path at seven moments, one column each, in two views."""
     times = np.linspace(0, 1, FRAMES)
     film = Film.of(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
     pictures = draw_film(film)
@@ -46,10 +46,10 @@ def strip_page(morph: Morph, side: int = 240) -> bytes:
 def registration_page(
     morph: Morph, side: int = 420, tell: Callable[[str], object] = lambda step: None
 ) -> bytes:
-    """What do f_k, the Moebius map and the registrations do? A PNG, a column for each surface.
+    """Return a PNG of f_k, the Moebius map and the registrations, one column per surface.
 
     Rows: the surface under the checkerboard of its conformal map, and that map; the same for the
-    registered map. Red dots are the landmarks, white rings where the first surface has them.
+    registered map. Red dots are the landmarks, white rings those of the first surface.
     """
     registered = [morph.aligned[0], *(found.uv for found in morph.registrations)]
     rows: list[list[Picture]] = [[], [], [], []]
@@ -84,7 +84,7 @@ def _page(
     notes: Sequence[Sequence[str]] | None = None,
     marks: dict[tuple[int, int], tuple[Complex, Complex]] | None = None,
 ) -> bytes:
-    """Put pictures of equal size on a page, with words above columns, beside rows, and below."""
+    """Return a page of equally large pictures, with text above columns, beside rows, and below."""
     side = len(rows[0][0])
     top, left, below = 46, 24 if sides else 6, 24 if notes else 4
     width = left + side * len(rows[0]) + 6
@@ -124,7 +124,7 @@ def _page(
 
 
 _DOT: dict[str, Any] = {"linestyle": "", "marker": "o"}
-#: Of landmarks, and of the places where they should be.
+#: Colours of landmarks and of their targets.
 _STYLES = (
     _DOT | {"markersize": 5, "color": PLACE},
     _DOT | {"markersize": 10, "markerfacecolor": "none", "markeredgecolor": TARGET},

@@ -1,4 +1,4 @@
-"""The way from surface to surface: a cubic spline in time through three or more, a line for two."""
+"""The path through the surfaces: a cubic spline in time, or a straight line for two."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ Real = NDArray[np.float64]
 
 
 def spline(surfaces: int) -> CubicSpline:
-    """The natural cubic spline of time 0 to 1 that has the value e_k at knot k; (surfaces,).
+    """Return the natural cubic spline on [0, 1] with the unit vector e_k at knot k.
 
-    A spline is linear in its values, so the positions at time t are ``spline(t) @ positions``
-    whatever they are: nothing is kept for each vertex. With two knots it is a straight line.
+    A spline is linear in its values, so the positions at time t are ``spline(t) @ positions``,
+    and nothing is stored per vertex. With two knots it is a straight line.
     """
     return CubicSpline(np.linspace(0, 1, surfaces), np.eye(surfaces), bc_type="natural")
 
 
 def position(surfaces: Sequence[Real] | Real, time: float) -> Real:
-    """Where are the vertices at a time from 0 to 1? `surfaces` are (n, 3) each, as the result."""
+    """Return the vertices (n, 3) at a time from 0 to 1; `surfaces` are (n, 3) each."""
     total = np.zeros_like(surfaces[0])
     for weight, at in zip(spline(len(surfaces))(time), surfaces, strict=True):
         total += weight * at
@@ -29,9 +29,9 @@ def position(surfaces: Sequence[Real] | Real, time: float) -> Real:
 
 
 def largest_acceleration(surfaces: Sequence[Real]) -> float:
-    """How sharply does a vertex turn or hasten at most? Length over the whole time squared.
+    """Return the largest acceleration of a vertex, in length over the whole time squared.
 
-    The second derivative of a cubic spline is linear between knots, so the largest is at a knot.
+    The second derivative of a cubic spline is linear between knots, so the maximum is at a knot.
     """
     knots = np.linspace(0, 1, len(surfaces))
     second = spline(len(surfaces)).derivative(2)
@@ -39,7 +39,7 @@ def largest_acceleration(surfaces: Sequence[Real]) -> float:
 
 
 def largest_step(surfaces: Sequence[Real], times: Real) -> float:
-    """How far does a vertex go at most from one frame to the next? In units of length."""
+    """Return the largest movement of a vertex between two frames, in units of length."""
     weights = np.diff(spline(len(surfaces))(times), axis=0)
     return max((_longest(step, surfaces) for step in weights), default=0.0)
 
@@ -50,10 +50,10 @@ def _longest(weights: Real, surfaces: Sequence[Real]) -> float:
 
 
 def pose_of(points: Real, model: Real, mass: Real, *, scale: bool) -> Callable[[Real], Real]:
-    """Which motion (with a scale, if asked for) brings points nearest to a model?
+    """Return the rigid motion (with a scale, if `scale`) that brings points closest to a model.
 
-    Least squares over `points` and `model` (k, 3), a row of one belonging to that of the other,
-    weighed by `mass` (k,): Umeyama 1991. The answer can be applied to any points.
+    Least squares over corresponding rows of `points` and `model` (k, 3),
+    weighted by `mass` (k,): Umeyama 1991. The result can be applied to any points.
     """
     share = mass / mass.sum()
     middle, goal = share @ points, share @ model

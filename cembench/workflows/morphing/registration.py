@@ -1,14 +1,14 @@
-"""Which map of a surface to the disk keeps its Dirichlet energy small and meets landmarks (34)?
+"""Registration: a map to the disk with small Dirichlet energy that meets landmarks (34).
 
 E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, the boundary held on the circle. The
 minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
 
-A single point has no capacity in the plane: pulled alone, a vertex comes out of its surroundings as
-a spike, and triangles fold. So a landmark here is a small disk round its vertex that is carried
-along: a few more pairs in (34), whose weights sum to 1; with radius 0 it is (34) to the letter.
-Where the minimiser folds all the same, a radial stretch first brings the landmarks to about the
-right distances from the centre; then a smaller lambda moves them part of the way without folds, and
-the next step starts from that image, whose own E_D it lessens, until they meet.
+A single point has no capacity in the plane: a vertex pulled alone leaves its surroundings as a
+spike, and triangles fold. So a landmark here is a small disk around its vertex that moves with it:
+a few more pairs in (34), with weights that sum to 1. With radius 0 it is exactly (34). If the
+minimiser still folds, a radial stretch first brings the landmarks to about the right distances from
+the centre. Then a smaller lambda moves them part of the way without folds, and the next step starts
+from that image and reduces its E_D, until the landmarks meet their targets.
 """
 
 from __future__ import annotations
@@ -31,38 +31,38 @@ Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 Real = NDArray[np.float64]
 
-#: The weight of the landmarks in (34) unless the user says otherwise; E_D of a disk is about pi.
+#: Default weight of the landmarks in (34); E_D of a disk is about pi.
 LAMBDA = 100.0
-#: Radius of a landmark's disk: this share of the way to the next landmark or the boundary, ...
+#: Radius of a landmark's disk: this share of the distance to the next landmark or boundary, ...
 REACH = 0.4
-#: ... but at most this, in units of the disk's radius.
+#: ... but at most this much, in units of the unit disk's radius.
 LARGEST_REACH = 0.15
-#: Steps are taken until the landmarks are so near to their targets, in units of the disk's radius.
+#: Tolerance for landmarks at their targets, in units of the unit disk's radius.
 NEAR = 2e-3
-#: How many steps are taken, and how often lambda is made smaller within one.
+#: Maximum number of steps, and of reductions of lambda within a step.
 MOST_STEPS, MOST_TRIES = 40, 8
-#: What share of the way to the first fold a step goes.
+#: Share of the distance to the first fold that a step takes.
 CAUTION = 0.7
-#: About the capacity of a landmark's disk in the unit disk; only the lambdas tried depend on it.
+#: Approximate capacity of a landmark's disk in the unit disk; used only to choose lambdas.
 CAPACITY = 2.0
-#: Where no landmark moves so far, in its distance to the next, there is no getting on.
+#: Least progress: a landmark's movement as a share of its distance to the next one.
 LEAST_STEP = 0.02
 
 
 @dataclass(frozen=True)
 class Registration:
-    """A registration map and how it was found.
+    """A registration map and how it was computed.
 
     Parameters
     ----------
     uv : complex128 (n,)
         The map; no triangle is folded.
     lambdas : tuple of float
-        The lambda of each step; a single one, as asked for, where nothing folded.
+        The lambda of each step; only the requested one if nothing folded.
     landmark_error : float
         Largest distance of a landmark from its target, in units of the disk's radius.
     exponent : float
-        Of the radial stretch before the first of several steps, 1 for none.
+        Exponent of the radial stretch before the first of several steps; 1 for none.
 
     """
 
@@ -81,27 +81,27 @@ def register(
     lam: float = LAMBDA,
     reach: float = REACH,
 ) -> Registration:
-    """Bring the landmarks of a map to the disk to their targets, by minimising (34).
+    """Move the landmarks of a map to the disk to their targets, by minimising (34).
 
     Parameters
     ----------
     mesh : DiskMesh
         The surface.
     start : complex128 (n,)
-        Its conformal map, already aligned; its boundary values are kept.
+        Its aligned conformal map; the boundary values are kept.
     landmarks : int64 (k,)
-        Vertices inside the surface; with none the start is the answer.
+        Interior vertices; without any, the start is returned.
     targets : complex128 (k,)
-        Where they should come to lie, inside the disk.
+        Their targets, inside the disk.
     lam : float
         The weight of the landmarks.
     reach : float
-        Radius of a landmark's disk, as a share of the way to the next landmark; 0 for a vertex.
+        Radius of a landmark's disk, as a share of the distance to the next landmark; 0: the vertex.
 
     Raises
     ------
     AlgorithmFailed
-        The landmarks cannot be met without folds, however small lambda is.
+        The landmarks cannot be met without folds for any lambda.
 
     """
     if not len(landmarks):
@@ -137,7 +137,7 @@ def _error(z: Complex, landmarks: Ints, targets: Complex) -> float:
 
 @dataclass(frozen=True)
 class _Pairs:
-    """The terms of (34): vertices, where they should go, and weights that sum to 1 a landmark."""
+    """The terms of (34): vertices, targets, and weights that sum to 1 for each landmark."""
 
     vertices: Ints
     targets: Complex
@@ -145,7 +145,7 @@ class _Pairs:
 
 
 def _pairs(F: Ints, z: Complex, landmarks: Ints, targets: Complex, reach: float) -> _Pairs:
-    """The landmarks with the disks round them, each carried by its landmark's displacement."""
+    """Return the terms of the landmarks and their disks, which move with the landmarks."""
     at = z[landmarks]
     radius = np.minimum(reach * _room(at), LARGEST_REACH)
     area = np.bincount(F.ravel(), weights=np.repeat(signed_areas(z, F), 3), minlength=len(z))
@@ -154,14 +154,14 @@ def _pairs(F: Ints, z: Complex, landmarks: Ints, targets: Complex, reach: float)
         away = np.abs(z - at[j])
         v = np.union1d(np.flatnonzero(away < radius[j]), vertex)
         fall = 1 - (away[v] / radius[j]) ** 2 if radius[j] > 0 else np.ones(len(v))
-        w = fall * area[v]  # by area: vertices that crowd somewhere pull no harder there
+        w = fall * area[v]  # by area, so that crowded vertices do not pull harder
         pairs.append((v, z[v] + (targets[j] - at[j]), w / w.sum()))
     vertices, places, weights = zip(*pairs, strict=True)
     return _Pairs(np.concatenate(vertices), np.concatenate(places), np.concatenate(weights))
 
 
 def _room(at: Complex) -> Real:
-    """How far is each landmark from the next one, or from the boundary? Shape (k,)."""
+    """Return the distance (k,) of each landmark from the next one or the boundary."""
     apart = np.abs(at[:, None] - at[None, :])
     np.fill_diagonal(apart, np.inf)
     return np.minimum(apart.min(axis=1), 1 - np.abs(at))
@@ -175,9 +175,9 @@ def _minimisers(
     targets: Complex,
     reach: float,
 ) -> Callable[[float], Complex]:
-    """The function that gives the minimiser of (34) for a lambda, from one analysis of the matrix.
+    """Return a function from lambda to the minimiser of (34), which reuses one symbolic analysis.
 
-    L is the Laplacian of E_D, z the map whose boundary is kept and in which landmarks have disks.
+    L is the Laplacian of E_D; z is the map whose boundary is kept and that defines the disks.
     """
     i, b = mesh.interior, mesh.boundary
     with phase("assembly"):
@@ -207,11 +207,11 @@ def _minimisers(
 def _step(
     z: Complex, F: Ints, minimiser: Callable[[float], Complex], lam: float
 ) -> tuple[Complex, float]:
-    """The minimiser for the largest lambda found, up to `lam`, that folds nothing; and that lambda.
+    """Return the minimiser for the largest lambda found, up to `lam`, without folds; and lambda.
 
-    The way that the landmarks go is about g = 2 lambda / (C + 2 lambda) of the whole, C being the
-    capacity of their disks: about 2, for disks that are small but not very small. From the share
-    of the way up to the first fold follows the next lambda to be tried.
+    The landmarks move about the share g = 2 lambda / (C + 2 lambda) of the distance to their
+    targets. C is the capacity of their disks, about 2 for disks that are small but not very small.
+    The share up to the first fold determines the next lambda to try.
     """
     tried = lam
     for _ in range(MOST_TRIES):
@@ -227,11 +227,11 @@ def _step(
 def radially_stretched(
     mesh: DiskMesh, z: Complex, landmarks: Ints, targets: Complex
 ) -> tuple[Complex, float]:
-    """Which map z |z|^(k-1) brings the landmarks nearest to the right distances from the centre?
+    """Return the map z |z|^(k-1) that best fits the landmarks' distances from the centre.
 
-    It has the same dilatation everywhere, max(k, 1/k): the least that any map between rings has
-    (Groetzsch 1928). k is the least squares fit of log |target| = k log |landmark|; if that folds
-    triangles, which stay straight, k comes nearer to 1.
+    Its dilatation is max(k, 1/k) everywhere, the least of any map between rings (Groetzsch 1928). k
+    is the least-squares fit of log |target| = k log |landmark|; if that folds triangles, which stay
+    straight, k is moved towards 1.
 
     Returns
     -------
@@ -256,9 +256,9 @@ def radially_stretched(
 
 
 def first_fold(z: Complex, new: Complex, F: Ints) -> float:
-    """How far along the straight way from z to `new` does a triangle first lose its area?
+    """Return where on the line from z to `new` a triangle first loses its area.
 
-    A share of the way, in (0, 1]; infinite where `new` has no fold. No triangle of z is folded.
+    A share of the distance, in (0, 1]; infinite if `new` has no fold. z must have no folds.
     """
     if (signed_areas(new, F) > 0).all():
         return np.inf

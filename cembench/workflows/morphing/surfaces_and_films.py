@@ -1,4 +1,4 @@
-"""What `cembench morph` reads, maps and writes: surfaces with landmarks, checked maps, films."""
+"""Inputs and outputs of `cembench morph`: surfaces with landmarks, checked maps, films."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from cembench.workflows.morphing import writers
 from cembench.workflows.morphing.drawing import Film, draw_film
 from cembench.workflows.morphing.morph import Morph
 
-#: Hears what is being done, in words.
+#: Called with a text at each step.
 Tell = Callable[[str], object]
 
 
 def disk_with_landmarks(
     registry: Registry, name: str, faces: int | None = None
 ) -> tuple[DiskMesh, Mapping[str, int]]:
-    """Return the disk of a file or of a registered name, and its landmarks by name.
+    """Return the disk of a mesh file or a registered name, and its landmarks by name.
 
     Raises
     ------
     MeshError
         The file cannot be read, or the surface is not a disk.
     ParameterError
-        Neither a file nor a registered name.
+        The name is neither a mesh file nor a registered surface.
 
     """
     if Path(name).suffix or name not in registry.surfaces:
@@ -62,14 +62,14 @@ def checked_maps(
     timeout: float,
     tell: Tell,
 ) -> list[NDArray[np.complex128]]:
-    """Map each surface to the disk in a process of its own, and check the map.
+    """Map each surface to the disk in its own process, and check the maps.
 
     Raises
     ------
     AlgorithmFailed
-        A surface without a valid map.
+        A surface has no valid map.
     ParameterError
-        An algorithm whose target is not the disk.
+        The algorithm's target is not the disk.
 
     """
     chosen = registry.algorithm(algorithm)
@@ -92,7 +92,7 @@ def checked_maps(
 def write_path(
     found: Morph, outputs: Sequence[Path], frames: int, tell: Tell = lambda words: None
 ) -> None:
-    """Write the meshes or the arrays of a path to every place that is not a film."""
+    """Write the meshes or arrays of a path to the outputs that are not films."""
     times, first = np.linspace(0, 1, frames), found.meshes[0]
     for path in outputs:
         if path.suffix.lower() in writers.ARRAYS and not path.is_dir():
@@ -109,7 +109,7 @@ def write_films(
     size: int,
     tell: Tell = lambda words: None,
 ) -> None:
-    """Draw a path once and write it to every film."""
+    """Draw a path once, and write it to every output that is a film."""
     film = Film.of(found.meshes[0], found.stops, np.linspace(0, 1, frames), views, size)
     pictures = draw_film(film, _frame_of(frames, tell))
     for path in outputs:
@@ -121,6 +121,6 @@ def _frame_of(frames: int, tell: Tell) -> Callable[[int], object]:
 
 
 def rows_of_paper(registry: Registry, surfaces: Sequence[str]) -> tuple[str, ...]:
-    """Which row of the paper's Table 1 each surface stands for; empty for one that does not."""
+    """Return the model of the paper's Table 1 that each surface stands in for; "" for none."""
     roles = paper_roles(registry, [name for name in surfaces if name in registry.surfaces])
     return tuple(roles[name].paper_row if name in roles else "" for name in surfaces)

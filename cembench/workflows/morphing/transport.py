@@ -1,4 +1,4 @@
-"""Where on a surface does a point of the disk lie? The inverse of a map, by point location."""
+"""The inverse of a map: locate points of the disk on the surface."""
 
 from __future__ import annotations
 
@@ -20,17 +20,16 @@ class BarycentricPlaces:
     weights: Real
 
     def carry(self, F: Ints, values: Real) -> Real:
-        """Interpolate values at vertices (n, ...) at these places: (p, ...)."""
+        """Return values at vertices (n, ...) interpolated at these places, (p, ...)."""
         found: Real = np.einsum("pc,pc...->p...", self.weights, values[F[self.faces]])
         return found
 
 
 def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> BarycentricPlaces:
-    """In which triangle of a map without folds lies each point, and where in it?
+    """Locate points in the triangles of a map without folds.
 
-    A tree of boxes (libigl's AABB) finds the triangle; a point of the disk between the circle and
-    the chord of a boundary edge belongs to the place on that chord in the same direction from the
-    centre.
+    A bounding-box tree (libigl's AABB) finds the triangle. A point between the unit circle and the
+    chord of a boundary edge is moved to that chord along its ray from the centre.
 
     Parameters
     ----------
@@ -41,7 +40,7 @@ def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> Barycentric
     boundary : int64 (b,)
         The boundary loop, counter-clockwise.
     points : complex128 (p,)
-        In the closed unit disk.
+        Points in the closed unit disk.
 
     """
     import igl  # slow to load
@@ -54,12 +53,12 @@ def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> Barycentric
 
 
 def _lifted(z: Complex) -> Real:
-    # The library's search is for points in space; in the plane it is no faster.
+    # The library searches in space; its search in the plane is not faster.
     return np.stack([z.real, z.imag, np.zeros(len(z))], axis=1)
 
 
 def _inside_polygon(corners: Complex, points: Complex) -> Complex:
-    """Points outside of the polygon, drawn in towards 0 as far as its edge."""
+    """Return the points, with those outside the polygon moved towards 0 onto its edge."""
     angles = np.unwrap(np.angle(corners))
     first = angles[0]
     turn = first + np.mod(np.angle(points) - first, 2 * np.pi)

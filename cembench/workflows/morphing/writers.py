@@ -1,4 +1,4 @@
-"""A path on disk: a film (GIF, MP4), numbered meshes (OBJ, PLY), or arrays (NPZ), by the name."""
+"""Write a path as a film (GIF, MP4), numbered meshes (OBJ, PLY), or arrays (NPZ), by suffix."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 Real = NDArray[np.float64]
 Pictures = NDArray[np.uint8]
 
-#: Frames in a second.
+#: Frames per second.
 RATE = 24
 FILMS, MESHES, ARRAYS = (".gif", ".mp4"), (".obj", ".ply"), (".npz",)
 
 
 def check_output(path: Path) -> None:
-    """Raise :class:`ParameterError` where a path cannot be written to this place, before work."""
+    """Raise :class:`ParameterError` if a path cannot be written here; called before any work."""
     if path.is_dir():
         return
     suffix = path.suffix.lower()
@@ -43,19 +43,19 @@ def check_output(path: Path) -> None:
 
 
 def files_of(path: Path, frames: int) -> list[Path]:
-    """Which files are written for this output?"""
+    """Return the files that are written for this output."""
     if path.suffix.lower() in (*FILMS, *ARRAYS) and not path.is_dir():
         return [path]
     return mesh_files(path, frames)
 
 
 def write_film(path: Path, pictures: Pictures) -> None:
-    """Write pictures (frames, rows, columns, 3) as GIF or MP4, 24 frames a second.
+    """Write pictures, uint8 (frames, rows, columns, 3), as GIF or MP4 at 24 frames per second.
 
     Raises
     ------
     RecordError
-        The place cannot be written to, or the encoder gave up.
+        The file cannot be written, or the encoder failed.
 
     """
     if path.suffix.lower() == ".gif":
@@ -78,7 +78,7 @@ def _save_gif(file: BinaryIO, pictures: Pictures) -> None:
         Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE)
         for picture in pictures
     ]
-    # GIF counts hundredths of a second: 4, 4, 4, 5, ... come to 24 a second in the mean.
+    # GIF delays are in hundredths of a second: 4, 4, 4, 5, ... average to 24 per second.
     ends = np.round(np.arange(len(images) + 1) * 100 / RATE).astype(int)
     durations = [int(10 * d) for d in np.diff(ends)]
     images[0].save(
@@ -89,7 +89,7 @@ def _save_gif(file: BinaryIO, pictures: Pictures) -> None:
 def _encode_mp4(path: Path, pictures: Pictures) -> None:
     import imageio_ffmpeg
 
-    rows, columns = (side - side % 2 for side in pictures.shape[1:3])  # the codec wants even sides
+    rows, columns = (side - side % 2 for side in pictures.shape[1:3])  # the codec needs even sides
     encoder = imageio_ffmpeg.write_frames(
         str(path),
         (columns, rows),
@@ -105,7 +105,7 @@ def _encode_mp4(path: Path, pictures: Pictures) -> None:
 
 
 def _check_mp4(path: Path, frames: int) -> None:
-    """Raise OSError where a film does not hold so many frames: the encoder reports no full disk."""
+    """Raise OSError if frames are missing, since the encoder does not report a full disk."""
     import imageio_ffmpeg
 
     try:
@@ -113,11 +113,13 @@ def _check_mp4(path: Path, frames: int) -> None:
     except RuntimeError:
         found = 0
     if found != frames:
-        raise OSError(errno.EIO, f"{found} of {frames} frames arrived; is the disk full?")
+        raise OSError(
+            errno.EIO, f"only {found} of {frames} frames were written; the disk may be full"
+        )
 
 
 def mesh_files(path: Path, frames: int) -> list[Path]:
-    """What are numbered meshes called? ``a.obj`` gives a_000.obj; a folder f, f/frame_000.ply."""
+    """Return the numbered files: a_000.obj for ``a.obj``, f/frame_000.ply for a folder f."""
     digits = max(3, len(str(frames - 1)))
     if path.suffix and not path.is_dir():
         return [path.with_stem(f"{path.stem}_{k:0{digits}d}") for k in range(frames)]
@@ -133,12 +135,12 @@ def write_meshes(
 ) -> list[Path]:
     """Write a mesh for each time, with the triangles of `mesh` and the vertices `at` that time.
 
-    All files get their names at the end, so that no half of a sequence is left.
+    All files are renamed at the end, so that no partial sequence is left.
 
     Raises
     ------
     RecordError
-        The place cannot be written to.
+        The files cannot be written.
 
     """
     files = mesh_files(path, len(times))

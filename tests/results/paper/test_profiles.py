@@ -42,12 +42,12 @@ def test_a_profile_takes_the_smallest_models_in_order(profile, count, last):
 
 def test_a_model_without_a_surface_is_said():
     rows = {name: row for name, row in ALL.items() if row != "Foot"}
-    with pytest.raises(RegistryError, match="profile 'quick': no surface stands for Foot; name"):
+    with pytest.raises(RegistryError, match="profile 'quick': no surface stands in for Foot; name"):
         surfaces_of(Profile.quick, registry_of(rows))
 
 
 def test_a_model_with_two_surfaces_is_said():
-    with pytest.raises(RegistryError, match=r"two surfaces stand for Foot: .*, again; only one"):
+    with pytest.raises(RegistryError, match=r"two surfaces stand in for Foot: .*, again; only one"):
         surfaces_of(Profile.quick, registry_of(ALL | {"again": "Foot"}))
 
 

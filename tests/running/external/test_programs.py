@@ -115,7 +115,7 @@ def test_the_time_by_its_own_word_and_that_of_its_start_stand_beside_the_wall_cl
     assert found.own_seconds == (0.000125,)
     outcome, _ = outcome_of("boasts", seconds=pattern)
     (note,) = (n for n in outcome.notes if n.kind is NoticeKind.PROGRAM_SECONDS)
-    assert "it solved for 1e+06 s" in str(note)
+    assert "it reports a solve time of 1e+06 s" in str(note)
     outcome, _ = outcome_of("good", seconds=r"took (\S+) s")
     assert outcome.rounds[0].own_seconds == ()
     assert "printed no solve time" in " ".join(map(str, outcome.notes))

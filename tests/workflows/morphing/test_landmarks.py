@@ -38,8 +38,8 @@ BAD = {
     "unknown name": (f"nose,{i},chin\n", "'chin' is neither .* its landmarks are: tip"),
     "no names": (f"nose,tip,{j}\n", "'tip' is neither .* it has no named landmarks"),
     "a fraction": (f"nose,1.5,{j}\n", "'1.5' is neither a vertex index"),
-    "boundary": (f"nose,{i},{EDGE}\n", "lies on the boundary"),
-    "empty": ("name,a,b\n", "no row in it"),
+    "boundary": (f"nose,{i},{EDGE}\n", "is on the boundary"),
+    "empty": ("name,a,b\n", "has no rows"),
 }
 
 

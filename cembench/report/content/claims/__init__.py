@@ -1,4 +1,4 @@
-"""What the paper's text claims, put to the test on a run: one function a claim."""
+"""Tests of the claims in the paper's text on a run, one function per claim."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
 
-#: Every claim in the order of the paper's text.
+#: All claims in the order of the paper's text.
 CLAIMS: tuple[Callable[[Evidence, Mapping[str, Inspection]], Claim], ...] = (
     premises.delaunay,
     premises.well_conditioned,
@@ -40,5 +40,5 @@ CLAIMS: tuple[Callable[[Evidence, Mapping[str, Inspection]], Claim], ...] = (
 
 
 def claims(evidence: Evidence, inspections: Mapping[str, Inspection]) -> list[Claim]:
-    """All claims with their verdicts on this run."""
+    """Return all claims with their verdicts on this run."""
     return [claim(evidence, inspections) for claim in CLAIMS]

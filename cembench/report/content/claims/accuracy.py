@@ -1,4 +1,4 @@
-"""Claims about how good the maps are."""
+"""Claims about the accuracy of the maps."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ from cembench.report.document import Claim
 from cembench.results.records import Record
 
 Inspections = Mapping[str, Inspection]
-#: "Similar": within this share of the smallest of the three; "slightly": by at most that.
+#: "Similar" means within this share of the smallest of the three; "slightly", by at most that.
 SIMILAR = 0.25
 
 
 def cem_records(evidence: Evidence) -> list[tuple[MeasuredSurface, Record]]:
-    """CEM's records that ended ok or invalid: those with a map that can be judged."""
+    """Return CEM's records that ended ok or invalid, those with a map to judge."""
     series = evidence.series_of(REFERENCE)
     found = [(s, evidence.find(s, series)) for s in evidence.surfaces] if series else []
     return [(s, r) for s, r in found if r is not None and r.outcome.metrics]
 
 
 def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are CEM's maps free of folds?"""
+    """Test the claim that CEM's maps have no folds."""
     found = cem_records(evidence)
     clean = [s for s, r in found if r.outcome.metrics.get("flipped_triangles") == 0]
     folded = [
@@ -44,13 +44,13 @@ def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
         + (f"; folded: {'; '.join(folded)}" if folded else "")
         + f". The repair of folds was needed in {repaired}.",
         verdict_of(len(clean), len(found)),
-        f"{tested_on([s for s, _ in found])} The paper shows it on Left Hand; weights that are "
-        "negative can fold a triangle, and are raised here until none is.",
+        f"{tested_on([s for s, _ in found])} The paper shows it on Left Hand. Negative weights "
+        "can fold a triangle; cembench raises them until no triangle is folded.",
     )
 
 
 def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Do CEM's maps keep angles?"""
+    """Test the claim that CEM's maps preserve angles."""
     found = cem_records(evidence)
     errors = [r.outcome.metrics.get("angle_error_mean_deg") for _, r in found]
     known = [float(e) for e in errors if e is not None]
@@ -67,7 +67,7 @@ def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
         "computed by CEM algorithm preserve angles",
         "Section 5",
         "The mean angular distortion is below 5 degrees, which the paper's worst model (Chinese "
-        "Vase, 4.50) keeps.",
+        "Vase, 4.50) meets.",
         words,
         verdict_of(small, len(known)),
         f"{tested_on([s for s, _ in found])} The pictures are in this report; the bound is ours.",
@@ -75,7 +75,7 @@ def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are most angular distortions of the paper's faces below one degree?"""
+    """Test the claim that most angular distortions of the paper's faces are below one degree."""
     series = evidence.series_of(REFERENCE)
     label = series.label if series else ""
     shares = {
@@ -94,21 +94,21 @@ def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
         "On each of the four faces of Fig. 9 more than half of the corners change by less than one "
         "degree; recomputed from the stored maps.",
         (listed or "None of the four faces is in this run")
-        + f". Of all surfaces of the run it is so on {every} of {len(shares)}.",
+        + f". This holds on {every} of all {len(shares)} surfaces of the run.",
         verdict_of(held, len(named)),
         tested_on(list(named)),
     )
 
 
 def energy_similar(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the energies of FDM, LDM and CEM similar?"""
+    """Test the claim that the energies of FDM, LDM and CEM are similar."""
     return _similar(
         evidence, "energy-similar", "conformal_energy", "the conformal energy", "figures 11 and 12"
     )
 
 
 def deviation_similar(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the standard deviations of the distortions by FDM, LDM and CEM similar?"""
+    """Test the claim that the standard deviations by FDM, LDM and CEM are similar."""
     what = "the standard deviation of the angular distortions"
     return _similar(evidence, "deviation-similar", "angle_error_sd_deg", what, "Fig. 12")
 
@@ -129,13 +129,13 @@ def _similar(evidence: Evidence, name: str, metric: str, what: str, figure: str)
         if worst
         else "No model with all three in this run.",
         verdict_of(held, len(spreads)),
-        f"{tested_on(list(spreads))} What counts as similar is our reading."
+        f"{tested_on(list(spreads))} The meaning of 'similar' is our reading."
         + _reading_of_fdm(evidence),
     )
 
 
 def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the mean distortions of FDM and LDM slightly better than CEM's?"""
+    """Test the claim that the mean distortions of FDM and LDM are slightly better than CEM's."""
     found = _triples(evidence, "angle_error_mean_deg")
     better, held = 0, 0
     gaps = []
@@ -160,14 +160,14 @@ def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim
 
 
 def _reading_of_fdm(evidence: Evidence) -> str:
-    """Say which FDM it is: the public program's, slip included, or the corrected one."""
+    """Return a remark on the FDM variant: the public program, or the corrected one."""
     series = evidence.series_of("fdm")
     if series is None or "public_program" not in series.parameters:
         return ""
     if series.parameters["public_program"]:
         return (
             " FDM is its authors' public program, which turns the map by a + b/2 where the "
-            "middle (a + b)/2 of an edge is meant: the printed figures contain that slip."
+            "middle (a + b)/2 of an edge is meant: the printed figures contain that error."
         )
     return (
         " FDM is the corrected reading; the printed figures contain a slip of its authors' public "
@@ -176,7 +176,7 @@ def _reading_of_fdm(evidence: Evidence) -> str:
 
 
 def _triples(evidence: Evidence, metric: str) -> dict[MeasuredSurface, tuple[float, ...]]:
-    """The figures of FDM, LDM and CEM on the models where all three ended ok."""
+    """Return the figures of FDM, LDM and CEM on the models where all three ended ok."""
     value: Callable[[Record | None], float | None] = lambda r: (  # noqa: E731
         r.outcome.metrics.get(metric) if r is not None and r.outcome.status == "ok" else None
     )

@@ -1,4 +1,4 @@
-"""Claims about time."""
+"""Claims about speed."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ from cembench.results.many import sign_test
 from cembench.results.records import DEFAULT_ROUNDS, Record
 
 Inspections = Mapping[str, Inspection]
-#: A figure agrees with a stated one where it reaches this share of it.
+#: A figure agrees with the paper's if it reaches this share of it.
 ABOUT = 0.9
 
 
 def _compared(evidence: Evidence) -> Iterator[tuple[str, str, list[float]]]:
-    """Name, words for a list, and rates of each algorithm under each policy that has any."""
+    """Yield name, label and rates of each algorithm under each policy that has any."""
     for policy in evidence.policies:
         for algorithm in COMPARED:
             rates, _ = measured_rates(evidence, algorithm, policy)
@@ -51,7 +51,7 @@ def _tally(
     holds: Callable[[str, list[float]], bool],
     told: Callable[[list[float]], str],
 ) -> tuple[str, Verdict]:
-    """What is found of the average rates, and for how many of them does it hold?"""
+    """Return the figures of the average rates, and the verdict on them."""
     found = list(_compared(evidence))
     words = [f"{label}: {told(rates)} (n = {len(rates)})" for _, label, rates in found]
     held = sum(holds(algorithm, rates) for algorithm, _, rates in found)
@@ -60,7 +60,7 @@ def _tally(
 
 
 def _timed(evidence: Evidence) -> list[Record]:
-    """The records on whose seconds the averages rest."""
+    """Return the records whose seconds the averages use."""
     return [
         record
         for record in evidence.records
@@ -69,7 +69,7 @@ def _timed(evidence: Evidence) -> list[Record]:
 
 
 def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Is CEM faster than QIEM, FDM and LDM on every model?"""
+    """Test the claim that CEM is faster than QIEM, FDM and LDM on every model."""
     held = tested = 0
     parts = []
     for _, label, rates in _compared(evidence):
@@ -102,7 +102,7 @@ def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Is the average rate of speedup 8.5 / 17.2 / 4.1?"""
+    """Test the claim that the average rates of speedup are 8.5 / 17.2 / 4.1."""
     found, verdict = _tally(
         evidence,
         lambda algorithm, rates: mean_rate(rates) >= ABOUT * STATED_RATE[algorithm],
@@ -113,7 +113,7 @@ def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
         "with the average rate of the speedup 8.5/17.2/4.1",
         "Section 5, below Eq. (33)",
         f"The arithmetic mean of the rates, as the paper takes it, reaches {ABOUT:.0%} of the "
-        "stated value for each algorithm; the geometric mean is given beside it.",
+        "stated value for each algorithm; the geometric mean is given too.",
         found,
         verdict,
         f"{tested_on(evidence.one_each)} {OURS} In print the geometric means are 6.8 / 12.4 / 3.5, "
@@ -122,7 +122,7 @@ def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does CEM save 89 / 94 / 80 % of the time?"""
+    """Test the claim that CEM saves 89 / 94 / 80 % of the time."""
     found, verdict = _tally(
         evidence,
         lambda algorithm, rates: saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm],
@@ -145,7 +145,7 @@ def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def more_than_80_percent(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does CEM save more than 80 % of the cost on average?"""
+    """Test the claim that CEM saves more than 80 % of the cost on average."""
     found, verdict = _tally(
         evidence,
         lambda _, rates: mean_saving(rates) > 0.8,
@@ -164,7 +164,7 @@ def more_than_80_percent(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does CEM map more than 100,000 triangles in less than a second?"""
+    """Test the claim that CEM maps more than 100,000 triangles in less than a second."""
     series = evidence.series_of(REFERENCE)
     times: list[tuple[float, str, int, str]] = []
     used: list[Record] = []
@@ -193,12 +193,12 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
         "it need not on all larger ones.",
         words,
         timed_verdict(int(bool(smallest and smallest[0] < 1)), int(bool(times)), used),
-        f"{OURS} The machine is in the report's head.",
+        f"{OURS} The head of the report describes the machine.",
     )
 
 
 def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does the printed Table 2 follow from the printed Table 1?"""
+    """Test whether the printed Table 2 follows from the printed Table 1."""
     agree, tested, odd = 0, 0, []
     for model, times in paper.table(1).items():
         for algorithm in COMPARED:
@@ -220,9 +220,9 @@ def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
         "The rate of speedup of CEM algorithm with respect to QIEM, FDM, and LDM, defined by "
         "Eq. (33)",
         "Table 2",
-        "Each printed rate lies within what the rounding of the printed seconds allows.",
+        "Each printed rate agrees with the printed seconds to within their rounding.",
         f"{agree} of {tested} cells agree; not: {'; '.join(odd) or 'none'}. With the misprint the "
         f"mean over FDM would be {spread:.2f}.",
         verdict_of(agree, tested),
-        "Of the printed tables alone; nothing measured takes part.",
+        "This concerns the printed tables only; nothing measured is used.",
     )

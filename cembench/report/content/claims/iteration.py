@@ -15,17 +15,17 @@ from cembench.report.document import Claim
 from cembench.results import paper
 
 Inspections = Mapping[str, Inspection]
-#: Below this share of the energy a rise is rounding.
+#: A rise below this share of the energy is rounding.
 ROUNDING = 1e-12
 
 
 def rises(history: Sequence[float]) -> int:
-    """Return in how many steps the energy rises."""
+    """Return the number of steps in which the energy rises."""
     return sum(_rising(history))
 
 
 def becomes_decreasing(history: Sequence[float]) -> bool:
-    """Whether the energy, once it falls, falls in every further step, and falls in the last one."""
+    """Whether the energy, once it falls, falls in every further step, including the last."""
     rising = _rising(history)
     return not rising[-1] and sorted(rising, reverse=True) == rising
 
@@ -35,7 +35,7 @@ def _rising(history: Sequence[float]) -> list[bool]:
 
 
 def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Judge whether E_C becomes monotonically decreasing."""
+    """Test the claim that E_C becomes monotonically decreasing."""
     histories = {
         s: r.outcome.energy_history
         for s, r in cem_records(evidence)
@@ -55,7 +55,7 @@ def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections)
         "Remark 3",
         "Once E_C falls in a step of CEM's iteration, it falls in all further ones. ('Become' "
         "allows a rise at first.)",
-        f"so on {len(become)} of {len(histories)} surfaces, on {len(falling)} of them in every step"
+        f"true on {len(become)} of {len(histories)} surfaces, in every step on {len(falling)}"
         + (f"; steps that rise: {'; '.join(rising)}" if rising else ""),
         verdict_of(len(become), len(histories)),
         f"{tested_on(list(histories))} Iteration ends after the first step that changes E_C by "
@@ -64,7 +64,7 @@ def energy_decreases_monotonically(evidence: Evidence, inspections: Inspections)
 
 
 def iteration_lowers_energy(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does the boundary iteration decrease E_C well?"""
+    """Test the claim that the boundary iteration decreases E_C well."""
     found = [(s, r) for s, r in cem_records(evidence) if len(r.outcome.energy_history) > 1]
     drops = {s: 1 - h[-1] / h[0] for s, r in found if (h := r.outcome.energy_history)[0] > 0}
     falls = list(drops.values())
@@ -85,7 +85,7 @@ def iteration_lowers_energy(evidence: Evidence, inspections: Inspections) -> Cla
 
 
 def inversion_converges_better(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does iteration (30) converge better than (23)?"""
+    """Test the claim that iteration (30) converges better than (23)."""
     variants = [s for s in evidence.series if s.algorithm == REFERENCE]
     with_it = [s for s in variants if s.parameters.get("inversion") is True]
     without = [s for s in variants if s.parameters.get("inversion") is False]
@@ -109,7 +109,7 @@ def inversion_converges_better(evidence: Evidence, inspections: Inspections) -> 
         "Remark 3",
         "CEM with the inversion (30) ends with an E_C not above that of CEM without it (23), under "
         "the same stopping rule.",
-        f"so on {better} of {tested} surfaces"
+        f"true on {better} of {tested} surfaces"
         if tested
         else "This run has no CEM without inversion; measure it into the same folder with "
         "`cembench run ... -a cem -p cem.inversion=False`.",
@@ -119,7 +119,7 @@ def inversion_converges_better(evidence: Evidence, inspections: Inspections) -> 
 
 
 def at_most_20_iterations(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does CEM take as many iterations as printed?"""
+    """Test the claim of at most 20 iterations, and compare with the printed numbers."""
     pairs = []
     for surface, record in cem_records(evidence):
         printed = paper.table(1)[surface.paper_row]["cem_iterations"] if surface.paper_row else None

@@ -1,4 +1,4 @@
-"""Claims about the meshes, the theory, and surfaces with holes."""
+"""Claims about meshes, the theory, and surfaces with holes."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
 
 Inspections = Mapping[str, Inspection]
-#: How far out of a convex hull of size 1 rounding may bring a point.
+#: Rounding tolerance for points outside a convex hull of size 1.
 ROUNDING = 1e-12
-#: The eigenvalues of K are computed densely, on surfaces up to so many vertices.
+#: Maximum number of vertices for the dense eigenvalues of K.
 DENSE = 3_000
 
 
 def delaunay(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Are the meshes Delaunay, as the paper supposes?"""
+    """Test the premise that the meshes are Delaunay."""
     surfaces = evidence.surfaces
     good = [s for s in surfaces if s.non_delaunay_share == 0]
     odd = [f"{s.title}: {s.non_delaunay_share:.1%}" for s in surfaces if s.non_delaunay_share]
@@ -44,7 +44,7 @@ def delaunay(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def well_conditioned(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Do the meshes satisfy Definition 1?"""
+    """Test the claim that meshes satisfy Definition 1."""
     notices: dict[str, tuple[Notice, ...]] = {}
     for record in evidence.records:
         notices[record.cell.mesh_hash] = record.mesh.notices
@@ -67,7 +67,7 @@ def well_conditioned(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Is K positive, with spectral radius 1 attained once (Corollary 1)?"""
+    """Test that K is positive and 1 is its simple, largest eigenvalue (Corollary 1)."""
     held, tested = 0, []
     parts = []
     for surface in evidence.surfaces:
@@ -88,19 +88,19 @@ def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Claim:
         "Corollary 1; K is positive by Theorem 2",
         f"All eigenvalues of K (Eq. 27) on every surface of the run with at most {DENSE:,} "
         "vertices, and the sign of its entries.",
-        "; ".join(parts) or f"No surface of at most {DENSE:,} vertices is kept in this run.",
+        "; ".join(parts) or f"This run stores no surface of at most {DENSE:,} vertices.",
         verdict_of(held, len(tested)),
         tested_on(tested),
     )
 
 
 def spectrum_of_iteration(mesh: TriangleMesh) -> tuple[float, float, float]:
-    """The smallest entry of K (Eq. 27), and the moduli of its two largest eigenvalues."""
+    """Return the smallest entry of K (Eq. 27) and the moduli of its two largest eigenvalues."""
     return _spectrum(iteration_matrix_of(mesh, cotangent_laplacian(mesh.V, mesh.F)))
 
 
 def iteration_matrix_of(mesh: TriangleMesh, L: sparse.sparray) -> NDArray[np.float64]:
-    """K (Eq. 27) of any Laplacian on the edges of the mesh, dense (B, B)."""
+    """Return K (Eq. 27), dense (B, B), for any Laplacian on the edges of the mesh."""
     dense = L.toarray()
     i, b = mesh.interior, mesh.loops[0]
     inner = np.linalg.solve(dense[np.ix_(i, i)], dense[np.ix_(i, b)])
@@ -120,7 +120,7 @@ def _small_disks(evidence: Evidence) -> Iterator[tuple[MeasuredSurface, Triangle
 
 
 def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does K map boundary points into their convex hull (Remark 4)?"""
+    """Test that K maps boundary points into their convex hull (Remark 4)."""
     out: dict[MeasuredSurface, float] = {}
     for surface, mesh in _small_disks(evidence):
         K = iteration_matrix_of(mesh, cotangent_laplacian(mesh.V, mesh.F))
@@ -132,9 +132,9 @@ def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
         "the matrix K, defined as in Theorem 2, maps all the entries of a vector f to their "
         "convex hull",
         "Remark 4",
-        "Of points on the unit circle and of hundred random sets, no image lies outside their "
+        "For points on the unit circle and a hundred random sets, no image is outside their "
         "convex hull by more than rounding; the largest distance is given.",
-        listed or f"No surface of at most {DENSE:,} vertices is kept in this run.",
+        listed or f"This run stores no surface of at most {DENSE:,} vertices.",
         verdict_of(held, len(out)),
         f"{tested_on(list(out))} It follows from K > 0 and K 1 = 1, so it can fail where a weight "
         "is negative.",
@@ -142,7 +142,7 @@ def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def largest_escape(K: NDArray[np.float64], sets: int = 100) -> float:
-    """How far outside the convex hull of f can K f lie, over sets of points f of size 1?"""
+    """Return the largest distance of K f outside the convex hull of f, over sets f of size 1."""
     n = len(K)
     rng = np.random.default_rng(0)
     points = np.exp(2j * np.pi * np.arange(n) / n)[:, None]
@@ -151,14 +151,14 @@ def largest_escape(K: NDArray[np.float64], sets: int = 100) -> float:
     )
     points /= np.abs(points).max(axis=0)
     images = K @ points
-    # A point lies in the hull if it is nowhere farther out than the points themselves.
+    # A point is in the hull if it is not farther out than the points in any direction.
     turns = np.exp(-1j * np.linspace(0, 2 * np.pi, 64, endpoint=False))
     found = ((turn * images).real.max(axis=0) - (turn * points).real.max(axis=0) for turn in turns)
     return float(max(escape.max() for escape in found))
 
 
 def other_weights(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does Corollary 1 hold for any positive weights (Remark 5)?"""
+    """Test that Corollary 1 holds for any positive weights (Remark 5)."""
     held, tested, parts = 0, [], []
     for surface, mesh in _small_disks(evidence):
         if definition_1_notices(mesh.F, mesh.n, mesh.loops):
@@ -180,14 +180,14 @@ def other_weights(evidence: Evidence, inspections: Inspections) -> Claim:
         "K > 0, its largest eigenvalue 1 and all others smaller, with the weight 1 on every edge "
         "(Tutte) and with random weights from 0.01 to 100, on each small surface that satisfies "
         "Definition 1.",
-        "; ".join(parts) or f"No such surface of at most {DENSE:,} vertices is kept in this run.",
+        "; ".join(parts) or f"This run stores no such surface of at most {DENSE:,} vertices.",
         verdict_of(held, len(tested)),
         tested_on(tested),
     )
 
 
 def _positive_laplacians(mesh: TriangleMesh) -> Iterator[sparse.csc_array]:
-    """Laplacians with weights 1, and random ones, on the edges of the mesh."""
+    """Yield Laplacians on the edges of the mesh with weights 1 and with random weights."""
     edges = sparse.triu(sparse.csr_array(vertex_graph(mesh.F, mesh.n)), k=1)
     rng = np.random.default_rng(0)
     for weights in (np.ones(edges.nnz), 10 ** rng.uniform(-2, 2, edges.nnz)):
@@ -197,7 +197,7 @@ def _positive_laplacians(mesh: TriangleMesh) -> Iterator[sparse.csc_array]:
 
 
 def circular_holes(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does the generalized CEM map a surface with holes to a disk with circular holes?"""
+    """Test that the generalized CEM maps surfaces with holes to a disk with circular holes."""
     found = [
         (r, float(off))
         for r in evidence.records
@@ -213,7 +213,7 @@ def circular_holes(evidence: Evidence, inspections: Inspections) -> Claim:
         "the generalized CEM algorithm is aimed to find a conformal map f that maps M to a unit "
         "disk with circular holes",
         "Section 3.3",
-        "Every boundary's image lies within 1 % of its radius from a circle.",
+        "Every boundary's image is within 1 % of its radius from a circle.",
         (listed or "No algorithm for surfaces with holes in this run.") + shown,
         verdict_of(round_, len(found)),
         tested_on(

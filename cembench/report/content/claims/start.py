@@ -1,4 +1,4 @@
-"""Claims about the linear map that CEM starts from (Section 3.1)."""
+"""Claims about CEM's initial linear map (Section 3.1)."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from cembench.report.document import Claim
 
 Inspections = Mapping[str, Inspection]
 Complex = NDArray[np.complex128]
-#: The start is solved for anew on surfaces up to so many vertices.
+#: Maximum number of vertices of surfaces on which the initial map is recomputed.
 MOST_VERTICES = 20_000
-#: Two solutions are the same where they differ by less, relative to their size.
+#: Solutions are equal if they differ by less, relative to their size.
 SAME = 1e-8
-#: Share of the triangles that count as near p, and their least number.
+#: Share of the triangles that count as near p, and their minimum number.
 NEAR, LEAST_NEAR = 0.01, 10
 
 
 class Solved:
-    """Solutions with symmetric matrices, and what they took, counted."""
+    """Solves symmetric systems, and counts factorisations and columns."""
 
     def __init__(self) -> None:
         self.factorisations = 0
         self.columns = 0
 
     def __call__(self, A: sparse.sparray, rhs: NDArray[Any]) -> NDArray[Any]:
-        """A^-1 rhs, rhs (k,) or (k, columns); a complex column is two real ones."""
+        """Return A^-1 rhs, for rhs (k,) or (k, columns); a complex column counts as two."""
         self.factorisations += 1
         width = 1 if rhs.ndim == 1 else rhs.shape[1]
         self.columns += width * (2 if np.iscomplexobj(rhs) else 1)
@@ -45,7 +45,7 @@ class Solved:
 
 
 def pinned(solve: Solved, L: sparse.csr_array, rhs: Complex, k: int) -> Complex:
-    """Eq. 18 with any index: the solution of L f = rhs that is 0 at k (Theorem 1)."""
+    """Return the solution of L f = rhs that is 0 at k (Eq. 18 with any index, Theorem 1)."""
     u = np.delete(np.arange(L.shape[0]), k)
     f = np.zeros(L.shape[0], dtype=np.complex128)
     f[u] = solve(L[u][:, u], rhs[u])
@@ -55,10 +55,10 @@ def pinned(solve: Solved, L: sparse.csr_array, rhs: Complex, k: int) -> Complex:
 def condensed(
     solve: Solved, L: sparse.csr_array, rhs: Complex, w: NDArray[np.int64], zero: int
 ) -> Complex:
-    """Eq. 21: the solution of the same system, 0 at `zero`, by the Schur complement of L_ww.
+    """Return the solution of the same system, 0 at `zero`, by the Schur complement (Eq. 21).
 
-    By Woodbury's formula: L_vv is solved with for the three columns of L_vw, then a system of order
-    3 remains, which is singular as L is; its least solution is taken.
+    Woodbury's formula is used: L_vv is solved for the three columns of L_vw, which leaves a system
+    of order 3. It is singular, as L is; its least-norm solution is taken.
     """
     v = np.setdiff1d(np.arange(L.shape[0]), w)
     L_vw = L[v][:, w].toarray()
@@ -71,7 +71,7 @@ def condensed(
 
 
 def start_system(mesh: TriangleMesh) -> tuple[sparse.csr_array, Complex, NDArray[np.int64]]:
-    """L, b (Eqs. 6, 14) and the corners of the triangle with the pole."""
+    """Return L, b (Eqs. 6, 14) and the corners of the triangle with the pole."""
     corners, values = pole(mesh.V, mesh.F)
     rhs = np.zeros(mesh.n, dtype=np.complex128)
     rhs[corners] = values
@@ -79,7 +79,7 @@ def start_system(mesh: TriangleMesh) -> tuple[sparse.csr_array, Complex, NDArray
 
 
 def apart(f: Complex, g: Complex) -> float:
-    """How far apart are two solutions that differ by a constant, relative to their size?"""
+    """Return the difference of two solutions up to a constant, relative to their size."""
     difference = f - g
     difference = difference - difference.mean()
     return float(np.abs(difference).max() / np.abs(f - f.mean()).max())
@@ -93,7 +93,7 @@ def _disks(evidence: Evidence) -> Iterator[tuple[MeasuredSurface, TriangleMesh]]
 
 
 def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Can any vertex be pinned (Theorem 1)?"""
+    """Test the claim that any vertex can be pinned (Theorem 1)."""
     off: dict[MeasuredSurface, float] = {}
     for surface, mesh in _disks(evidence):
         L, rhs, corners = start_system(mesh)
@@ -110,14 +110,14 @@ def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
         f"the same map up to a constant, within {SAME:g} of its size.",
         f"so on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
         if off
-        else f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(held, len(off)),
         tested_on(list(off)),
     )
 
 
 def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Does (21) give the same as (18), for more work?"""
+    """Test the claim that (21) gives the same as (18) with more work."""
     off: dict[MeasuredSurface, float] = {}
     less, work = 0, ""
     for surface, mesh in _disks(evidence):
@@ -140,7 +140,7 @@ def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
         "no more matrices and solves for fewer columns: counted, not timed.",
         f"the same on {same} of {len(off)} surfaces, at most {max(off.values()):.1e} apart{work}"
         if off
-        else f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(min(same, less), len(off)),
         f"{tested_on(list(off))} (21) is solved by Woodbury's formula, as the paper says it can "
         "be: three columns, of orders that differ by two.",
@@ -148,7 +148,7 @@ def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
-    """Is the angular distortion of the map (12) large near p and small at the boundary?"""
+    """Test the claim that the distortion of map (12) is large near p and small at the boundary."""
     ratios: dict[MeasuredSurface, tuple[float, float]] = {}
     for surface, mesh in _disks(evidence):
         ratios[surface] = near_and_at_boundary(mesh)
@@ -164,7 +164,7 @@ def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
         "Section 3.1, below Eq. (12)",
         f"In degrees, the mean over the {NEAR:.0%} of the triangles nearest to p (at least "
         f"{LEAST_NEAR}) is above that over the triangles at the boundary.",
-        listed or f"No disk of at most {MOST_VERTICES:,} vertices is kept in this run.",
+        listed or f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(held, len(ratios)),
         f"{tested_on(list(ratios))} On a flat disk with p in its middle Eq. (11) with the natural "
         "boundary has the solution 1 / z + conj(z), whose |mu| is |z|^2: conformal at p, where "
@@ -174,7 +174,7 @@ def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
 
 
 def near_and_at_boundary(mesh: TriangleMesh) -> tuple[float, float]:
-    """Mean angular distortion of the map (12) in degrees: near p, and at the boundary."""
+    """Return the mean angular distortion of map (12) in degrees, near p and at the boundary."""
     L, rhs, corners = start_system(mesh)
     f = pinned(Solved(), L, rhs, mesh.n - 1)
     errors = angle_errors(mesh, f).mean(axis=1)

@@ -1,4 +1,4 @@
-"""What verdicts have in common: when one is given, and on what it rests."""
+"""Verdicts on claims: when one is given, and the surfaces it is based on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ OURS = (
 
 
 def verdict_of(held: int, tested: int) -> Verdict:
-    """Holds everywhere, somewhere, nowhere, or was not tested?"""
+    """Return the verdict: holds everywhere, in part, nowhere, or was not tested."""
     if tested == 0:
         return "not tested here"
     if held == tested:
@@ -25,9 +25,9 @@ def verdict_of(held: int, tested: int) -> Verdict:
 
 
 def timed_verdict(held: int, tested: int, records: Iterable[Record]) -> Verdict:
-    """Give a verdict that rests on seconds: none where a record has too few rounds for an interval.
+    """Return a verdict based on seconds; none if a record has too few rounds for an interval.
 
-    Of one round nobody can say how far the next one would be.
+    A single round does not show how much the next one would differ.
     """
     timed = [r for r in records if r.outcome.median_seconds is not None]
     if tested and any(seconds_interval(record) is None for record in timed):
@@ -36,7 +36,7 @@ def timed_verdict(held: int, tested: int, records: Iterable[Record]) -> Verdict:
 
 
 def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:
-    """On what kind of surfaces a verdict rests."""
+    """Return a sentence on the kinds of surfaces behind a verdict."""
     kinds = {
         "model": "the paper's own models",
         "stand-in": "stand-ins for the paper's models",
@@ -53,5 +53,5 @@ def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:
 
 
 def under(policy: str, evidence: Evidence) -> str:
-    """Which policy a figure is of, where the run has several."""
+    """Return the policy of a figure if the run has several, else ""."""
     return f" ({policy})" if len(evidence.policies) > 1 else ""

@@ -1,1 +1,1 @@
-"""The figures of a report, one a file: from the run's records to a plot, which others draw."""
+"""The figures of a report, one per file; each turns records into plot data."""

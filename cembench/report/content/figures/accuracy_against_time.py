@@ -1,4 +1,4 @@
-"""Which algorithms give the best accuracy for their time (Pareto)?"""
+"""Plot of accuracy against time, with the Pareto front of the algorithms."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ METRIC = "angle_error_mean_deg"
 
 
 def accuracy_against_time(evidence: Evidence) -> Plot | None:
-    """A point for each cell, relative to the best on its surface, and the middle of each cloud."""
+    """Return a plot with a point per cell, relative to the best on its surface, and the means."""
     panels = tuple(p for policy in evidence.policies if (p := _panel(evidence, policy)))
     if not panels:
         return None
@@ -22,11 +22,11 @@ def accuracy_against_time(evidence: Evidence) -> Plot | None:
         "accuracy-against-time",
         "Accuracy against time, relative to the best on each surface",
         panels,
-        "Right: times as slow as the fastest algorithm on the same surface; up: times the smallest "
-        "mean angular distortion there. At (1, 1) an algorithm is best in both. Joined points are "
-        "the geometric means of the algorithms that no other one beats in both; maps to the disk "
-        "alone.",
-        "A cloud of points for each algorithm; the nearer to the lower left corner, the better.",
+        "Horizontal: time relative to the fastest algorithm on the same surface. Vertical: mean "
+        "angular distortion relative to the smallest there. At (1, 1) an algorithm is best in "
+        "both. Joined points are the geometric means of the algorithms that no other algorithm "
+        "beats in both. Maps to the disk only.",
+        "A cloud of points for each algorithm; closer to the lower left corner is better.",
     )
 
 
@@ -58,7 +58,7 @@ def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
 
 
 def _middle(label: str, cloud: Sequence[Point]) -> Point:
-    """Geometric mean of a cloud."""
+    """Return the geometric mean of a cloud of points."""
     x, y = (float(np.exp(np.mean(np.log([p[k] for p in cloud])))) for k in (0, 1))
     return Point(x, y, label)
 
@@ -68,7 +68,7 @@ def _beats(one: Point, other: Point) -> bool:
 
 
 def _figures(record: Record) -> tuple[float, float] | None:
-    """Seconds and mean distortion; None where the cell has not both, above zero."""
+    """Return seconds and mean distortion; None unless both are known and positive."""
     outcome = record.outcome
     error = outcome.metrics.get(METRIC)
     if outcome.status != "ok" or not outcome.median_seconds or not error:

@@ -1,4 +1,4 @@
-"""Figure 9: how the angular distortions are distributed."""
+"""Figure 9: histograms of the angular distortions."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
 #: The models of the paper's figure, in its order.
 MODELS = ("Liu's Neutral Face", "Liu's Smile Face", "Liu's Wry Face", "Liu's Pouting Face")
-#: Degrees that the paper's figure is about.
+#: Degree threshold of the paper's figure.
 SHOWN = 4.0
 
 
 def angle_histograms(
     evidence: Evidence, inspections: Mapping[str, Inspection]
 ) -> tuple[Plot | None, list[Gap]]:
-    """The plot of the paper's models that the run has, and a gap for each of the others."""
+    """Return the plot of the paper's models in the run, and a gap for each missing one."""
     series = evidence.series_of(REFERENCE)
     panels, gaps = [], []
     for model in MODELS:
@@ -41,8 +41,8 @@ def angle_histograms(
         "figure-9",
         "Histograms of the angular distortion of CEM's maps",
         tuple(panels),
-        f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps; in "
-        f"each heading the share below one degree. Bars beyond {SHOWN:g} degrees are left out.",
+        f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps. Each "
+        f"heading gives the share below one degree. Bars above {SHOWN:g} degrees are left out.",
         "Bars that are highest near zero degrees and fall off quickly.",
         "Figure 9",
     )
@@ -63,7 +63,7 @@ def _panel(title: str, angles: Angles) -> PlotPanel:
 def histogram(
     name: str, angles: Angles, look: SeriesStyle, shown: float = LAST, kind: str = "bars"
 ) -> PlotSeries:
-    """The bins up to so many degrees, in percent of all corners."""
+    """Return the bins up to `shown` degrees, in percent of all corners."""
     count = round(shown / BIN)
     middles = (np.arange(count) + 0.5) * BIN
     shares = 100 * angles.shares[:count]

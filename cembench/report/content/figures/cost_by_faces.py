@@ -1,4 +1,4 @@
-"""Figure 10: what a map costs against the number of triangles, with fitted exponents."""
+"""Figure 10: cost of a map against the number of triangles, with fitted exponents."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from cembench.report.palette import SeriesStyle, looks
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, through
 from cembench.results import paper
 
-#: Fewer points determine no exponent that says anything.
+#: Minimum number of points for a meaningful exponent.
 FEWEST = 3
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Seconds = factor * faces ** exponent, by least squares of logarithms; `error` is the SE."""
+    """Seconds = factor * faces ** exponent, fitted to logarithms; `error` is the standard error."""
 
     exponent: float
     factor: float
@@ -28,7 +28,7 @@ class Fit:
 
 
 def fit(points: Sequence[Point]) -> Fit | None:
-    """Which power law runs through these (faces, seconds)? None for too few or equal sizes."""
+    """Return the power law fitted to (faces, seconds); None for too few or equal sizes."""
     if len(points) < FEWEST or len({p.x for p in points}) < FEWEST:
         return None
     x, y = (np.log([p[k] for p in points]) for k in (0, 1))
@@ -40,7 +40,7 @@ def fit(points: Sequence[Point]) -> Fit | None:
 
 
 def measured_points(evidence: Evidence, label: str, policy: str) -> list[Point]:
-    """(faces, seconds, surface) of every cell of a series that has times."""
+    """Return (faces, seconds, surface) of every timed cell of a series."""
     series = next(s for s in evidence.series if s.label == label)
     found = []
     for surface in evidence.surfaces:
@@ -51,7 +51,7 @@ def measured_points(evidence: Evidence, label: str, policy: str) -> list[Point]:
 
 
 def printed_points(algorithm: str) -> list[Point]:
-    """(faces, seconds, model) of the paper's Table 1."""
+    """Return (faces, seconds, model) from the paper's Table 1."""
     return [
         Point(paper.faces(model), seconds, model)
         for model, row in paper.table(1).items()
@@ -60,7 +60,7 @@ def printed_points(algorithm: str) -> list[Point]:
 
 
 def cost_by_faces(evidence: Evidence) -> Plot:
-    """A panel for each way of solving, and one of the printed seconds."""
+    """Return a plot with a panel for each policy, and one for the printed seconds."""
     panels = []
     for policy in evidence.policies:
         groups = [
@@ -75,9 +75,9 @@ def cost_by_faces(evidence: Evidence) -> Plot:
         "figure-10",
         "Computational cost against number of triangles",
         tuple(panels),
-        "Seconds against triangles on logarithmic axes; straight lines are fitted powers, whose "
-        "exponents stand in the table below. Here all surfaces of the run count, also those that "
-        "are not in the paper; the printed seconds are of another machine.",
+        "Seconds against triangles on logarithmic axes. Lines are fitted power laws, whose "
+        "exponents are in the table below. All surfaces of the run are included, even those not in "
+        "the paper; the printed seconds are from a different machine.",
         "Points along straight lines that rise from left to right, one for each algorithm.",
         "Figure 10",
     )
@@ -101,7 +101,7 @@ def _panel(groups: Sequence[tuple[str, SeriesStyle, list[Point]]], title: str) -
 
 
 def exponents_table(evidence: Evidence) -> Table:
-    """The fitted exponents, printed and here, with standard errors and n."""
+    """Return a table of the fitted exponents, printed and measured, with standard errors and n."""
     columns = [Column("algorithm", numeric=False)]
     for group in ("printed", *(f"here, {policy}" for policy in evidence.policies)):
         columns += [Column("exponent", group), Column("n", group)]
@@ -119,9 +119,9 @@ def exponents_table(evidence: Evidence) -> Table:
         "Fitted exponents: seconds grow as the number of triangles to this power",
         tuple(columns),
         tuple(rows),
-        "Least squares of logarithms; ± one standard error. The size of a surface is not all that "
-        "matters: iterations differ from surface to surface.",
-        (f"fewer than {FEWEST} sizes determine no exponent",),
+        "Least squares of logarithms; ± one standard error. Iterations also "
+        "differ between surfaces.",
+        (f"an exponent needs at least {FEWEST} sizes",),
     )
 
 

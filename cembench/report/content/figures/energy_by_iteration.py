@@ -12,7 +12,7 @@ MODELS = ("Chinese Vase", "Bourbon Bottle", "David Head", "Human Brain")
 
 
 def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
-    """The plot of the paper's models that the run has, and a gap for each of the others."""
+    """Return the plot of the paper's models in the run, and a gap for each missing one."""
     panels = []
     gaps = []
     for model in MODELS:
@@ -28,7 +28,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
         "figure-8",
         "Conformal energy against iterations of CEM",
         tuple(panels),
-        "E_C of the start (0) and after each iteration. The last value need not be the smallest: "
+        "E_C at the start (0) and after each iteration. The last value need not be the smallest: "
         "CEM's iteration ends after the first step that changes E_C by less than the tolerance. "
         "Curves other than CEM's are not in the paper.",
         "For each surface, a curve of the conformal energy that falls with the iterations.",
@@ -38,10 +38,10 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
 
 
 def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> PlotPanel | None:
-    """The energies of CEM's iterations on a surface; None where there are none.
+    """Return a panel of the energies of CEM's iterations on a surface; None if there are none.
 
-    CEM with other parameters, and algorithms that are not in the paper and tell E_C after each
-    iteration, have curves of their own.
+    CEM with other parameters, and algorithms not in the paper that report E_C after each iteration,
+    have their own curves.
     """
     shown = []
     for series in evidence.disk_series:
@@ -65,11 +65,11 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
 
 
 def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
-    """What is missing where a run does not have a model's map by CEM."""
+    """Return the gap for a model without a map by CEM in the run."""
     surface = evidence.standing_for(model)
     series = evidence.series_of(REFERENCE)
     record = evidence.find(surface, series) if surface and series else None
-    why = evidence.why_not(record) if surface else "no surface of this run is or stands for it"
+    why = evidence.why_not(record) if surface else "no surface of this run is or stands in for it"
     return Gap(
         f"{figure}: {model}",
         f"no map of {model} by CEM: {why}.",

@@ -1,4 +1,4 @@
-"""Figures 11 and 12: energy, and mean and SD of the angular distortion, over the models."""
+"""Figures 11 and 12: energy, and mean and SD of the angular distortion, by model."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from cembench.results import paper
 
 
 def energy_over_models(evidence: Evidence) -> Plot:
-    """Figure 11: the conformal energy of every algorithm on every model of the run."""
+    """Return Figure 11: the conformal energy of every algorithm on every model of the run."""
     axis = Axis("conformal energy E_C", log=True)
     return Plot(
         "figure-11",
         "Conformal energy over the models",
         _pair(evidence, "conformal_energy", axis, 3, lambda a: a),
-        "Left on this run's surfaces, right as printed for the models that they are or stand for.",
-        "A line for each algorithm over the models; the lines lie close together.",
+        "Left: this run's surfaces. Right: as printed for the models they are or stand in for.",
+        "A line for each algorithm over the models; the lines are close together.",
         "Figure 11",
     )
 
 
 def angles_over_models(evidence: Evidence) -> Plot:
-    """Figure 12: (a) mean and (b) SD of the angular distortion on every model of the run."""
+    """Return Figure 12: mean and SD of the angular distortion on every model of the run."""
     panels: tuple[PlotPanel, ...] = ()
     for what, words in (("mean", "mean"), ("sd", "SD")):
         axis = Axis(f"{words} of angular distortion (degrees)", log=True)
@@ -34,7 +34,7 @@ def angles_over_models(evidence: Evidence) -> Plot:
         "figure-12",
         "Mean and standard deviation of the angular distortion over the models",
         panels,
-        "Above the mean, below the standard deviation; left here, right as printed.",
+        "Top: mean; bottom: standard deviation. Left: measured here; right: as printed.",
         "A line for each algorithm over the models.",
         "Figure 12",
     )
@@ -47,7 +47,7 @@ def _column(what: str) -> Callable[[str], str]:
 def _pair(
     evidence: Evidence, metric: str, axis: Axis, table: int, column: Callable[[str], str]
 ) -> tuple[PlotPanel, PlotPanel]:
-    """Measured and printed side by side, for the same models."""
+    """Return the measured and the printed panel for the same models."""
     style = looks(paper.ALGORITHMS)
     measured, printed = [], []
     for algorithm in paper.ALGORITHMS:

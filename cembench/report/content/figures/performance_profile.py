@@ -1,10 +1,10 @@
-"""On what share of the surfaces is an algorithm within a factor of the fastest?
+"""Performance profile of the time.
 
-The performance profile of Dolan and More (2002): for each algorithm the share of surfaces on which
-its time is at most tau times the best. A cell that did not end ok counts as infinite, and so does a
-map whose angles are not as good as the best on that surface: a curve that stays below 100 % tells
-of both. Variants that were tried on fewer surfaces than the others are left out, so that they do
-not take surfaces away.
+The performance profile of Dolan and More (2002) shows, for each algorithm, the share of surfaces on
+which its time is at most tau times the best. A cell that did not end ok counts as infinite, and so
+does a map whose angles are not as good as the best on that surface; both keep a curve below 100 %.
+Variants that were tried on fewer surfaces than the others are left out, because only surfaces tried
+by all are compared.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from cembench.results.records import Record
 def time_of(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
 ) -> float | None:
-    """Seconds of a good map, else infinite; None where the cell is not in the run."""
+    """Return the seconds of a good map, else infinity; None if the cell is not in the run."""
     record = evidence.find(surface, series, policy)
     if record is None:
         return None
@@ -32,7 +32,7 @@ def time_of(
 
 
 def _angle(record: Record) -> float:
-    """The mean angle error in degrees; infinite where the cell did not end ok."""
+    """Return the mean angle error in degrees; infinite if the cell did not end ok."""
     error = record.outcome.metrics.get("angle_error_mean_deg")
     return inf if record.outcome.status != "ok" or error is None else float(error)
 
@@ -43,7 +43,7 @@ def _best_angle(evidence: Evidence, surface: MeasuredSurface, policy: str) -> fl
 
 
 def shown_series(evidence: Evidence, policy: str) -> tuple[AlgorithmSeries, ...]:
-    """The series to compare: variants only where they were tried on as many surfaces as others."""
+    """Return the series to compare; variants only if tried on as many surfaces as others."""
     tried = {
         s.label: sum(evidence.find(surface, s, policy) is not None for surface in evidence.surfaces)
         for s in evidence.disk_series
@@ -53,7 +53,7 @@ def shown_series(evidence: Evidence, policy: str) -> tuple[AlgorithmSeries, ...]
 
 
 def ratios(evidence: Evidence, policy: str) -> tuple[dict[str, list[float]], list[str]]:
-    """Time over the best time, by series, on each surface that all were tried on; and which."""
+    """Return time over best time by series, on the surfaces tried by all, and these surfaces."""
     shown = shown_series(evidence, policy)
     found: dict[str, list[float]] = {s.label: [] for s in shown}
     used = []
@@ -69,7 +69,7 @@ def ratios(evidence: Evidence, policy: str) -> tuple[dict[str, list[float]], lis
 
 
 def performance_profile(evidence: Evidence) -> Plot | None:
-    """A panel for each way of solving; None where no surface was tried by two algorithms."""
+    """Return a plot with a panel for each policy; None if no two algorithms share a surface."""
     panels, counts = [], []
     for policy in evidence.policies:
         found, used = ratios(evidence, policy)
@@ -84,10 +84,10 @@ def performance_profile(evidence: Evidence) -> Plot | None:
         "Performance profiles of the time",
         tuple(panels),
         "Share of the surfaces on which an algorithm takes at most tau times as long as the "
-        "fastest; what did not end ok counts as infinitely slow, and so does a map whose mean "
-        f"angle error is more than {AS_GOOD} times the smallest on that surface and more than "
-        f"{DEGREES} degrees above it. Only maps to the disk, and only surfaces that all of these "
-        f"were tried on: {', '.join(counts)}.{_left_out(evidence)}",
+        "fastest. A cell that did not end ok counts as infinitely slow, and so does a map whose "
+        f"mean angle error is more than {AS_GOOD} times the smallest on that surface and more than "
+        f"{DEGREES} degrees above it. Only maps to the disk are compared, on the surfaces that all "
+        f"of these algorithms were tried on: {', '.join(counts)}.{_left_out(evidence)}",
         "Staircases: the further up and left, the faster on more surfaces.",
     )
 

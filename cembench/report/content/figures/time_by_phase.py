@@ -1,4 +1,4 @@
-"""Where does the time of a call go?"""
+"""Time of a call by phase."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cembench.results.records import Record
 
 
 def time_by_phase(evidence: Evidence) -> Plot | None:
-    """Shares of the time by phase, a bar for each algorithm, in the mean over the surfaces."""
+    """Return a plot of the mean shares of time by phase, one bar per algorithm."""
     panels = []
     for policy in evidence.policies:
         bars = []
@@ -31,14 +31,14 @@ def time_by_phase(evidence: Evidence) -> Plot | None:
         "time-by-phase",
         "Time by phase",
         tuple(panels),
-        "Shares of the time that is measured, which the phases add up to; the mean over the "
+        "Shares of the measured time, which the phases add up to; the mean over the "
         "surfaces of the run (n).",
         "A bar for each algorithm, divided into its phases.",
     )
 
 
 def phases_panel(evidence: Evidence, surface: MeasuredSurface, policy: str) -> PlotPanel | None:
-    """Seconds by phase of every algorithm on one surface; None where nothing was timed."""
+    """Return a panel of seconds by phase on one surface; None if nothing was timed."""
     found = [(s, evidence.find(surface, s, policy)) for s in evidence.series]
     bars = [(s.label, r.outcome.phases) for s, r in found if r and r.outcome.phases]
     if not bars:
@@ -52,7 +52,7 @@ def _shares(record: Record) -> dict[str, float]:
 
 
 def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[PlotSeries, ...]:
-    """A series for each phase, the largest first; what is left over last."""
+    """Return a series for each phase, the largest first; the remainder is last."""
     total: dict[str, float] = {}
     for _, phases in bars:
         for name, value in phases.items():
@@ -67,7 +67,7 @@ def _stacked(bars: Sequence[tuple[str, dict[str, float]]]) -> tuple[PlotSeries, 
     )
 
 
-#: A phase has the same colour in every plot.
+#: Colours of phases, the same in every plot.
 _KNOWN = (
     "solves",
     "factorisation",
@@ -85,5 +85,5 @@ _KNOWN = (
 
 
 def colour_of(phase: str) -> SeriesStyle:
-    """The colour of a phase; what is left over, and what no built-in algorithm books, is grey."""
+    """Return the colour of a phase; the remainder and phases of plug-ins are grey."""
     return SeriesStyle(PARTS[_KNOWN.index(phase)] if phase in _KNOWN else REST)

@@ -1,1 +1,1 @@
-"""What a run over many surfaces shows instead of a page for each."""
+"""Summaries of a run over many surfaces, in place of a page for each."""

@@ -1,8 +1,8 @@
-"""On what share of the surfaces is an algorithm's map within a factor of the best one?
+"""Performance profiles of accuracy.
 
-Performance profiles (Dolan and More, 2002) of figures of merit instead of seconds. A cell that did
-not end ok counts as infinitely bad. Angles and |mu| do not depend on the gauge, so maps to the disk
-and free boundaries stand side by side; E_C is that of disks in the common gauge.
+These are performance profiles (Dolan and More, 2002) of figures of merit instead of seconds. A cell
+that did not end ok counts as infinitely bad. Angles and |mu| do not depend on the gauge, so maps to
+the disk and maps with a free boundary are compared; E_C is that of disks in the common gauge.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from math import inf
 from cembench.report.content.evidence import DISK, AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
-#: Factors beyond this are not told apart.
+#: Larger factors are not distinguished.
 FARTHEST = 100.0
-#: What is smaller than this is as good as nothing: below it ratios are of rounding.
+#: Smaller figures count as this much; below it, ratios are rounding.
 SMALLEST = 1e-9
 
 
 @dataclass(frozen=True)
 class _Panel:
-    """A figure of merit, and the targets whose maps are compared by it."""
+    """A figure of merit, and the targets of the compared maps."""
 
     metric: str
     title: str
@@ -37,7 +37,7 @@ _PANELS = (
 
 
 def accuracy_profiles(evidence: Evidence, policy: str) -> Plot | None:
-    """A panel a figure of merit; None where no two algorithms were tried on the same surfaces."""
+    """Return a plot with a panel per figure of merit; None if no algorithms share surfaces."""
     panels = [p for wanted in _PANELS if (p := _panel(evidence, policy, wanted))]
     if not panels:
         return None
@@ -46,9 +46,9 @@ def accuracy_profiles(evidence: Evidence, policy: str) -> Plot | None:
         "Performance profiles of accuracy",
         tuple(panels),
         "Share of the surfaces on which an algorithm's figure is at most tau times the best one "
-        "there; what did not end ok counts as infinitely bad, so that a curve ends at the success "
-        "rate. On the surfaces (n) that all the algorithms of a panel were tried on; factors above "
-        f"{FARTHEST:g} are not told apart.",
+        "there. A cell that did not end ok counts as infinitely bad, so a curve ends at the "
+        "success rate. Only surfaces (n) that all algorithms of a panel were tried on are "
+        f"included; factors above {FARTHEST:g} are not distinguished.",
         "Staircases: the further up and left, the more accurate on more surfaces.",
     )
 
@@ -86,7 +86,7 @@ def _panel(evidence: Evidence, policy: str, wanted: _Panel) -> PlotPanel | None:
 def figure(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str, metric: str
 ) -> float | None:
-    """Return a figure of a map; infinite if the cell did not end ok, None if it was not tried."""
+    """Return a figure of a map; infinite if the cell did not end ok, None if not tried."""
     record = evidence.find(surface, series, policy)
     if record is None:
         return None

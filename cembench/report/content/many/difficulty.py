@@ -1,4 +1,4 @@
-"""What makes a surface hard to map: size, thin triangles, crowding, and how maps do by them."""
+"""Difficulty of surfaces (size, thin triangles, crowding) and its effect on maps."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from cembench.report.plots import Axis, Plot, PlotPanel, Point, through
 from cembench.report.surface_facts import factor_spans
 from cembench.results.records import Record
 
-#: So many algorithms are drawn: more cannot be told apart.
+#: Maximum number of algorithms in the plot; more cannot be distinguished.
 DRAWN = 8
 
 
 @dataclass(frozen=True)
 class Difficulty:
-    """How hard a surface is to map to a disk, by its best map.
+    """Difficulty of mapping a surface to a disk, judged by its best map.
 
     Parameters
     ----------
     span : float
-        Of the conformal factor, a ratio of lengths: the 99.9 over the 0.1 percentile.
+        Span of the conformal factor, a ratio of lengths: the 99.9 over the 0.1 percentile.
     crowding : float
         The same along the boundary, in the common gauge: the 99 over the 1 percentile of the
         edges' image lengths over their lengths.
@@ -58,7 +58,7 @@ def difficulties(evidence: Evidence, policy: str) -> dict[str, Difficulty]:
 
 
 def best_record(evidence: Evidence, surface: MeasuredSurface, policy: str) -> Record | None:
-    """Return the record with the smallest mean angle error; of disks where there is one."""
+    """Return the record with the smallest mean angle error, preferring maps to the disk."""
     best: tuple[bool, float] = (True, inf)
     found = None
     for series in evidence.series:
@@ -70,7 +70,7 @@ def best_record(evidence: Evidence, surface: MeasuredSurface, policy: str) -> Re
 
 
 def boundary_crowding(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> float | None:
-    """How unevenly does a map to the disk scale the boundary, in the common gauge?
+    """Return how unevenly a map to the disk scales the boundary, in the common gauge.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def boundary_crowding(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> float |
     -------
     float or None
         The 99 over the 1 percentile of image length over length of the boundary's edges; None
-        where the map has no such gauge, or an edge has no length.
+        if the map has no such gauge, or an edge has no length.
 
     """
     if not is_disk_map(mesh, uv):
@@ -105,7 +105,7 @@ def boundary_crowding(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> float |
 def errors_by_difficulty(
     evidence: Evidence, policy: str, known: Mapping[str, Difficulty]
 ) -> Plot | None:
-    """Angle errors against size, thin triangles, span and crowding: a point a map."""
+    """Return a plot of angle errors against size, thin triangles, span and crowding."""
     if not known:
         return None
     axes = (
@@ -131,11 +131,11 @@ def errors_by_difficulty(
     left = f" Not drawn: {others}." if others else ""
     return Plot(
         "errors-by-difficulty",
-        "Angle errors by what makes a surface hard",
+        "Angle errors by the difficulty of surfaces",
         tuple(panels),
         "Each point is a valid map to the disk. The span is that of the conformal factor of the "
         "surface's best map, a ratio of lengths (99.9 over 0.1 percentile of the triangles); "
         "crowding is the same along the boundary, in the common gauge (99 over 1 percentile of "
         f"its edges).{left}",
-        "Clouds of points; where they rise to the right, surfaces of that kind are harder.",
+        "Clouds of points; if they rise to the right, surfaces of that kind are harder.",
     )

@@ -1,4 +1,4 @@
-"""Which algorithm beats which, on how many surfaces, and is that more than chance?"""
+"""Pairwise wins of algorithms over surfaces, with sign tests."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.intervals import ERROR
 from cembench.results.many import holm, sign_test
 
-#: Figures that differ by less than this share are equal.
+#: Figures that differ by less than this share count as equal.
 SAME = 1e-6
 
 Score = Callable[[MeasuredSurface, AlgorithmSeries], float | None]
 
 
 def pairwise_wins(evidence: Evidence, policy: str) -> list[Table]:
-    """A table of angles and one of seconds for the maps to the disk, where there are several."""
+    """Return tables of angles and seconds for maps to the disk, if there are several."""
 
     def angle(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
         return figure(evidence, surface, series, policy, "angle_error_mean_deg")
@@ -61,10 +61,11 @@ def _table(evidence: Evidence, name: str, title: str, score: Score) -> Table | N
         title,
         (Column("better", numeric=False), *(Column(s.label, "than") for s in series)),
         tuple(rows),
-        "On how many surfaces the algorithm of the line beats that of the column, of those that "
-        "both were tried on; equal figures are left out. What did not end ok loses to what did. "
-        f"A star: more, or fewer, than chance would let it be, with {100 * (1 - ERROR):.0f} %"
-        f"{_together(len(pairs))}. Surfaces are counted, not by how much.",
+        "Number of surfaces on which the algorithm of the row beats that of the column, out of "
+        "those that both were tried on; equal figures are left out. A cell that did not end ok "
+        "loses to one that did. A star marks a number beyond chance, with a confidence of "
+        f"{100 * (1 - ERROR):.0f} %{_together(len(pairs))}. Only surfaces are counted; the size of "
+        "the difference does not matter.",
     )
 
 
@@ -75,7 +76,7 @@ def _together(pairs: int) -> str:
 
 
 def _wins(first: list[float | None], second: list[float | None]) -> tuple[int, int]:
-    """Return on how many surfaces the first, and the second, has the smaller figure."""
+    """Return the numbers of surfaces on which the first and the second have the smaller figure."""
     both = [(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None]
     differ = [(a, b) for a, b in both if not (a == b or isclose(a, b, rel_tol=SAME))]
     won = sum(a < b for a, b in differ)

@@ -1,4 +1,4 @@
-"""The section of a report about a run over many surfaces."""
+"""The section of a report on a run over many surfaces."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from cembench.report.render.terminal_many import MANY
 
 
 def is_many(evidence: Evidence) -> bool:
-    """Whether a run has so many surfaces that hardly anybody looks at each."""
+    """Whether a run has too many surfaces for a page each."""
     return len(evidence.surfaces) > MANY
 
 
@@ -29,11 +29,11 @@ def many_section(
     inspections: Mapping[str, Inspection],
     folder: Path,
 ) -> Section:
-    """Success rates, profiles, who beats whom, the hardest surfaces, and what makes them hard."""
+    """Return success rates, profiles, pairwise wins, and the hardest surfaces, as a section."""
     policy = evidence.policies[0]
     items: list[Item] = []
     if len(evidence.policies) > 1:
-        items.append(Text(f"Where nothing else is said, systems were solved by {policy}."))
+        items.append(Text(f"Unless stated otherwise, the linear-algebra policy is {policy}."))
     items += [success_table(evidence, policy), spread_table(evidence, policy)]
     plots = (
         accuracy_profiles(evidence, policy),

@@ -1,4 +1,4 @@
-"""How often does an algorithm end with a valid map, and what keeps it from that?"""
+"""Success rates of algorithms, and the causes of failures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from cembench.report.document import Column, Table, Value, words
 from cembench.results.intervals import LEVEL
 from cembench.results.records import Record, Status
 
-#: Columns in this order, as far as the run has such cells.
+#: Order of the columns; statuses that do not occur are left out.
 _STATUSES: tuple[Status, ...] = (
     "invalid",
     "failed",
@@ -18,12 +18,12 @@ _STATUSES: tuple[Status, ...] = (
     "not_comparable",
     "skipped",
 )
-#: So many kinds of faults are named.
+#: Maximum number of kinds of faults listed.
 _NAMED = 3
 
 
 def success_table(evidence: Evidence, policy: str) -> Table:
-    """A line an algorithm: of how many surfaces it has a valid map, and what else came out."""
+    """Return a table with a row per algorithm: valid maps, and how the other cells ended."""
     held = {s.label: records_of(evidence, s, policy) for s in evidence.series}
     there = {r.outcome.status for records in held.values() for r in records}
     statuses = [status for status in _STATUSES if status in there]
@@ -43,14 +43,14 @@ def success_table(evidence: Evidence, policy: str) -> Table:
         "Success rates",
         columns,
         tuple(rows),
-        "Of the surfaces that an algorithm takes and was tried on: valid maps, and how the others "
-        "ended. The interval (Wilson) is over surfaces: where the share would lie on other "
-        "surfaces like these. A cell can have several faults.",
+        "Valid maps, and how the other cells ended, for the surfaces that an algorithm takes and "
+        "was tried on. The Wilson interval is for the share on other surfaces of this kind. A cell "
+        "can have several faults.",
     )
 
 
 def records_of(evidence: Evidence, series: AlgorithmSeries, policy: str) -> list[Record]:
-    """Return a series' records, one a surface that it was tried on."""
+    """Return the records of a series, one for each surface that it was tried on."""
     found = (evidence.find(surface, series, policy) for surface in evidence.surfaces)
     return [record for record in found if record is not None]
 
@@ -76,7 +76,7 @@ def _row(
 
 
 def share_interval(successes: int, n: int) -> tuple[float, float]:
-    """Return the Wilson interval of a share: between which shares the true one lies, with 95 %.
+    """Return the 95 % Wilson interval of a share.
 
     >>> [round(end, 3) for end in share_interval(10, 10)]
     [0.722, 1.0]

@@ -1,4 +1,4 @@
-"""How bad is the worst? The worst map of each algorithm, and the surfaces that are hardest."""
+"""The worst map of each algorithm, and the hardest surfaces."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from cembench.report.content.many.difficulty import best_record
 from cembench.report.content.many.success import records_of
 from cembench.report.document import Column, Gallery, Table, Value, missing, words
 
-#: So many surfaces are shown.
+#: Number of surfaces shown.
 HARDEST = 10
 _ANGLE = "angle_error_mean_deg"
 
 
 def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
-    """Return the surfaces whose best map has the largest angle errors, the worst first.
+    """Return the surfaces with the largest angle errors of the best map, worst first.
 
-    Those that nobody mapped come before them.
+    Surfaces without any map come first.
     """
 
     def error(surface: MeasuredSurface) -> float:
@@ -34,7 +34,7 @@ def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
 
 
 def spread_table(evidence: Evidence, policy: str) -> Table:
-    """A line an algorithm: the middle, the 90th percentile and the worst of its angle errors."""
+    """Return the median, 90th percentile and maximum of angle errors, one row per algorithm."""
     rows = []
     for series in evidence.series:
         found = [
@@ -68,12 +68,12 @@ def spread_table(evidence: Evidence, policy: str) -> Table:
         "Angle errors over the surfaces",
         columns,
         tuple(rows),
-        "Of valid maps alone: compare the counts before the errors.",
+        "For valid maps only: compare the counts before the errors.",
     )
 
 
 def hardest_table(evidence: Evidence, policy: str, surfaces: tuple[MeasuredSurface, ...]) -> Table:
-    """A line a surface, a column an algorithm: the mean angle error, or how the cell ended."""
+    """Return the mean angle error, or the status, by surface (rows) and algorithm (columns)."""
     tried = [s for s in evidence.series if s.main and records_of(evidence, s, policy)]
     rows = []
     for surface in surfaces:
@@ -99,8 +99,8 @@ def hardest_table(evidence: Evidence, policy: str, surfaces: tuple[MeasuredSurfa
             *(Column(s.label, "mean angle error", "degrees") for s in tried),
         ),
         tuple(rows),
-        "Those on which the best map has the largest angle errors, of maps to the disk where there "
-        "are any; surfaces that nothing mapped come first.",
+        "The surfaces whose best map has the largest angle errors (of maps to the disk where there "
+        "are any); surfaces without a map come first.",
     )
 
 
@@ -110,7 +110,7 @@ def hardest_gallery(
     surfaces: tuple[MeasuredSurface, ...],
     inspections: Mapping[str, Inspection],
 ) -> Gallery | None:
-    """The best map of each of them; None where the run kept no surface."""
+    """Return the best map of each of these surfaces; None if the run saved no surface."""
     figures = []
     for surface in surfaces:
         seen = inspections.get(surface.mesh_hash)
