@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
+from cembench.commands import cluster as cluster_runs
 from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
@@ -243,6 +244,8 @@ def run(
         str | None,
         typer.Option(help="The algorithm whose speedup over the others is shown; default: cem."),
     ] = None,
+    cluster: cluster_runs.Cluster = None,
+    same_environment: cluster_runs.SameEnvironment = False,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The run's folder; resumed if it exists.")
     ] = Path("results/run"),
@@ -271,12 +274,13 @@ def run(
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)
+    machines = cluster_runs.place_of(cluster, same_environment=same_environment)
     policies = _policies(solves)
     one_round = bool(sets) and rounds is None and precision is None
     repeats, share = settings_of_rounds(1 if one_round else rounds, precision)
     options = Options(
         timeout,
-        memory_bytes(memory),
+        None if machines and memory is None else memory_bytes(memory),
         fresh,
         rerun_failed,
         seed,
@@ -318,13 +322,21 @@ def run(
         how = MeasurementSettings(policy, installed_backend(backend), threads, repeats, share)
         tasks += plan_cells(chosen, found, given, how, plugin, standing)
     if dry_run:
-        _present_plan(tasks, Store(output), options, as_json=as_json)
+        on_cluster = machines is not None
+        _present_plan(tasks, Store(output), options, as_json=as_json, on_cluster=on_cluster)
         return
     if many is not None:
         set_verbs.lay_into(output, many, sets)
     elif not as_json:
         print_notices(found)
-    records = _measure(tasks, Store(output), options)
+    if machines is None:
+        records = _measure(tasks, Store(output), options)
+    else:
+        records = cluster_runs.measure(
+            *(tasks, Store(output), options, machines),
+            faces=faces,
+            same_environment=same_environment,
+        )
     _present(records, as_json=as_json, where=output, reference=reference)
 
 
@@ -467,7 +479,14 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
         raise typer.Exit(1)
 
 
-def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_json: bool) -> None:
+def _present_plan(
+    tasks: Sequence[Task],
+    store: Store,
+    options: Options,
+    *,
+    as_json: bool,
+    on_cluster: bool = False,
+) -> None:
     """Say which cells would be measured, and what that will cost."""
     from cembench.commands.progress import duration
     from cembench.report.render.terminal import plan_table
@@ -486,6 +505,8 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
     costs = [cost for _, _, cost in lines if cost is not None]
     seconds = planned_seconds(costs, options.budget)
     largest = max((cost.memory_bytes for cost in costs), default=0)
+    each = [cost for _, _, cost in lines]
+    hours = cluster_runs.hours(tasks, each, options.budget) if on_cluster else None
     if as_json:
         cells = [
             {
@@ -499,7 +520,8 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
             }
             for cell, faces, cost in lines
         ]
-        print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest})
+        more = {"cluster": hours} if hours else {}
+        print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest} | more)
         return
     shown = [
         (cell, faces, cost.basis if cost else f"there: {held[cell.key]}", cost)
@@ -515,6 +537,8 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
         f"\n{len(costs)} of {len(tasks)} cells to measure: about {duration(seconds)}, "
         f"{largest / 2**30:.1f} GiB at most{rough}"
     )
+    if hours:
+        cluster_runs.show_hours(hours)
 
 
 def _policies(given: list[str]) -> list[str]:

@@ -40,6 +40,10 @@ class NotPositiveDefinite(AlgorithmFailed):
     """A Cholesky factorisation met a pivot that is not positive."""
 
 
+class ClusterError(CembenchError):
+    """A cluster cannot be reached, is gone, or has machines that cannot measure what is asked."""
+
+
 class RenderError(CembenchError):
     """A picture cannot be drawn or written."""
 

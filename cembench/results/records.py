@@ -160,6 +160,8 @@ class FaultKind(StrEnum):
     PROCESS_ENDED = "process_ended"
     #: The process left an answer that cannot be read.
     UNREADABLE_ANSWER = "unreadable_answer"
+    #: Its unit ended the workers of a cluster that measured it.
+    WORKERS_LOST = "workers_lost"
     #: What it needs is not on this machine.
     NOT_THERE = "not_there"
     #: An external program ended with a code other than 0, or by a signal.
@@ -442,6 +444,8 @@ class Environment(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
+    #: What the machine is called; None in records older than this field.
+    machine: Printable | None = None
     cpu: str | None = None
     cores: Count | None = None
     memory_bytes: Count | None = None

@@ -22,7 +22,7 @@ from cembench.results.records import Cell, Record
 #: The folders of a run.
 FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits")
 #: The files of a run besides its marker.
-PLAN, LOCK = "plan.json", "lock"
+PLAN, LOCK, MACHINES = "plan.json", "lock", "machines.json"
 #: The cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 
@@ -47,7 +47,7 @@ def is_own(folder: Path, path: Path) -> bool:
         inside = path.resolve().relative_to(folder.resolve())
     except ValueError:
         return False
-    own = (*FOLDERS, PLAN, LOCK, folders.MARKERS["run"])
+    own = (*FOLDERS, PLAN, LOCK, MACHINES, folders.MARKERS["run"])
     return not inside.parts or inside.parts[0] in own
 
 

@@ -9,6 +9,7 @@
     RUN/plan.json                                 the cells that were last asked for
     RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
         <id>.jsonl  <id>.npz                      a line for each process that has ended, the map
+    RUN/machines.json                             how far a run on a cluster is
     RUN/lock                                      held by the run that measures
     RUN/cembench.json                             says that the folder is a run
     RUN/scratch-<token>/                          what passes between processes, while it measures
