@@ -17,8 +17,9 @@ from cembench.drawing import draw_numpy
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.report import plots
 from cembench.report.content import inspection
+from cembench.results.merging import merge
 from cembench.results.records import Cell, MeshFacts, Outcome, Record
-from cembench.results.store import Store, merge
+from cembench.results.store import Store
 from tests.limits import files_of_at_most, tree
 
 DECOYS = {

@@ -459,18 +459,22 @@ def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None
 
 def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
     from cembench.report.render.terminal import results_table, speedups_table
-    from cembench.report.render.terminal_many import MANY, many_table
+    from cembench.report.render.terminal_many import MANY, machines_told, many_table
     from cembench.results.record_rows import REFERENCE, rows
+    from cembench.results.store import Store
 
     reference = reference or REFERENCE
+    environments = Store(where).environments()
     if as_json:
         print_json(rows(records, reference))
     elif len({record.cell.mesh_hash for record in records}) > MANY:
         out.print(many_table(records))
+        for words in machines_told(records, environments):
+            out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
         out.print(f"Pictures and profiles: cembench report {where}", soft_wrap=True)
     else:
-        out.print(results_table(records))
+        out.print(results_table(records, environments))
         speedups = speedups_table(records, reference)
         if speedups is not None:
             out.print(speedups)

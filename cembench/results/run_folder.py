@@ -20,7 +20,7 @@ from cembench.core.errors import RecordError
 from cembench.results.records import Cell, Record
 
 #: The folders of a run.
-FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits")
+FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits", "others")
 #: The files of a run besides its marker.
 PLAN, LOCK, MACHINES = "plan.json", "lock", "machines.json"
 #: The cells of a plan.

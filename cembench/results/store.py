@@ -10,6 +10,7 @@
     RUN/samples/<mesh>--<algorithm>--<key>/       what is known of a cell that is not finished:
         <id>.jsonl  <id>.npz                      a line for each process that has ended, the map
     RUN/machines.json                             how far a run on a cluster is
+    RUN/others/<machine>/                         of a merged run: what other machines measured
     RUN/lock                                      held by the run that measures
     RUN/cembench.json                             says that the folder is a run
     RUN/scratch-<token>/                          what passes between processes, while it measures
@@ -24,7 +25,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -202,6 +203,11 @@ class Store:
         journals = files_in(self.folder / "samples" / cell.label, "*.jsonl")
         return max((len(Samples(journal).rounds()) for journal in journals), default=None)
 
+    def forget(self, cell: Cell) -> None:
+        """Delete a cell's record and map, if they are here."""
+        for path in (self._record_path(cell), self._map_path(cell)):
+            path.unlink(missing_ok=True)
+
     def forget_samples(self, cell: Cell) -> None:
         """Delete what is kept of an unfinished cell."""
         shutil.rmtree(self.folder / "samples" / cell.label, ignore_errors=True)
@@ -306,30 +312,6 @@ class Store:
 
     def _mesh_path(self, mesh_hash: str) -> Path:
         return self.folder / "meshes" / f"{file_name(mesh_hash[:32])}.npz"
-
-
-def merge(runs: Iterable[Store], into: Store) -> int:
-    """Bring the records of several runs together; how many are there then?
-
-    Of a cell that several runs hold, one that ended ok counts before one that did not, and then
-    the later one. All runs are read before anything is written.
-    """
-    found = [(run, run.records()) for run in runs]
-    best: dict[str, tuple[tuple[bool, str], Store, Record]] = {}
-    with into.locked():
-        for run, records in [*found, (into, into.finished())]:
-            for record in records:
-                rank = (record.outcome.status == "ok", record.started_at)
-                key = record.cell.key
-                if key not in best or best[key][0] < rank:
-                    best[key] = (rank, run, record)
-        for _, run, record in best.values():
-            environment = run.environments().get(record.environment, {"id": record.environment})
-            into.save(record, run.uv(record.cell), environment)
-            mesh = run.mesh(record.cell)
-            if mesh is not None:
-                into.save_mesh(mesh)
-    return len(best)
 
 
 def lock_path(folder: Path) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
+from types import MappingProxyType
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -28,6 +29,7 @@ from cembench.results.comparison import (
     seconds_interval,
 )
 from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.machines import Environments, Marks, marks
 from cembench.results.many import corrected
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.results.runs_compared import Change
@@ -41,25 +43,31 @@ def status_style(status: str) -> str:
     return _STYLES.get(status, "bold red")
 
 
-def results_table(records: Iterable[Record]) -> RenderableType:
+def results_table(
+    records: Iterable[Record], environments: Environments = MappingProxyType({})
+) -> RenderableType:
     """One line a cell, surfaces apart, policies of solving in tables of their own.
+
+    `environments` are the store's; where they are of several machines, seconds are marked.
 
     Mean and SD are of the angles' errors in degrees; seconds are the median of the rounds, and
     beside them stands half the width of its 95 % interval in percent, with a ! where that is wide.
     The causes of what did not end ok stand below.
     """
     ordered = list(records)
+    marked = marks(ordered, environments)
     policies = list(dict.fromkeys(record.cell.solves for record in ordered))
     parts: list[RenderableType] = []
     for policy in policies:
         chosen = [record for record in ordered if record.cell.solves == policy]
         if len(policies) > 1:
             parts.append(Text(f"\nsolves: {policy}", style="bold"))
-        parts.append(_cells_table(chosen))
-    return Group(*parts, *_remarks(ordered))
+        parts.append(_cells_table(chosen, marked))
+    told = [Text(line, style="yellow") for line in marked.explained()]
+    return Group(*parts, *told, *_remarks(ordered))
 
 
-def _cells_table(records: Sequence[Record]) -> Table:
+def _cells_table(records: Sequence[Record], marked: Marks) -> Table:
     longest = max((len(_name(record)) for record in records), default=9)
     shown = metrics_shown("overview")
     columns = [
@@ -78,7 +86,9 @@ def _cells_table(records: Sequence[Record]) -> Table:
                     _name(record),
                     *(_figure(record, metric) for metric in shown),
                     "-" if outcome.iterations is None else str(outcome.iterations),
-                    "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
+                    "-"
+                    if outcome.median_seconds is None
+                    else f"{outcome.median_seconds:.3f} {marked.of(record)}".rstrip(),
                     _spread(record),
                     Text(outcome.status, style=status_style(outcome.status)),
                 ]

@@ -25,9 +25,9 @@ from pydantic import ValidationError
 from cembench.core.errors import ClusterError
 from cembench.results import run_folder
 from cembench.results.looks import next_look
+from cembench.results.machines import differences, software_of
 from cembench.results.records import Fault, FaultKind, Record, not_ok
 from cembench.results.store import Store
-from cembench.running.cluster.software import differences, software_of
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from cembench.running.cluster.units import Parcel, grouped, makespan, parcel
 from cembench.running.cluster.worker import Answer, MeasurerGoneError, forget, measure_unit
@@ -73,7 +73,9 @@ def run_on_cluster(
         store.save_plan([task.cell for task in tasks])
         for mesh in {task.cell.mesh_hash: task.mesh for task in tasks}.values():
             store.save_mesh(mesh)
-        run = _ClusterRun(store, client, options, watcher, faces, same_environment)
+        run = _ClusterRun(
+            *(store, client, options, watcher, faces, same_environment, describe_environment())
+        )
         try:
             run.measure(tasks)
         finally:
@@ -106,7 +108,7 @@ class _ClusterRun:
     watcher: Watcher
     faces: int | None
     same_environment: bool
-    environment: dict[str, Any] = field(default_factory=describe_environment)
+    environment: dict[str, Any]
     topic: str = field(default_factory=lambda: f"cembench-{uuid.uuid4().hex[:12]}")
     records: dict[str, Record] = field(default_factory=dict)
     events: SimpleQueue[tuple[str, Any]] = field(default_factory=SimpleQueue)

@@ -145,6 +145,7 @@ def _local(where: ClusterPlace) -> Any:
         silence_logs=logging.CRITICAL,
         dashboard_address=None,
         local_directory=str(place() / "dask"),
+        preload=["cembench.running.cluster.worker"],
     )
 
 

@@ -23,10 +23,10 @@ from cembench.core.atomic import read_model
 from cembench.core.errors import ClusterError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_algorithm
+from cembench.results.machines import differences
 from cembench.results.records import Cell, Record
 from cembench.results.store import Store
 from cembench.running.cluster.host import Turn, kept_surface, unit_folder
-from cembench.running.cluster.software import differences
 from cembench.running.cluster.units import Unit
 from cembench.running.environment import describe_environment
 from cembench.running.local import Launcher, Options, Step, Watcher, run_tasks

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -53,6 +54,11 @@ class Answer:
     lacks_surface: bool = False
     #: In what the software differs, where it must not.
     refused: str = ""
+
+
+def dask_setup(worker: Any) -> None:
+    """Leave Ctrl-C to the client; dask calls this in each worker that was started here."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def measure_unit(
