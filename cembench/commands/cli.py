@@ -23,6 +23,7 @@ from cembench.commands import holes as holes_verbs
 from cembench.commands import map as map_verbs
 from cembench.commands import morph as morph_verbs
 from cembench.commands import peers as peers_verbs
+from cembench.commands import publish as publish_verbs
 from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
@@ -419,6 +420,7 @@ def doctor(*, as_json: Json = False) -> None:
 _MORE = (
     run_verbs,
     report_verbs,
+    publish_verbs,
     validate_verbs,
     holes_verbs,
     theory_verbs,

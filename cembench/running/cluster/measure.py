@@ -72,8 +72,10 @@ class TakingTurns(Launcher):
             self.turn.alone(lambda: self.tell({"what": "queues"}))
 
 
-def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record]:
+def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
     """Measure a unit in a folder of its own, and go on with what is there of it.
+
+    None where the machine has other software and must not measure, which is told.
 
     Raises
     ------
@@ -85,7 +87,7 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record]:
     told = differences(unit.software, environment) if unit.software else []
     if told:
         tell({"what": "refused", "why": "; ".join(told)})
-        return []
+        return None
     mesh = surface_of(unit)
     tasks = [task_of(unit, cell, mesh) for cell in unit.cells]
     tell({"what": "began", "environment": json.dumps(environment)})
@@ -148,8 +150,8 @@ def main() -> None:
     while True:
         folder = unit_folder(keys.get())
         try:
-            measure(read_model(folder / UNIT, Unit), folder / RUN, tell)
-            tell({"what": "done"})
+            if measure(read_model(folder / UNIT, Unit), folder / RUN, tell) is not None:
+                tell({"what": "done"})
         except Exception as error:
             known = isinstance(error, ClusterError)
             tell({"what": "failed", "why": str(error) if known else traceback.format_exc()})
