@@ -5,7 +5,9 @@ import re
 import pytest
 
 from cembench.core.errors import ParameterError, RecordError
+from cembench.report import site
 from cembench.report.content.evidence import Evidence
+from cembench.report.document import Report
 from cembench.report.site import about, history, publish
 from tests.results.test_machines import record_of, run_of
 
@@ -47,18 +49,25 @@ def test_what_cannot_be_published_is_said(tmp_path):
     assert not (tmp_path / "site").exists()
 
 
-def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path):
-    from tests.report.small_run import write_run
+def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, monkeypatch):
+    shown = []
 
-    for name in ("one", "two"):
-        write_run(tmp_path / name)
-    found = publish([tmp_path / "one", tmp_path / "two"], tmp_path / "site")
+    def small_report(evidence, folder, command):
+        shown.append(evidence.store.folder.name)
+        return Report(command, command, (), ())
+
+    monkeypatch.setattr(site, "build_report", small_report)  # reports have tests of their own
+    for number in (1, 2):
+        published(tmp_path, number, 4.0, "hat")
+    runs = [tmp_path / "run-2", tmp_path / "run-1"]
+    found = publish(runs, tmp_path / "site")
+    assert shown == ["run-2", "run-1"]
+    assert [run.name for run in found] == ["run-1", "run-2"]
     page = (tmp_path / "site/index.html").read_text()
     links = re.findall(r'(?:href|src)="([^"]+)"', page)
-    assert {f"runs/{run.name}/index.html" for run in found} <= set(links)
+    assert {"runs/run-1/index.html", "runs/run-2/index.html", "figures/history.svg"} == set(links)
     assert all((tmp_path / "site" / link).is_file() for link in links)
-    assert "http" not in page
-    publish([tmp_path / "one"], tmp_path / "site")
-    assert not (tmp_path / "site/runs/two").is_dir() or not any(
-        (tmp_path / "site/runs/two").iterdir()
-    )
+    assert "://" not in page
+    publish(runs[:1], tmp_path / "site")
+    kept = [path for path in (tmp_path / "site/runs").rglob("*") if path.is_file()]
+    assert kept == [tmp_path / "site/runs/run-2/index.html"]

@@ -13,6 +13,7 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -28,7 +29,7 @@ from cembench.results.records import Cell, Record
 from cembench.results.store import Store
 from cembench.running.cluster.host import Turn, kept_surface, unit_folder
 from cembench.running.cluster.units import Unit
-from cembench.running.environment import describe_environment
+from cembench.running.environment import describe_environment, machine_name
 from cembench.running.local import Launcher, Options, Step, Watcher, run_tasks
 from cembench.running.plan import Task
 from cembench.running.sources import hash_of, sources_of
@@ -83,7 +84,7 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
         The machine has other code than the client, or not the surface.
 
     """
-    environment = describe_environment()
+    environment = _environment()
     told = differences(unit.software, environment) if unit.software else []
     if told:
         tell({"what": "refused", "why": "; ".join(told)})
@@ -98,6 +99,12 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
             return TakingTurns(scratch, options, turn=turn, tell=tell)
 
         return run_tasks(tasks, Store(folder), _options(unit), Teller(tell), launcher)
+
+
+@cache
+def _environment() -> dict[str, Any]:
+    """Return the environment, which a process asks the system for once."""
+    return describe_environment()
 
 
 def surface_of(unit: Unit) -> TriangleMesh:
@@ -118,7 +125,7 @@ def task_of(unit: Unit, cell: Cell, mesh: TriangleMesh) -> Task:
     sources = sources_of(algorithm)
     if hash_of(sources) != cell.code_hash:
         raise ClusterError(
-            f"{cell.algorithm} is other code on {describe_environment()['machine']} than here: "
+            f"{cell.algorithm} is other code on {machine_name()} than here: "
             f"{', '.join(sources)} differ. Install the same version of cembench and of plug-ins "
             "on all machines."
         )

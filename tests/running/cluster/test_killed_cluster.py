@@ -110,6 +110,7 @@ def test_random_kills_lose_nothing_that_was_finished(tmp_path, kills):
     assert len(found) == len(rows)
 
 
+@pytest.mark.slow
 def test_a_killed_client_leaves_nothing_behind_and_the_same_command_goes_on(tmp_path):
     cluster = Cluster(tmp_path / "run", tmp_path / "cache")
     command = list(cluster.commands["client"])
