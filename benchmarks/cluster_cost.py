@@ -1,4 +1,4 @@
-"""What does a cell cost on a cluster beside the local runner? ``python -m benchmarks.cluster_cost``.
+"""What does a cell cost on a cluster? ``python -m benchmarks.cluster_cost``.
 
 Cells of algorithms that are never called go through two workers of this machine, and through the
 local runner. Told are CPU seconds of all processes that take part: they hang on what else the
