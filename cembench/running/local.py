@@ -127,6 +127,9 @@ class Watcher:
     def begins(self, processes: int) -> None:
         """So many processes are to be run."""
 
+    def timing_begins(self) -> None:
+        """All checks have ended; what is run from now on is timed."""
+
     def goes_on(self, task: Task, rounds: int) -> None:
         """A cell is not precise yet: so many more rounds of it follow."""
 
@@ -239,7 +242,7 @@ class _Run:
             self._load(task)
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         self._check_all(pending)
-        self.launcher.timing_begins()
+        self.watcher.timing_begins()
         most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
@@ -540,9 +543,6 @@ class Launcher:
     def stop(self) -> None:
         """End the process that runs, and every other right after its start."""
         self._stopped.set()
-
-    def timing_begins(self) -> None:
-        """Know that the checks are over, and that what is run from now on is timed."""
 
     def close(self) -> None:
         """End the server, if there is one."""

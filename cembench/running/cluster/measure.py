@@ -12,7 +12,7 @@ import os
 import threading
 import traceback
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from queue import SimpleQueue
@@ -30,7 +30,7 @@ from cembench.results.store import Store
 from cembench.running.cluster.host import Turn, kept_surface, unit_folder
 from cembench.running.cluster.units import Unit
 from cembench.running.environment import describe_environment, machine_name
-from cembench.running.local import Launcher, Options, Step, Watcher, run_tasks
+from cembench.running.local import Options, Step, Watcher, run_tasks
 from cembench.running.plan import Task
 from cembench.running.sources import hash_of, sources_of
 from cembench.running.worker import MESH_TYPES
@@ -41,10 +41,15 @@ UNIT, RUN = "unit.json", "run"
 
 
 class Teller(Watcher):
-    """Tells the client how the cells of a unit go on; it knows the tasks by their labels."""
+    """Tells the client how the cells of a unit go on, and waits for the machine before timing."""
 
-    def __init__(self, tell: Tell) -> None:
+    def __init__(self, tell: Tell, turn: Turn) -> None:
         self.tell = tell
+        self.turn = turn
+
+    def timing_begins(self) -> None:
+        """Wait until no other worker of the machine is at work."""
+        self.turn.alone(lambda: self.tell({"what": "queues"}))
 
     def goes_on(self, task: Task, rounds: int) -> None:
         """Tell."""
@@ -58,19 +63,6 @@ class Teller(Watcher):
         """Tell."""
         about = {"cell": task.cell.label, "step": vars(step), "seconds": seconds}
         self.tell({"what": "ends", **about})
-
-
-@dataclass
-class TakingTurns(Launcher):
-    """A launcher whose rounds begin when no other worker of the machine is at work."""
-
-    turn: Turn | None = None
-    tell: Tell = field(default=lambda event: None)
-
-    def timing_begins(self) -> None:
-        """Wait for the machine."""
-        if self.turn is not None:
-            self.turn.alone(lambda: self.tell({"what": "queues"}))
 
 
 def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
@@ -94,11 +86,7 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
     tell({"what": "began", "environment": json.dumps(environment)})
     with Turn() as turn:
         turn.share()
-
-        def launcher(scratch: Path, options: Options) -> Launcher:
-            return TakingTurns(scratch, options, turn=turn, tell=tell)
-
-        return run_tasks(tasks, Store(folder), _options(unit), Teller(tell), launcher)
+        return run_tasks(tasks, Store(folder), _options(unit), Teller(tell, turn))
 
 
 @cache
