@@ -17,8 +17,9 @@ from cembench.drawing import draw_numpy
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.report import plots
 from cembench.report.content import inspection
+from cembench.results.merging import merge
 from cembench.results.records import Cell, MeshFacts, Outcome, Record
-from cembench.results.store import Store, merge
+from cembench.results.store import Store
 from tests.limits import files_of_at_most, tree
 
 DECOYS = {
@@ -310,7 +311,7 @@ def test_any_name_of_an_algorithm_or_mesh_is_kept_inside_and_found_again(name, t
     assert store.uv(record.cell) is not None
     store.samples(record.cell, name).save_check(record.outcome, None)
     assert store.rounds_done(record.cell) == 0
-    assert merge([store], Store(tmp_path / "up/all")) == 1
+    assert merge([store], Store(tmp_path / "up/all")).cells == 1
     assert len(Store(tmp_path / "up/all").records()) == 1
     assert {p.name for p in tmp_path.iterdir()} == {"up"}
     assert {p.name for p in (tmp_path / "up").iterdir()} == {"run", "all"}

@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
+from cembench.commands import cluster as cluster_runs
 from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import holes as holes_verbs
 from cembench.commands import map as map_verbs
 from cembench.commands import morph as morph_verbs
 from cembench.commands import peers as peers_verbs
+from cembench.commands import publish as publish_verbs
 from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands import run as run_verbs
@@ -247,6 +249,8 @@ def run(
         str | None,
         typer.Option(help="Show this algorithm's speedup over the others (default: cem)."),
     ] = None,
+    cluster: cluster_runs.Cluster = None,
+    same_environment: cluster_runs.SameEnvironment = False,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
     ] = Path("results/run"),
@@ -279,12 +283,13 @@ def run(
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)
+    machines = cluster_runs.place_of(cluster, same_environment=same_environment)
     policies = _policies(solves)
     one_round = bool(sets) and rounds is None and precision is None
     repeats, share = settings_of_rounds(1 if one_round else rounds, precision)
     options = Options(
         timeout,
-        memory_bytes(memory),
+        None if machines and memory is None else memory_bytes(memory),
         fresh,
         rerun_failed,
         seed,
@@ -331,13 +336,21 @@ def run(
         how = MeasurementSettings(policy, installed_backend(backend), threads, repeats, share)
         tasks += plan_cells(chosen, found, given, how, plugin, standing)
     if dry_run:
-        _present_plan(tasks, Store(output), options, as_json=as_json)
+        on_cluster = machines is not None
+        _present_plan(tasks, Store(output), options, as_json=as_json, on_cluster=on_cluster)
         return
     if many is not None:
         set_verbs.lay_into(output, many, sets)
     elif not as_json:
         print_notices(found)
-    records = _measure(tasks, Store(output), options)
+    if machines is None:
+        records = _measure(tasks, Store(output), options)
+    else:
+        records = cluster_runs.measure(
+            *(tasks, Store(output), options, machines),
+            faces=faces,
+            same_environment=same_environment,
+        )
     _present(records, as_json=as_json, where=output, reference=reference)
 
 
@@ -421,6 +434,7 @@ def doctor(*, as_json: Json = False) -> None:
 _MORE = (
     run_verbs,
     report_verbs,
+    publish_verbs,
     validate_verbs,
     holes_verbs,
     theory_verbs,
@@ -461,18 +475,22 @@ def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None
 
 def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
     from cembench.report.render.terminal import results_table, speedups_table
-    from cembench.report.render.terminal_many import MANY, many_table
+    from cembench.report.render.terminal_many import MANY, machines_told, many_table
     from cembench.results.record_rows import REFERENCE, rows
+    from cembench.results.store import Store
 
     reference = reference or REFERENCE
+    environments = Store(where).environments()
     if as_json:
         print_json(rows(records, reference))
     elif len({record.cell.mesh_hash for record in records}) > MANY:
         out.print(many_table(records))
+        for words in machines_told(records, environments):
+            out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
         out.print(f"Pictures and profiles: cembench report {where}", soft_wrap=True)
     else:
-        out.print(results_table(records))
+        out.print(results_table(records, environments))
         speedups = speedups_table(records, reference)
         if speedups is not None:
             out.print(speedups)
@@ -481,7 +499,14 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
         raise typer.Exit(1)
 
 
-def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_json: bool) -> None:
+def _present_plan(
+    tasks: Sequence[Task],
+    store: Store,
+    options: Options,
+    *,
+    as_json: bool,
+    on_cluster: bool = False,
+) -> None:
     """Print which cells would be measured, and their estimated cost."""
     from cembench.commands.progress import duration
     from cembench.report.render.terminal import plan_table
@@ -500,6 +525,8 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
     costs = [cost for _, _, cost in lines if cost is not None]
     seconds = planned_seconds(costs, options.budget)
     largest = max((cost.memory_bytes for cost in costs), default=0)
+    each = [cost for _, _, cost in lines]
+    hours = cluster_runs.hours(tasks, each, options.budget) if on_cluster else None
     if as_json:
         cells = [
             {
@@ -513,7 +540,8 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
             }
             for cell, faces, cost in lines
         ]
-        print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest})
+        more = {"cluster": hours} if hours else {}
+        print_json({"cells": cells, "seconds": seconds, "memory_bytes": largest} | more)
         return
     shown = [
         (cell, faces, cost.basis if cost else f"recorded: {held[cell.key]}", cost)
@@ -529,6 +557,8 @@ def _present_plan(tasks: Sequence[Task], store: Store, options: Options, *, as_j
         f"\n{len(costs)} of {len(tasks)} cells to measure: about {duration(seconds)}, "
         f"{largest / 2**30:.1f} GiB at most{rough}"
     )
+    if hours:
+        cluster_runs.show_hours(hours)
 
 
 def _policies(given: list[str]) -> list[str]:

@@ -16,6 +16,9 @@ from cembench.core.outputs import refuse_inputs
 from cembench.report.export import Format
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    from cembench.results.merging import Conflict
     from cembench.results.records import Cell, Record
     from cembench.results.store import Store
 
@@ -58,6 +61,7 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
             for f in shown
         ],
     }
+    about["machines"] = machines_of(store, verified.records)
     if as_json:
         print_json(about)
     else:
@@ -78,6 +82,7 @@ def _show_status(
         out.print(f"{count:>6}  {state}", style=status_style(state) if state == "ok" else "")
     if others:
         out.print(f"{len(others):>6}  other records, not part of the last request")
+    _show_machines(about["machines"])
     for cell, state in cells:
         if state.name not in ("ok", "waiting"):
             line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {state}"
@@ -85,6 +90,38 @@ def _show_status(
     for finding in about["findings"]:
         if not finding["disagrees"]:
             note(f"{finding['record']}: {finding['detail']}")
+
+
+def machines_of(store: Store, records: Iterable[Record]) -> dict[str, Any]:
+    """Return how many cells each machine measured; of a run on a cluster, how far that is."""
+    from cembench.results.machines import machine_of_record
+    from cembench.running.cluster.state import read_state
+
+    environments = store.environments()
+    state = read_state(store.folder)
+    return {
+        "cells": dict(Counter(machine_of_record(record, environments) for record in records)),
+        "cluster": None if state is None else state.model_dump(),
+    }
+
+
+def _show_machines(about: dict[str, Any]) -> None:
+    from cembench.commands.progress import duration
+
+    if len(about["cells"]) > 1:
+        for name, count in sorted(about["cells"].items(), key=lambda item: -item[1]):
+            out.print(f"{count:>6}  cells measured on {name or 'a machine without a name'}")
+    state = about["cluster"]
+    if state is None:
+        return
+    left = state["seconds_left"]
+    at_work = state["done"] < state["units"]
+    more = f", about {duration(left)} left" if at_work and left is not None else ""
+    words = f"cluster: {state['done']} of {state['units']} surfaces with a policy are done{more}"
+    out.print(f"{words} ({state['written_at']})", soft_wrap=True)
+    for one in state["machines"]:
+        at = "lost" if one["lost"] else (one["at"] or "idle") if at_work else ""
+        out.print(f"{one['units']:>6}  by a worker on {one['machine']}  {at}", soft_wrap=True)
 
 
 #: Messages on whether a run is writing to the folder; None: the lock cannot be opened.
@@ -201,10 +238,15 @@ def merge(
     """Merge the records of several runs into one folder.
 
     If several runs hold a cell, a record that ended ok is preferred, then the
-    later one.
+    later one. Cells of several machines are not mixed: those of one machine go
+    into the run, the same cells of others into runs of their own, in
+    OUTPUT/others.
     """
+    from dataclasses import asdict
+
+    from cembench.results.machines import machine_of
+    from cembench.results.merging import merge as merged
     from cembench.results.store import Store
-    from cembench.results.store import merge as merged
     from cembench.results.verify import Depth, sound_records
 
     refuse_inputs(output, runs, force=force)
@@ -214,14 +256,40 @@ def merge(
         sound_records(Store(run), depth)
     if (output / "records").is_dir():
         sound_records(into, depth)
-    count = merged([Store(run) for run in runs], into)
-    machines = sorted({record.environment for record in into.records()})
+    found = merged([Store(run) for run in runs], into)
+    used = sorted({record.environment for record in into.records()})
+    environments = into.environments()
+    machines = sorted({machine_of(environments.get(key, {})) for key in used})
     if as_json:
-        print_json({"output": str(output), "cells": count, "environments": machines})
+        told = {"output": str(output), "cells": found.cells, "environments": used}
+        conflicts = [asdict(conflict) for conflict in found.conflicts]
+        print_json(told | {"machines": machines, "conflicts": conflicts})
     else:
-        out.print(f"{count} cells in {output}", soft_wrap=True)
-    if len(machines) > 1:
-        warn(f"measured in {len(machines)} environments; compare only ratios from the same run")
+        out.print(f"{found.cells} cells in {output}", soft_wrap=True)
+        _show_conflicts(found.conflicts, output)
+    if len(used) > 1:
+        warn(
+            f"measured in {len(used)} environments, on {len(machines)} machines; only ratios of "
+            "one sitting compare"
+        )
+
+
+#: So many conflicts are named on the terminal.
+NAMED = 10
+
+
+def _show_conflicts(conflicts: Sequence[Conflict], output: Path) -> None:
+    if not conflicts:
+        return
+    out.print(
+        f"{len(conflicts)} cells were measured on several machines; the first named stands in the "
+        f"run, the others in {output / 'others'}:",
+        soft_wrap=True,
+    )
+    for conflict in conflicts[:NAMED]:
+        out.print(f"  {conflict}", soft_wrap=True)
+    if len(conflicts) > NAMED:
+        out.print(f"  and {len(conflicts) - NAMED} more: --json names all")
 
 
 def export(

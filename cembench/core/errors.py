@@ -115,6 +115,10 @@ class NotPositiveDefinite(AlgorithmFailed):
     """
 
 
+class ClusterError(CembenchError):
+    """A cluster cannot be reached, is gone, or has machines that cannot measure what is asked."""
+
+
 class RenderError(CembenchError):
     """A picture cannot be drawn or written.
 

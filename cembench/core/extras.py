@@ -17,6 +17,7 @@ from cembench.core.errors import CembenchError
 class Extra(StrEnum):
     """An optional set of libraries: ``pip install 'cembench[NAME]'``."""
 
+    CLUSTER = "cluster"
     FETCH = "fetch"
     FORMATS = "formats"
     PARDISO = "pardiso"
@@ -30,6 +31,7 @@ class Extra(StrEnum):
 
 #: The modules that each extra installs.
 MODULES: Mapping[Extra, tuple[str, ...]] = {
+    Extra.CLUSTER: ("dask", "distributed", "dask_jobqueue"),
     Extra.FETCH: ("pooch", "requests"),
     Extra.FORMATS: ("OpenEXR", "meshio", "nibabel", "trimesh"),
     Extra.PARDISO: ("pypardiso",),

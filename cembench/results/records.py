@@ -160,6 +160,8 @@ class FaultKind(StrEnum):
     PROCESS_ENDED = "process_ended"
     #: The answer of the process cannot be read.
     UNREADABLE_ANSWER = "unreadable_answer"
+    #: The unit of the cell ended the workers of a cluster that measured it.
+    WORKERS_LOST = "workers_lost"
     #: A dependency is not installed on this machine.
     NOT_THERE = "not_there"
     #: An external program ended with a nonzero exit code, or by a signal.
@@ -443,6 +445,8 @@ class Environment(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
+    #: What the machine is called; None in records older than this field.
+    machine: Printable | None = None
     cpu: str | None = None
     cores: Count | None = None
     memory_bytes: Count | None = None

@@ -20,9 +20,9 @@ from cembench.core.errors import RecordError
 from cembench.results.records import Cell, Record
 
 #: Folders of a run.
-FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits")
+FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits", "others")
 #: Files of a run, without its marker.
-PLAN, LOCK = "plan.json", "lock"
+PLAN, LOCK, MACHINES = "plan.json", "lock", "machines.json"
 #: Adapter for the cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 
@@ -47,7 +47,7 @@ def is_own(folder: Path, path: Path) -> bool:
         inside = path.resolve().relative_to(folder.resolve())
     except ValueError:
         return False
-    own = (*FOLDERS, PLAN, LOCK, folders.MARKERS["run"])
+    own = (*FOLDERS, PLAN, LOCK, MACHINES, folders.MARKERS["run"])
     return not inside.parts or inside.parts[0] in own
 
 

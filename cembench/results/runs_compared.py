@@ -88,6 +88,15 @@ def machine_differences(before: Mapping[str, object], after: Mapping[str, object
     """Return the differences of two environments that make their seconds incomparable."""
     return [
         f"{name}: {before.get(name)} / {after.get(name)}"
-        for name in ("cpu", "cores", "memory_bytes", "platform", "python", "libraries", "blas")
+        for name in (
+            "machine",
+            "cpu",
+            "cores",
+            "memory_bytes",
+            "platform",
+            "python",
+            "libraries",
+            "blas",
+        )
         if before.get(name) != after.get(name)
     ]

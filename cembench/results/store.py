@@ -9,6 +9,8 @@
     RUN/plan.json                                 the cells of the last request
     RUN/samples/<mesh>--<algorithm>--<key>/       the journal of an unfinished cell:
         <id>.jsonl  <id>.npz                      one line per finished process, and the map
+    RUN/machines.json                             progress of a run on a cluster
+    RUN/others/<machine>/                         records of other machines in a merged run
     RUN/lock                                      held while a run is writing
     RUN/cembench.json                             marker of the folder
     RUN/scratch-<token>/                          files exchanged between processes
@@ -23,7 +25,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -201,6 +203,11 @@ class Store:
         journals = files_in(self.folder / "samples" / cell.label, "*.jsonl")
         return max((len(Samples(journal).rounds()) for journal in journals), default=None)
 
+    def forget(self, cell: Cell) -> None:
+        """Delete a cell's record and map, if they are here."""
+        for path in (self._record_path(cell), self._map_path(cell)):
+            path.unlink(missing_ok=True)
+
     def forget_samples(self, cell: Cell) -> None:
         """Delete the journals of an unfinished cell."""
         shutil.rmtree(self.folder / "samples" / cell.label, ignore_errors=True)
@@ -305,30 +312,6 @@ class Store:
 
     def _mesh_path(self, mesh_hash: str) -> Path:
         return self.folder / "meshes" / f"{file_name(mesh_hash[:32])}.npz"
-
-
-def merge(runs: Iterable[Store], into: Store) -> int:
-    """Merge the records of several runs; return the number of records in the result.
-
-    If several runs hold a cell, a record that ended ok is preferred, then the later one. All runs
-    are read before anything is written.
-    """
-    found = [(run, run.records()) for run in runs]
-    best: dict[str, tuple[tuple[bool, str], Store, Record]] = {}
-    with into.locked():
-        for run, records in [*found, (into, into.finished())]:
-            for record in records:
-                rank = (record.outcome.status == "ok", record.started_at)
-                key = record.cell.key
-                if key not in best or best[key][0] < rank:
-                    best[key] = (rank, run, record)
-        for _, run, record in best.values():
-            environment = run.environments().get(record.environment, {"id": record.environment})
-            into.save(record, run.uv(record.cell), environment)
-            mesh = run.mesh(record.cell)
-            if mesh is not None:
-                into.save_mesh(mesh)
-    return len(best)
 
 
 def lock_path(folder: Path) -> Path:

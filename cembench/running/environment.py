@@ -11,6 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from cembench.core.names import printable
+
 #: Variables that set the number of threads; set them before numerical libraries are loaded.
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -19,6 +21,8 @@ THREAD_VARIABLES = (
     "IGL_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
+#: Names the machine in records; set it where the system's name changes, as in containers.
+MACHINE_VARIABLE = "CEMBENCH_MACHINE"
 _LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pypardiso", "pydantic")
 
 
@@ -27,12 +31,18 @@ def with_threads(count: int) -> dict[str, str]:
     return os.environ | dict.fromkeys(THREAD_VARIABLES, str(count))
 
 
+def machine_name() -> str:
+    """What is this machine called in records? `CEMBENCH_MACHINE`, or the system's name of it."""
+    return printable(os.environ.get(MACHINE_VARIABLE) or platform.node() or "unnamed")
+
+
 def describe_environment() -> dict[str, Any]:
     """Return everything that a figure may depend on, as JSON values; "id" is a hash of the rest."""
     import psutil
     from threadpoolctl import threadpool_info
 
     about: dict[str, Any] = {
+        "machine": machine_name(),
         "cembench": version("cembench"),
         "git": _git_state(),
         "python": platform.python_version(),

@@ -127,6 +127,9 @@ class Watcher:
     def begins(self, processes: int) -> None:
         """So many processes are to be run."""
 
+    def timing_begins(self) -> None:
+        """All checks have ended; what is run from now on is timed."""
+
     def goes_on(self, task: Task, rounds: int) -> None:
         """A cell is not precise yet: so many more rounds of it follow."""
 
@@ -138,6 +141,12 @@ class Watcher:
 
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
         """A cell's record is there, from before if `kept`; no more processes are run for it."""
+
+    def machines(self, names: Sequence[str]) -> None:
+        """These machines of a cluster take part now, one name for each worker."""
+
+    def tells(self, words: str) -> None:
+        """Something happened to a machine of the cluster, or to what it measured."""
 
 
 def run_tasks(
@@ -185,12 +194,29 @@ def map_once(
             f"the temporary folder cannot be used: {error.strerror or error}. Make room in it, or "
             "set TMPDIR to another."
         ) from error
-    return _record(task, outcome, describe_environment()["id"], started), uv
+    return record_of(task, outcome, describe_environment()["id"], started), uv
 
 
 def in_random_order(tasks: Sequence[Task], seed: int, number: int) -> list[Task]:
     """The order of a round: another one each round, the same for the same seed."""
     return random.Random(f"{seed} {number}").sample(list(tasks), len(tasks))
+
+
+def kept_record(
+    task: Task, store: Store, options: Options, asked: AbstractSet[str]
+) -> Record | None:
+    """Return the record that stands, if any; samples of what is measured anew are forgotten.
+
+    A record follows its mesh to another name, unless the old one is `asked` for too.
+    """
+    kept = store.find(task.cell)
+    if kept is not None or options.fresh:
+        store.forget_samples(task.cell)
+    if kept is None or options.measures_again(kept):
+        return None
+    if kept.cell.label != task.cell.label:
+        return store.rename(kept, task.cell, keep=kept.cell.label in asked)
+    return kept
 
 
 @dataclass
@@ -216,6 +242,7 @@ class _Run:
             self._load(task)
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         self._check_all(pending)
+        self.watcher.timing_begins()
         most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
@@ -229,19 +256,10 @@ class _Run:
                 self._time(task, number, kernel)
 
     def _is_kept(self, task: Task, asked: AbstractSet[str]) -> bool:
-        """Is there a record that stands? Samples of what is measured anew are forgotten.
-
-        A record follows its mesh to another name, unless the old one is `asked` for too.
-        """
-        kept = self.store.find(task.cell)
-        if kept is not None or self.options.fresh:
-            self.store.forget_samples(task.cell)
-        if kept is None or self.options.measures_again(kept):
-            return False
-        if kept.cell.label != task.cell.label:
-            kept = self.store.rename(kept, task.cell, keep=kept.cell.label in asked)
-        self._finish(task, kept, kept=True)
-        return True
+        kept = kept_record(task, self.store, self.options, asked)
+        if kept is not None:
+            self._finish(task, kept, kept=True)
+        return kept is not None
 
     def _load(self, task: Task) -> None:
         samples = self._samples(task)
@@ -388,7 +406,7 @@ class _Run:
 
     def _save(self, task: Task, outcome: Outcome) -> None:
         started = outcome.rounds[0].started_at if outcome.rounds else _now()
-        record = _record(task, outcome, self.environment["id"], started)
+        record = record_of(task, outcome, self.environment["id"], started)
         self.store.save(record, self._samples(task).uv(), self.environment)
         self._finish(task, record, kept=False)
 
@@ -458,7 +476,8 @@ def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
     return tuple(told)
 
 
-def _record(task: Task, outcome: Outcome, environment: str, started: str) -> Record:
+def record_of(task: Task, outcome: Outcome, environment: str, started: str) -> Record:
+    """Return the record of a cell that came to this."""
     return Record(
         cell=task.cell,
         title=task.algorithm.title,

@@ -37,7 +37,8 @@ from cembench.running.returned import outcome_of_error
 _LOADED_LATE = ("igl", "scipy.optimize")
 #: The folder next to the answer for the folders of external programs.
 PROGRAMS = "programs"
-_MESH_TYPES = {kind.__name__: kind for kind in (TriangleMesh, DiskMesh, HoledMesh)}
+#: The kinds of surfaces, by the names that jobs have for them.
+MESH_TYPES = {kind.__name__: kind for kind in (TriangleMesh, DiskMesh, HoledMesh)}
 
 
 JobTask = Literal["check", "time", "again", "judge check", "judge calls"]
@@ -181,7 +182,7 @@ def _mesh(job: Job) -> TriangleMesh:
     V, F = (np.load(file) for file in job.mesh_files)
     V.setflags(write=False)
     F.setflags(write=False)
-    mesh = _MESH_TYPES[job.mesh_type].trusted(V, F, job.cell.mesh, job.notices)
+    mesh = MESH_TYPES[job.mesh_type].trusted(V, F, job.cell.mesh, job.notices)
     if mesh.hash != job.cell.mesh_hash:
         raise MeshError(f"{job.mesh_files[0]} or {job.mesh_files[1]} was changed; run again.")
     return mesh

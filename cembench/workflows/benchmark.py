@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,12 +20,13 @@ from cembench.results.record_rows import REFERENCE
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.local import DEFAULT_TIMEOUT, USUAL_BUDGET, Options, Watcher, run_tasks
-from cembench.running.plan import MeasurementSettings, PaperRole, paper_roles, plan_cells
+from cembench.running.plan import MeasurementSettings, PaperRole, Task, paper_roles, plan_cells
 from cembench.workflows.notebook import html_table
 from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 if TYPE_CHECKING:
     import pandas as pd
+    from distributed import Client
 
     from cembench.report.document import Report
 
@@ -192,6 +194,7 @@ def benchmark(
     seed: int = 0,
     plugins: Sequence[str] = (),
     watcher: Watcher | None = None,
+    cluster: Client | str | None = None,
 ) -> Run:
     """Benchmark algorithms on surfaces, with fresh processes for every round.
 
@@ -236,6 +239,9 @@ def benchmark(
         Python files or ``module:name`` with more algorithms.
     watcher : Watcher, optional
         Receives progress events.
+    cluster : distributed.Client or str, optional
+        Measure on the workers of this client, or where ``cembench run --cluster`` would:
+        ``"local:2"``, ``"tcp://HOST:8786"``. See ``docs/cluster.md``.
 
     Returns
     -------
@@ -252,10 +258,12 @@ def benchmark(
         A parameter is unknown or out of range.
     RecordError
         The folder is not a run, or cannot be written to.
+    ClusterError
+        The scheduler cannot be reached, or is gone; what is finished is in the folder.
 
     Notes
     -----
-    All errors are raised before anything is measured.
+    All errors but the last are raised before anything is measured.
 
     Examples
     --------
@@ -296,8 +304,27 @@ def benchmark(
         tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
     options = Options(timeout, memory_bytes, seed=seed, reference=reference, budget=budget)
-    run_tasks(tasks, Store(folder), options, watcher)
+    if cluster is None:
+        run_tasks(tasks, Store(folder), options, watcher)
+    else:
+        _on_cluster(tasks, Store(folder), options, watcher, cluster)
     return Run(folder)
+
+
+def _on_cluster(
+    tasks: Sequence[Task],
+    store: Store,
+    options: Options,
+    watcher: Watcher | None,
+    cluster: Client | str,
+) -> None:
+    require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
+    from cembench.running.cluster.client import run_on_cluster
+    from cembench.running.cluster.connect import connected, parse_cluster
+
+    where = connected(parse_cluster(cluster)) if isinstance(cluster, str) else nullcontext(cluster)
+    with where as client:
+        run_on_cluster(tasks, store, client, options, watcher)
 
 
 def _roles(registry: Registry, given: SurfaceInput) -> dict[str, PaperRole]:

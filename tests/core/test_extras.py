@@ -14,7 +14,11 @@ from cembench.workflows.benchmark import Run
 
 ROOT = Path(__file__).parents[2]
 #: Where the name of a module is not that of what is installed.
-DISTRIBUTIONS = {"skimage": "scikit-image", "imageio_ffmpeg": "imageio-ffmpeg"}
+DISTRIBUTIONS = {
+    "skimage": "scikit-image",
+    "imageio_ffmpeg": "imageio-ffmpeg",
+    "dask_jobqueue": "dask-jobqueue",
+}
 
 
 def project():

@@ -20,7 +20,8 @@ from cembench.report.document import (
 )
 from cembench.report.render.terminal_report import paper_tables
 from cembench.report.write_report import write_report
-from cembench.results.store import Store, merge
+from cembench.results.merging import merge
+from cembench.results.store import Store
 from tests.report.small_run import write_run
 
 

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from cembench.core.errors import RecordError
+from cembench.results.merging import merge
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
-from cembench.results.store import Store, merge
+from cembench.results.store import Store
 
 
 @pytest.fixture
@@ -169,10 +170,10 @@ def test_merging_takes_the_ok_and_then_the_later_one(record, tmp_path):
     runs = [saved("2001"), saved("2003"), saved("2002"), saved("2004", outcome=failed)]
     runs.append(saved("2000", cell=record.cell.model_copy(update={"threads": 2})))
     into = Store(tmp_path / "all")
-    assert merge(runs, into) == 2
+    assert merge(runs, into).cells == 2
     assert sorted(r.started_at for r in into.records()) == ["2000", "2003"]
     assert into.uv(record.cell) is not None
-    assert merge([runs[0]], into) == 2
+    assert merge([runs[0]], into).cells == 2
     assert sorted(r.started_at for r in into.records()) == ["2000", "2003"]
 
 

@@ -21,6 +21,7 @@ from cembench.results import paper
 from cembench.results import record_rows as frame
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
+from cembench.results.machines import Marks, marks
 from cembench.results.records import Cell, MeshOrigin, Record
 from cembench.results.store import Store
 
@@ -107,6 +108,11 @@ class Evidence:
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
         return {row["key"]: row for row in frame.rows(self.records)}
+
+    @cached_property
+    def machines(self) -> Marks:
+        """A mark for the seconds of each machine, where the records are of several."""
+        return marks(self.records, self.store.environments())
 
     @cached_property
     def policies(self) -> tuple[str, ...]:

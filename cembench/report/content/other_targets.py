@@ -39,7 +39,8 @@ def other_targets(evidence: Evidence) -> Table | None:
             seconds = outcome.median_seconds
             timed = Value("-", None, "", key, why or "not timed")
             if seconds is not None:
-                timed = Value(significant(seconds), seconds, surface.origin, key)
+                told = f"{significant(seconds)} {evidence.machines.of(record)}".rstrip()
+                timed = Value(told, seconds, surface.origin, key)
             rows.append(
                 (
                     words(surface.title),

@@ -99,6 +99,8 @@ def here(
     if quantity.timed and evidence.row(record)["unstable"]:
         why = f"unstable: its 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
     text = quantity.show(number) + ("!" if why else "")
+    if quantity.timed:
+        text = f"{text} {evidence.machines.of(record)}".rstrip()
     return Value(text, float(number), surface.origin, record.cell.key, why)
 
 

@@ -24,6 +24,7 @@ from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
+from cembench.report.content.machines import machines_section
 from cembench.report.content.many.found import many_findings
 from cembench.report.content.many.section import is_many, many_section
 from cembench.report.content.many.worst import hardest
@@ -83,6 +84,8 @@ def build_report(
     beyond = _beyond(evidence, folder, by_surface=not many)
     first = _first_plot(beyond)
     sections = [] if many else [_summary(evidence, of_paper=of_paper)]
+    machines = machines_section(evidence)
+    sections += [machines] if machines else []
     if many:
         about_all = many_section(evidence, shown, inspections, folder)
         first = _first_plot(about_all)
@@ -165,8 +168,9 @@ def _machine(about: Mapping[str, object]) -> str:
         versions = f"; {', '.join(chosen)}"
     git = about.get("git")
     commit = f"; commit {str(git.get('commit'))[:12]}" if isinstance(git, dict) else ""
+    named = f"{about['machine']}: " if about.get("machine") else ""
     return (
-        f"{about.get('cpu')}, {about.get('cores')} cores{size}; Python {about.get('python')}"
+        f"{named}{about.get('cpu')}, {about.get('cores')} cores{size}; Python {about.get('python')}"
         f"{versions}{commit}"
     )
 

@@ -142,7 +142,7 @@ def _line(
     seconds = outcome.median_seconds
     low, high = row["seconds_low"], row["seconds_high"]
     half = None if low is None or not seconds else 50 * (high - low) / seconds
-    mark = "!" if row["unstable"] else ""
+    mark = f"{'!' if row['unstable'] else ''} {evidence.machines.of(record)}".rstrip()
     cells = [
         words(label),
         words(record.cell.solves),

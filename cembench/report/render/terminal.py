@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
+from types import MappingProxyType
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -28,6 +29,7 @@ from cembench.results.comparison import (
     seconds_interval,
 )
 from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.machines import Environments, Marks, marks
 from cembench.results.many import corrected
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.results.runs_compared import Change
@@ -41,25 +43,30 @@ def status_style(status: str) -> str:
     return _STYLES.get(status, "bold red")
 
 
-def results_table(records: Iterable[Record]) -> RenderableType:
+def results_table(
+    records: Iterable[Record], environments: Environments = MappingProxyType({})
+) -> RenderableType:
     """Return the results, one row per cell, grouped by surface, with a table per policy.
 
-    Mean and SD are of the angle errors in degrees. Seconds are the median of the rounds, followed
-    by half the width of its 95 % interval in percent, with a ! if that is wide. The causes of cells
-    that did not end ok are listed below.
+    `environments` are the store's: seconds are marked if they are of several machines. Mean and SD
+    are of the angle errors in degrees. Seconds are the median of the rounds, followed by half the
+    width of its 95 % interval in percent, with a ! if that is wide. The causes of cells that did
+    not end ok are listed below.
     """
     ordered = list(records)
+    marked = marks(ordered, environments)
     policies = list(dict.fromkeys(record.cell.solves for record in ordered))
     parts: list[RenderableType] = []
     for policy in policies:
         chosen = [record for record in ordered if record.cell.solves == policy]
         if len(policies) > 1:
             parts.append(Text(f"\nsolves: {policy}", style="bold"))
-        parts.append(_cells_table(chosen))
-    return Group(*parts, *_remarks(ordered))
+        parts.append(_cells_table(chosen, marked))
+    told = [Text(line, style="yellow") for line in marked.explained()]
+    return Group(*parts, *told, *_remarks(ordered))
 
 
-def _cells_table(records: Sequence[Record]) -> Table:
+def _cells_table(records: Sequence[Record], marked: Marks) -> Table:
     longest = max((len(_name(record)) for record in records), default=9)
     shown = metrics_shown("overview")
     columns = [
@@ -78,7 +85,9 @@ def _cells_table(records: Sequence[Record]) -> Table:
                     _name(record),
                     *(_figure(record, metric) for metric in shown),
                     "-" if outcome.iterations is None else str(outcome.iterations),
-                    "-" if outcome.median_seconds is None else f"{outcome.median_seconds:.3f}",
+                    "-"
+                    if outcome.median_seconds is None
+                    else f"{outcome.median_seconds:.3f} {marked.of(record)}".rstrip(),
                     _spread(record),
                     Text(outcome.status, style=status_style(outcome.status)),
                 ]

@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from cembench.report.render.grid import figures, grid, names
+from cembench.results.machines import Environments, marks
 from cembench.results.records import Record
 
 #: With more surfaces than this, runs are summarised instead of shown cell by cell.
@@ -42,6 +43,15 @@ def many_table(records: Sequence[Record]) -> RenderableType:
     if len(causes) > TOLD:
         told.append(Text(f"        and {len(causes) - TOLD} other kinds", style="dim"))
     return Group(grid(columns, lines, title=title), *([Text("")] if told else []), *told)
+
+
+def machines_told(records: Sequence[Record], environments: Environments) -> list[Text]:
+    """Say that the median seconds are of several machines, if they are."""
+    marked = marks(records, environments)
+    if not marked.letters:
+        return []
+    told = f"! median seconds are over surfaces on {len(marked.letters)} machines, which mixes them"
+    return [Text(told, style="yellow"), *(Text(t, style="dim") for t in marked.explained())]
 
 
 def _line(name: str, records: Sequence[Record]) -> list[str]:

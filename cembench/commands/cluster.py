@@ -1,0 +1,203 @@
+"""Runs on a cluster: what ``run --cluster`` starts, shows and estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from cembench.commands.console import err, out
+from cembench.commands.ending import resumable
+from cembench.commands.progress import LiveProgress, PlainProgress, Remaining, duration
+from cembench.running.local import Step
+from cembench.running.plan import Task
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from rich.console import Console
+
+    from cembench.results.records import Record
+    from cembench.results.store import Store
+    from cembench.running.cluster.connect import ClusterPlace
+    from cembench.running.estimate import Estimate
+    from cembench.running.local import Options
+
+Cluster = Annotated[
+    str | None,
+    typer.Option(
+        "--cluster",
+        help="Measure on local:N workers, on those of tcp://HOST:PORT, or on "
+        "slurm:partition=cpu,cores=16,machines=10: see docs/cluster.md.",
+    ),
+]
+SameEnvironment = Annotated[
+    bool,
+    typer.Option(
+        "--same-environment", help="Of a cluster, leave out machines with other software."
+    ),
+]
+#: For so many machines hours are estimated.
+ESTIMATED_FOR = (1, 10, 100)
+
+
+def place_of(given: str | None, *, same_environment: bool) -> ClusterPlace | None:
+    """Read ``--cluster``, before anything else is done; None without.
+
+    Raises
+    ------
+    ParameterError
+        It cannot be read, or ``--same-environment`` stands alone.
+    MissingExtra
+        dask is not installed.
+
+    """
+    from cembench.core.errors import ParameterError
+    from cembench.core.extras import Extra, require
+    from cembench.running.cluster.connect import parse_cluster
+
+    if given is None:
+        if same_environment:
+            raise ParameterError("--same-environment is of --cluster: name one, or leave it out.")
+        return None
+    where = parse_cluster(given)
+    needed = ["dask", "distributed", *(["dask_jobqueue"] if where.kind == "slurm" else [])]
+    require(Extra.CLUSTER, "--cluster", *needed)
+    return where
+
+
+def measure(
+    tasks: Sequence[Task],
+    store: Store,
+    options: Options,
+    where: ClusterPlace,
+    *,
+    faces: int | None,
+    same_environment: bool,
+) -> list[Record]:
+    """Run the tasks on a cluster, with a live table on a terminal."""
+    from cembench.running.cluster.client import run_on_cluster
+    from cembench.running.cluster.connect import connected
+
+    with resumable(), _progress(len(tasks)) as progress:
+        progress.tells("starting workers" if where.kind != "address" else "connecting")
+        with connected(where) as client:
+            return run_on_cluster(
+                tasks,
+                store,
+                client,
+                options,
+                progress,
+                faces=faces,
+                same_environment=same_environment,
+            )
+
+
+@contextmanager
+def _progress(cells: int) -> Iterator[PlainProgress]:
+    with (LiveOnCluster if err.is_terminal else PlainOnCluster)(err, cells) as progress:
+        yield progress
+
+
+class SharedRemaining(Remaining):
+    """What is left is shared by several machines."""
+
+    machines = 1
+
+    @property
+    def seconds(self) -> float | None:
+        """Of what is left, if all machines are at work to the end."""
+        alone = super().seconds
+        return None if alone is None else alone / self.machines
+
+
+class PlainOnCluster(PlainProgress):
+    """A line for each cell that is finished and for what happens to machines."""
+
+    def __init__(self, console: Console, cells: int) -> None:
+        super().__init__(console, cells)
+        self.remaining: SharedRemaining = SharedRemaining()
+
+    def starts(self, task: Task, step: Step) -> None:
+        """Nothing: several machines are at several steps."""
+
+    def machines(self, names: Sequence[str]) -> None:
+        """Say how many workers there are; those of one machine take turns."""
+        self.remaining.machines = max(1, len(set(names)))
+        self._say(_workers(names))
+
+    def tells(self, words: str) -> None:
+        """Say it."""
+        self._say(words)
+
+
+class LiveOnCluster(LiveProgress):
+    """The live table; what happens to machines stands below it, and stays."""
+
+    def __init__(self, console: Console, cells: int) -> None:
+        super().__init__(console, cells)
+        self.remaining: SharedRemaining = SharedRemaining()
+
+    def machines(self, names: Sequence[str]) -> None:
+        """Say how many workers there are."""
+        self.remaining.machines = max(1, len(set(names)))
+        self.tells(_workers(names))
+
+    def tells(self, words: str) -> None:
+        """Say it above the table."""
+        self.console.print(words, markup=False, soft_wrap=True)
+
+
+def _workers(names: Sequence[str]) -> str:
+    return f"{len(names)} worker{'' if len(names) == 1 else 's'} there"
+
+
+def hours(
+    tasks: Sequence[Task], costs: Sequence[Estimate | None], budget: float | None
+) -> dict[str, Any]:
+    """How long would so many machines take, and what keeps them from taking less?
+
+    Returns
+    -------
+    dict
+        ``seconds`` by number of machines; ``units``, how many there are; ``longest``, the surface
+        whose unit takes longest, and its seconds.
+
+    """
+    from cembench.running.cluster.units import grouped, makespan
+    from cembench.running.estimate import planned_seconds
+
+    known = {t.cell.label: cost for t, cost in zip(tasks, costs, strict=True) if cost is not None}
+    groups = grouped([task for task in tasks if task.cell.label in known])
+    found = {}
+    for machines in ESTIMATED_FOR:
+        share = None if budget is None else budget * machines / max(1, len(groups))
+        seconds = [planned_seconds([known[t.cell.label] for t in g], share) for g in groups]
+        found[machines] = makespan(seconds, machines) if seconds else 0.0
+    longest = max(zip(seconds, groups, strict=True), key=lambda one: one[0], default=None)
+    return {
+        "seconds": found,
+        "units": len(groups),
+        "longest": None if longest is None else longest[1][0].cell.mesh,
+        "longest_seconds": None if longest is None else longest[0],
+    }
+
+
+def show_hours(found: dict[str, Any]) -> None:
+    """Print what :func:`hours` found."""
+    for machines, seconds in found["seconds"].items():
+        longest = found["longest_seconds"] or 0.0
+        limit = (
+            f": no less than {found['longest']} takes"
+            if machines > 1 and seconds <= 1.01 * longest
+            else ""
+        )
+        name = "machine " if machines == 1 else "machines"
+        out.print(f"{machines:>6} {name}  about {duration(seconds)}{limit}", soft_wrap=True)
+    out.print(
+        f"{found['units']} surfaces with a policy travel, each to one machine; the longest takes "
+        f"about {duration(found['longest_seconds'] or 0.0)}.",
+        soft_wrap=True,
+    )

@@ -1,0 +1,45 @@
+"""The verb that makes a site of several runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cembench.commands.console import Json, err, out, print_json
+from cembench.core.outputs import refuse_inputs
+
+
+def publish(
+    runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where the site goes.")],
+    as_json: Json = False,
+) -> None:
+    """Write a static site of several runs: index, machines, ratios over time, reports.
+
+    It needs no network and no server: open index.html, or put the folder on a web server.
+    """
+    from dataclasses import asdict
+
+    from cembench.report.site import publish as write_site
+    from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records
+
+    refuse_inputs(output, runs, force=False)
+    for run in runs:
+        sound_records(Store(run), Depth.sample)
+
+    def progress(words: str, done: int, total: int) -> None:
+        err.print(f"[{done}/{total}] {words}", markup=False, style="dim")
+
+    found = write_site(runs, output, progress)
+    if as_json:
+        print_json({"output": str(output), "runs": [asdict(one) for one in found]})
+    else:
+        out.print(f"{len(found)} runs in {output / 'index.html'}", soft_wrap=True)
+
+
+#: Each verb with the examples that its help shows.
+VERBS = ((publish, "Example:  cembench publish results/may results/june -o site"),)

@@ -1,0 +1,234 @@
+"""Several runs as a static site: an index, their machines, their ratios over time, their reports.
+
+::
+
+    index.html                 what the runs are, and what became of ratios from one to the next
+    figures/history.*          the ratios as a plot, and its data
+    runs/<name>/index.html     the report of each run, one file
+    contents.json              which of the folder's files are the site's, with their hashes
+
+Every link is relative and nothing is asked of the network: it works from a disk as from a server.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, log
+from pathlib import Path
+from statistics import mean
+
+from cembench import __version__
+from cembench.core import folders
+from cembench.core.atomic import draft_folder, unwritable, write_text
+from cembench.core.errors import ParameterError
+from cembench.core.extras import Extra, require
+from cembench.core.names import distinct_slugs
+from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.report import build_report
+from cembench.report.palette import looks
+from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
+from cembench.results.machines import machine_of, machine_of_record, software_differences
+
+#: Is told which run's report is made, how many are done, and how many there are.
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class PublishedRun:
+    """A run as the index shows it.
+
+    `ratios` are seconds over the reference's, by algorithm and then by surface and policy: each is
+    formed within one machine and one sitting.
+    """
+
+    name: str
+    date: str
+    commits: tuple[str, ...]
+    cells: int
+    ok: int
+    surfaces: int
+    machines: Mapping[str, int]
+    processors: Mapping[str, str]
+    ratios: Mapping[str, Mapping[str, float]]
+    differing: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class HeadlineRatio:
+    """The geometric mean of an algorithm's ratios in a run, and over how many surfaces."""
+
+    ratio: float
+    surfaces: int
+    #: Whether these are the surfaces of every run that has the algorithm.
+    common: bool
+
+    def __str__(self) -> str:
+        return f"{self.ratio:.2f} ({self.surfaces}{'' if self.common else '*'})"
+
+
+def publish(
+    runs: Sequence[Path], folder: Path, progress: Progress = lambda *_: None
+) -> list[PublishedRun]:
+    """Write the site of several runs.
+
+    Parameters
+    ----------
+    runs : sequence of Path
+        The runs' folders.
+    folder : Path
+        A new or empty folder, or an earlier site.
+    progress : function
+        What is told how far it is.
+
+    Returns
+    -------
+    list of PublishedRun
+        The runs, in order of their dates.
+
+    Raises
+    ------
+    ParameterError
+        No run, or the same one twice.
+    RecordError
+        A folder holds no run, or the site's folder holds other files.
+    MissingExtra
+        What only reports need is not installed.
+
+    """
+    require(Extra.REPORT, "a site")
+    places = [run.resolve() for run in runs]
+    if not places or len(set(places)) < len(places):
+        raise ParameterError("publish takes one run or more, each once.")
+    folders.check(folder, "report")
+    names = distinct_slugs({str(place): place.name for place in places})
+    found = []
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with draft_folder(folder) as draft:
+            for k, run in enumerate(runs):
+                name = names[str(places[k])]
+                progress(name, k, len(runs))
+                found.append(_publish_one(run, name, draft))
+            progress("index", len(runs), len(runs))
+            found.sort(key=lambda one: (one.date, one.name))
+            _write_index(found, draft)
+            folders.publish(draft, folder, "report")
+    except OSError as error:
+        raise unwritable(folder, error) from error
+    return found
+
+
+def _publish_one(run: Path, name: str, draft: Path) -> PublishedRun:
+    from cembench.report.render.html import render  # needs the extra
+
+    evidence = Evidence.of(run)
+    with draft_folder(draft / "making") as making:
+        report = build_report(evidence, making, f"cembench report {run}")
+        write_text(draft / "runs" / name / "index.html", render(report, making))
+    return about(evidence, name)
+
+
+def about(evidence: Evidence, name: str) -> PublishedRun:
+    """Gather what the index says of a run."""
+    environments = evidence.store.environments()
+    records = evidence.records
+    machines: dict[str, int] = {}
+    for record in records:
+        machine = machine_of_record(record, environments)
+        machines[machine] = machines.get(machine, 0) + 1
+    used = {record.environment for record in records}
+    commits = {
+        str(git.get("commit"))[:10] + ("+" if git.get("dirty") else "")
+        for key in used
+        if isinstance(git := environments.get(key, {}).get("git"), Mapping)
+    }
+    versions = {str(environments.get(key, {}).get("cembench") or "") for key in used} - {""}
+    ratios: dict[str, dict[str, float]] = {}
+    for record in records:
+        rate = evidence.rate(record) if record.outcome.status == "ok" else None
+        base = evidence.base(record)
+        if rate is not None and base is not None and base.environment == record.environment:
+            place = f"{record.cell.mesh_hash} {record.cell.solves}"
+            ratios.setdefault(record.cell.algorithm, {})[place] = 1 + rate
+    return PublishedRun(
+        name=name,
+        date=max(record.started_at for record in records)[:10],
+        commits=tuple(sorted(commits or versions)),
+        cells=len(records),
+        ok=sum(record.outcome.status == "ok" for record in records),
+        surfaces=len(evidence.surfaces),
+        machines=machines,
+        processors={
+            machine_of(environments.get(key, {})): str(environments.get(key, {}).get("cpu") or "-")
+            for key in sorted(used)
+        },
+        ratios=ratios,
+        differing=tuple(software_differences(records, environments)),
+    )
+
+
+def history(runs: Sequence[PublishedRun]) -> dict[str, list[HeadlineRatio | None]]:
+    """Return each algorithm's headline ratio in each run, None where the run has none.
+
+    Averaged are the surfaces that all runs with the algorithm have, so that another choice of
+    surfaces is not taken for a change; where they have none in common, a run's own.
+
+    Examples
+    --------
+    >>> history([])
+    {}
+
+    """
+    found: dict[str, list[HeadlineRatio | None]] = {}
+    for name in sorted({name for run in runs for name in run.ratios}):
+        having = [set(run.ratios[name]) for run in runs if name in run.ratios]
+        common = set.intersection(*having)
+        row: list[HeadlineRatio | None] = []
+        for run in runs:
+            own = run.ratios.get(name)
+            if own is None:
+                row.append(None)
+                continue
+            chosen = common or set(own)
+            average = exp(mean(log(own[place]) for place in sorted(chosen)))
+            row.append(HeadlineRatio(average, len(chosen), bool(common)))
+        found[name] = row
+    return found
+
+
+def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
+    from cembench.report.render.html import environment, template_text
+
+    told = history(runs)
+    if len(runs) > 1 and told:
+        write_plot(_plot(runs, told), draft)
+    page = (
+        environment()
+        .get_template("site.html")
+        .render(
+            runs=runs,
+            history=told,
+            reference=REFERENCE,
+            style=template_text("site.css"),
+            drawn=len(runs) > 1 and bool(told),
+            starred=any(one and not one.common for row in told.values() for one in row),
+            version=__version__,
+        )
+    )
+    write_text(draft / "index.html", page)
+
+
+def _plot(runs: Sequence[PublishedRun], told: Mapping[str, list[HeadlineRatio | None]]) -> Plot:
+    styles = looks(list(told))
+    series = []
+    for name, row in told.items():
+        points = [
+            Point(k, one.ratio, f"{run.name}, {run.date}")
+            for k, (run, one) in enumerate(zip(runs, row, strict=True), start=1)
+            if one
+        ]
+        series.append(through(name, points, "both", styles[name]))
+    y = Axis(f"seconds over {REFERENCE}'s", log=True)
+    panel = PlotPanel(Axis("run, by date"), y, tuple(series))
+    return Plot("history", "Ratios from run to run", (panel,))

@@ -1,0 +1,129 @@
+"""On which machines was a run measured? Seconds of several do not compare; ratios within one do."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from string import ascii_lowercase
+from typing import Any
+
+from cembench.results.records import Record
+
+Environments = Mapping[str, Mapping[str, Any]]
+
+
+def machine_of(environment: Mapping[str, Any]) -> str:
+    """What is a machine called? In older records, which have no name, by its processor.
+
+    >>> machine_of({"machine": "node-1", "cpu": "x"})
+    'node-1'
+    """
+    named = environment.get("machine")
+    if named:
+        return str(named)
+    cpu = environment.get("cpu")
+    return f"{cpu}, {environment.get('cores')} cores" if cpu else ""
+
+
+def machine_of_record(record: Record, environments: Environments) -> str:
+    """Return the machine that a record was measured on; "" where that is not known."""
+    return machine_of(environments.get(record.environment, {}))
+
+
+@dataclass(frozen=True)
+class Marks:
+    """A letter for each machine, where there are several; nothing is marked where there is one."""
+
+    #: By the machines' names, most cells first.
+    letters: Mapping[str, str]
+    counts: Mapping[str, int]
+    #: By environment.
+    by_environment: Mapping[str, str]
+
+    def of(self, record: Record) -> str:
+        """Return the mark of a record's seconds; "" where all are of one machine."""
+        return self.by_environment.get(record.environment, "")
+
+    def explained(self) -> list[str]:
+        """Say what the letters mean, and what does not compare; nothing where there are none."""
+        if not self.letters:
+            return []
+        named = "; ".join(
+            f"{letter}: {name or 'not named'}, {self.counts[name]} cells"
+            for name, letter in self.letters.items()
+        )
+        return [
+            f"Seconds of {len(self.letters)} machines ({named}) do not compare with one another: "
+            "only speedups do, each within a machine."
+        ]
+
+
+def marks(records: Iterable[Record], environments: Environments) -> Marks:
+    """Give each machine of these records a letter, if there are several.
+
+    Examples
+    --------
+    >>> marks([], {}).explained()
+    []
+
+    """
+    told = list(records)
+    counts = Counter(machine_of_record(record, environments) for record in told)
+    if len(counts) < 2:
+        return Marks({}, counts, {})
+    ordered = [name for name, _ in counts.most_common()]
+    letters = {name: _letter(k) for k, name in enumerate(ordered)}
+    used = {record.environment for record in told}
+    by = {key: letters[machine_of(environments.get(key, {}))] for key in used}
+    return Marks(letters, counts, by)
+
+
+def _letter(number: int) -> str:
+    more, this = divmod(number, len(ascii_lowercase))
+    return (_letter(more - 1) if more else "") + ascii_lowercase[this]
+
+
+def software_differences(records: Sequence[Record], environments: Environments) -> list[str]:
+    """Say of each machine in what versions or commit it differs from that with most cells."""
+    counts = Counter(record.environment for record in records)
+    if len(counts) < 2:
+        return []
+    first, *others = [key for key, _ in counts.most_common()]
+    told = []
+    for key in others:
+        base, other = environments.get(first, {}), environments.get(key, {})
+        found = differences(base, other)
+        if found:
+            told.append(f"{machine_of(other) or key}: {'; '.join(found)}")
+    return list(dict.fromkeys(told))
+
+
+#: The facts of an environment that are the software's. What BLAS was loaded is not among them: a
+#: process that has planned a run has loaded more than one that measures.
+SOFTWARE = ("cembench", "git", "python", "libraries")
+
+
+def software_of(environment: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what an environment says of versions and of the commit."""
+    return {name: environment.get(name) for name in SOFTWARE}
+
+
+def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
+    """Say which versions differ, ours first.
+
+    >>> differences({"python": "3.11.2"}, {"python": "3.12.1"})
+    ['python: 3.11.2 / 3.12.1']
+    """
+    found = []
+    for name in SOFTWARE:
+        mine, other = ours.get(name), theirs.get(name)
+        if isinstance(mine, Mapping) and isinstance(other, Mapping):
+            found += [
+                f"{part}: {mine.get(part)} / {other.get(part)}"
+                for part in sorted({*mine, *other})
+                if mine.get(part) != other.get(part)
+            ]
+        elif mine != other:
+            found.append(f"{name}: {mine} / {other}")
+    return found

@@ -1,0 +1,181 @@
+"""From what ``--cluster`` says to a client of dask: workers here, a scheduler, or Slurm."""
+
+from __future__ import annotations
+
+import logging
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from cembench.core.errors import ClusterError, ParameterError
+from cembench.core.extras import Extra, require
+from cembench.running.cluster.host import place
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: Seconds in which a scheduler has to answer.
+CONNECT_SECONDS = 15
+#: What ``slurm:`` takes: name, default (None: required), and what it means.
+SLURM = {
+    "partition": (None, "the partition (queue)"),
+    "cores": (None, "cores of a machine"),
+    "memory": ("4GB", "memory of a job, as 60GB"),
+    "machines": ("1", "how many jobs at a time, one a machine"),
+    "walltime": ("12:00:00", "hours:minutes:seconds of a job"),
+    "account": ("", "who pays"),
+    "exclusive": ("yes", "yes: nobody else is on the machine; no"),
+    "interface": ("", "the network, as ib0"),
+}
+_LOCAL = re.compile(r"local:([1-9]\d{0,2})")
+_ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
+
+
+@dataclass(frozen=True)
+class ClusterPlace:
+    """Where the workers are, as ``--cluster`` says it."""
+
+    #: "local", "address" or "slurm".
+    kind: str
+    address: str = ""
+    workers: int = 0
+    settings: Mapping[str, str] = field(default_factory=dict)
+
+
+def parse_cluster(text: str) -> ClusterPlace:
+    """Read what ``--cluster`` says.
+
+    Raises
+    ------
+    ParameterError
+        It is none of ``local:N``, ``tcp://HOST:PORT`` and ``slurm:NAME=VALUE,...``.
+
+    Examples
+    --------
+    >>> parse_cluster("local:4").workers
+    4
+
+    """
+    local = _LOCAL.fullmatch(text)
+    if local:
+        return ClusterPlace("local", workers=int(local[1]))
+    if _ADDRESS.fullmatch(text):
+        return ClusterPlace("address", address=text)
+    kind, colon, rest = text.partition(":")
+    if kind == "slurm" and colon:
+        return ClusterPlace("slurm", settings=_settings(rest))
+    raise ParameterError(
+        f"--cluster {text!r} is not allowed; write local:4 (workers on this machine), "
+        "tcp://HOST:8786 (a scheduler that runs), or slurm:partition=cpu,cores=16,machines=10."
+    )
+
+
+def _settings(text: str) -> dict[str, str]:
+    found: dict[str, str] = {}
+    for part in text.split(","):
+        name, equals, value = part.partition("=")
+        if not equals or name not in SLURM or not value:
+            raise ParameterError(f"--cluster slurm: {part!r} is not allowed; {_allowed()}")
+        found[name] = value
+    missing = [name for name, (usual, _) in SLURM.items() if usual is None and name not in found]
+    if missing:
+        raise ParameterError(f"--cluster slurm: {missing[0]} is missing; {_allowed()}")
+    found = {name: found.get(name, usual or "") for name, (usual, _) in SLURM.items()}
+    for name in ("cores", "machines"):
+        if not re.fullmatch(r"[1-9]\d{0,4}", found[name]):
+            raise ParameterError(
+                f"--cluster slurm: {name}={found[name]} is no whole number above 0; {_allowed()}"
+            )
+    if found["exclusive"] not in ("yes", "no"):
+        raise ParameterError(f"--cluster slurm: exclusive is yes or no; {_allowed()}")
+    return found
+
+
+def _allowed() -> str:
+    told = "; ".join(f"{name}: {words}" for name, (_, words) in SLURM.items())
+    return f"name=value with commas between. {told}."
+
+
+@contextmanager
+def connected(where: ClusterPlace) -> Iterator[Client]:
+    """Give a client; workers that it started end with it.
+
+    Raises
+    ------
+    MissingExtra
+        dask is not installed.
+    ClusterError
+        The scheduler cannot be reached.
+
+    """
+    require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
+    import dask
+    from distributed import Client
+
+    if where.kind == "address":
+        try:
+            client = Client(where.address, timeout=CONNECT_SECONDS, set_as_default=False)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ClusterError(
+                f"no scheduler answers at {where.address}: {error or 'timed out'}. Start one with "
+                "`dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`."
+            ) from error
+        with client:
+            yield client
+        return
+    # The first worker that a unit ends may be bad luck, the second is the unit's.
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        _local(where) if where.kind == "local" else _slurm(where) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+def _local(where: ClusterPlace) -> Any:
+    from distributed import LocalCluster
+
+    return LocalCluster(
+        n_workers=where.workers,
+        threads_per_worker=1,
+        memory_limit=0,
+        silence_logs=logging.CRITICAL,
+        dashboard_address=None,
+        local_directory=str(place() / "dask"),
+        preload=["cembench.running.cluster.worker"],
+    )
+
+
+def _slurm(where: ClusterPlace) -> Any:
+    require(Extra.CLUSTER, "a run on Slurm", "dask_jobqueue")
+    from dask_jobqueue import SLURMCluster
+
+    chosen = where.settings
+    logs = place() / "slurm"
+    logs.mkdir(parents=True, exist_ok=True)
+    cluster = SLURMCluster(
+        queue=chosen["partition"],
+        account=chosen["account"] or None,
+        cores=int(chosen["cores"]),
+        memory=chosen["memory"],
+        walltime=chosen["walltime"],
+        interface=chosen["interface"] or None,
+        processes=1,
+        python=sys.executable,
+        worker_extra_args=["--no-dashboard"],
+        job_extra_directives=["--exclusive"] if chosen["exclusive"] == "yes" else [],
+        job_name="cembench",
+        local_directory=str(place() / "dask"),
+        log_directory=str(logs),
+        scheduler_options={"dashboard_address": None},
+    )
+    try:
+        wanted = int(chosen["machines"])
+        cluster.adapt(minimum_jobs=wanted, maximum_jobs=wanted)  # a job that ends is replaced
+    except BaseException:
+        cluster.close()
+        raise
+    return cluster

@@ -1,0 +1,49 @@
+"""How far a run on a cluster is, in its folder: what `cembench status` shows of the machines."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import BaseModel, Field, TypeAdapter
+
+from cembench.core.atomic import write_model
+from cembench.core.loading import is_there, read_json
+from cembench.results.records import Count, Printable
+from cembench.results.run_folder import MACHINES
+
+Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+class MachineState(BaseModel):
+    """A worker, and what it measures."""
+
+    machine: Printable
+    units: Count = 0
+    lost: bool = False
+    #: The surface and policy that it measures, and the process that it last told of.
+    at: Printable = ""
+
+
+class ClusterState(BaseModel):
+    """Units are surfaces under one policy."""
+
+    units: Count
+    done: Count = 0
+    machines: list[MachineState] = []
+    #: None before the first unit is done, and where no machine is there.
+    seconds_left: Seconds | None = None
+    written_at: str = ""
+
+
+def save_state(folder: Path, state: ClusterState) -> None:
+    """Write down how far a run is."""
+    state.written_at = datetime.now(UTC).isoformat(timespec="seconds")
+    write_model(folder / MACHINES, state)
+
+
+def read_state(folder: Path) -> ClusterState | None:
+    """Return how far a run was when that was last written; None for one that had no cluster."""
+    path = folder / MACHINES
+    return read_json(path, TypeAdapter(ClusterState), "a state") if is_there(path) else None

@@ -1,0 +1,150 @@
+"""What travels to a machine: one surface under one policy, with all its algorithms and rounds.
+
+So every ratio is formed of seconds from one machine and one sitting.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import heapq
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, TypeAdapter
+
+from cembench.core.notices import Notice
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import COMMAND
+from cembench.results.comparison import circumstances
+from cembench.results.records import Cell, MeshFacts
+from cembench.running.local import Options
+from cembench.running.plan import Task
+
+#: Files of plug-ins: by the plug-in as it was named, their content by relative path.
+PluginFiles = dict[str, dict[str, bytes]]
+
+
+class Unit(BaseModel):
+    """All cells of one surface under one policy, as data that a worker can read."""
+
+    model_config = ConfigDict(frozen=True)
+
+    #: Of the run's folder: two runs never share what a worker keeps of an unfinished unit.
+    token: str
+    cells: tuple[Cell, ...]
+    mesh_type: str
+    notices: tuple[Notice, ...]
+    facts: MeshFacts
+    #: How many triangles a registered surface was asked for; None: its usual number.
+    faces: int | None = None
+    plugins: tuple[str, ...] = ()
+    options: dict[str, Any] = {}
+    #: What a machine has to have in common with the client; empty: nothing.
+    software: dict[str, Any] = {}
+
+    @property
+    def key(self) -> str:
+        """Hash of the content."""
+        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:24]
+
+    @property
+    def mesh(self) -> str:
+        """The surface's name."""
+        return self.cells[0].mesh
+
+    @property
+    def mesh_hash(self) -> str:
+        """The surface's hash."""
+        return self.cells[0].mesh_hash
+
+    def run_options(self) -> Options:
+        """The options of the run, as the worker goes about its cells."""
+        return TypeAdapter(Options).validate_python(self.options)
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A unit with the tasks that it was made of, and what it is expected to take."""
+
+    unit: Unit
+    tasks: tuple[Task, ...]
+    plugin_files: PluginFiles
+    seconds: float = 0.0
+
+    @property
+    def surface(self) -> TriangleMesh:
+        """The surface itself."""
+        return self.tasks[0].mesh
+
+
+def grouped(tasks: Sequence[Task]) -> list[list[Task]]:
+    """Return the tasks of each unit: same surface, policy, back end and threads, in order."""
+    found: dict[tuple[str, str], list[Task]] = {}
+    for task in tasks:
+        found.setdefault((circumstances(task.cell), task.cell.mesh), []).append(task)
+    return list(found.values())
+
+
+def parcel(
+    tasks: Sequence[Task],
+    token: str,
+    options: Options,
+    faces: int | None = None,
+    software: dict[str, Any] | None = None,
+    seconds: float = 0.0,
+) -> Parcel:
+    """Pack the tasks of one unit."""
+    plugins, files = _plugins(tasks)
+    first = tasks[0]
+    unit = Unit(
+        token=token,
+        cells=tuple(task.cell for task in tasks),
+        mesh_type=type(first.mesh).__name__,
+        notices=first.mesh.notices,
+        facts=first.facts,
+        faces=faces,
+        plugins=plugins,
+        # The worker's folder holds nothing of before, unless it is to be gone on from.
+        options=asdict(replace(options, fresh=False, rerun_failed=False)),
+        software=software or {},
+    )
+    return Parcel(unit, tuple(tasks), files, seconds)
+
+
+def _plugins(tasks: Sequence[Task]) -> tuple[tuple[str, ...], PluginFiles]:
+    """Which plug-ins do these tasks need, and which files are those made of?
+
+    A module, or a program's command line, has to be on the workers: only its name travels.
+    """
+    named: list[str] = []
+    files: PluginFiles = {}
+    for plugin in dict.fromkeys(name for task in tasks for name in task.plugins):
+        path = Path(plugin)
+        if plugin.startswith(COMMAND) or not path.is_file():
+            named.append(plugin)
+        else:
+            inside = {name for task in tasks if _declares(path, task) for name in task.sources}
+            if inside:
+                named.append(plugin)
+                places = {name: path.parent / name for name in sorted({path.name, *inside})}
+                files[plugin] = {n: place.read_bytes() for n, place in places.items()}
+    return tuple(named), files
+
+
+def _declares(plugin: Path, task: Task) -> bool:
+    file = task.algorithm.file
+    return file is not None and file.resolve() == plugin.resolve()
+
+
+def makespan(seconds: Sequence[float], machines: int) -> float:
+    """Seconds until all units are done on so many machines, the longest being taken first.
+
+    >>> makespan([3.0, 2.0, 2.0], 2)
+    4.0
+    """
+    free = [0.0] * machines
+    for one in sorted(seconds, reverse=True):
+        heapq.heappush(free, heapq.heappop(free) + one)
+    return max(free)

@@ -1,0 +1,231 @@
+"""What a dask worker does: it has a unit measured by a process of its own, and returns records."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from queue import Empty, SimpleQueue
+from typing import IO, Any
+
+import dask
+import numpy as np
+from distributed import get_worker
+from numpy.typing import NDArray
+
+from cembench.core.atomic import write_bytes, write_text
+from cembench.core.errors import ClusterError
+from cembench.core.loading import read_bytes
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import load_registry
+from cembench.results.records import Record, signed
+from cembench.results.store import Store
+from cembench.running.cluster import host
+from cembench.running.cluster.measure import RUN, UNIT
+from cembench.running.cluster.units import PluginFiles, Unit
+from cembench.running.environment import machine_name
+from cembench.running.plan import generate_surface
+
+#: Seconds between two looks whether anybody still wants the unit.
+LOOK_EVERY = 1.0
+#: A record as it was signed, and its map.
+Found = tuple[bytes, NDArray[np.complex128] | None]
+
+_one_unit = threading.Lock()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What comes of a unit: its records; or why this machine does not measure it."""
+
+    machine: str
+    address: str
+    records: tuple[Found, ...] = ()
+    environments: Mapping[str, dict[str, Any]] | None = None
+    #: The surface is not here and cannot be generated: send the unit again, with it.
+    lacks_surface: bool = False
+    #: In what the software differs, where it must not.
+    refused: str = ""
+
+
+def dask_setup(worker: Any) -> None:
+    """Leave Ctrl-C to the client; dask calls this in each worker that was started here."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def measure_unit(
+    text: str, plugins: PluginFiles, surface: host.Arrays | None, topic: str
+) -> Answer:
+    """Measure a unit; a worker has one at a time. Events go to the topic.
+
+    Raises
+    ------
+    ClusterError
+        It cannot be measured here, whatever is sent; or nobody wants it any more.
+
+    """
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def tell(event: Mapping[str, Any]) -> None:
+        worker.log_event(topic, {**event, "unit": unit.key, "machine": machine_name()})
+
+    def is_wanted() -> bool:
+        state = worker.state.tasks.get(key)
+        return state is not None and state.state in ("executing", "long-running")
+
+    unit = Unit.model_validate_json(text)
+    with _one_unit:
+        about = (machine_name(), worker.address)
+        host.clear_old()
+        if not _has_surface(unit, surface):
+            return Answer(*about, lacks_surface=True)
+        folder = host.unit_folder(unit.key)
+        placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
+        write_text(folder / UNIT, placed.model_dump_json())
+        tell({"what": "takes", "worker": worker.address})
+        refused = _measurer().measure(unit.key, tell, is_wanted)
+        if refused:
+            return Answer(*about, refused=refused)
+        store = Store(folder / RUN)
+        found = tuple((signed(r), store.uv(r.cell)) for r in _asked(store, unit))
+        return Answer(*about, found, store.environments())
+
+
+async def forget(keys: list[str]) -> None:
+    """Delete what is kept of units whose records the client has; dask waits for nothing."""
+    host.forget_units(keys)
+
+
+def _asked(store: Store, unit: Unit) -> list[Record]:
+    keys = {cell.key for cell in unit.cells}
+    return [record for record in store.records() if record.cell.key in keys]
+
+
+def _has_surface(unit: Unit, sent: host.Arrays | None) -> bool:
+    """Have the surface here: kept from before, or sent, or generated."""
+    if host.kept_surface(unit.mesh_hash) is not None:
+        return True
+    arrays = sent or _generated(unit)
+    if arrays is not None:
+        host.keep_surface(unit.mesh_hash, arrays)
+    return arrays is not None
+
+
+def _generated(unit: Unit) -> host.Arrays | None:
+    """Generate a registered surface, unless that takes longer than sending it.
+
+    Another surface of the same name, or one that differs in a bit on this machine, is none.
+    """
+    registry = load_registry()
+    family = registry.surfaces.get(unit.mesh)
+    if family is None or family.kept is not None:
+        return None
+    made: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
+    return (made.V, made.F) if made.hash == unit.mesh_hash else None
+
+
+def _placed(named: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
+    """Write the files of plug-ins, once for each content; return the plug-ins' names here."""
+    here = []
+    for plugin in named:
+        if plugin not in files:
+            here.append(plugin)
+            continue
+        digest = hashlib.sha256()
+        for name, content in sorted(files[plugin].items()):
+            digest.update(f"{name} {len(content)} ".encode() + content)
+        folder = host.place() / "plugins" / digest.hexdigest()[:24]
+        for name, content in files[plugin].items():
+            path = folder / name
+            if not path.is_file() or read_bytes(path) != content:
+                write_bytes(path, content)
+        here.append(str(folder / Path(plugin).name))
+    return tuple(here)
+
+
+class Measurer:
+    """The process that measures, started once a worker, and again after it has ended."""
+
+    def __init__(self) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "cembench.running.cluster.measure"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=_environment(),
+            text=True,
+            start_new_session=True,  # Ctrl-C is the client's
+        )
+        self.lines: SimpleQueue[str | None] = SimpleQueue()
+        threading.Thread(target=self._read, args=(self.process.stdout,), daemon=True).start()
+
+    def _read(self, stream: IO[str]) -> None:
+        for line in stream:
+            self.lines.put(line)
+        self.lines.put(None)
+
+    def measure(
+        self, key: str, tell: Callable[[Mapping[str, Any]], None], is_wanted: Callable[[], bool]
+    ) -> str:
+        """Measure a unit; returns why it is refused, or nothing. It ends if nobody wants it."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(key + "\n")
+        self.process.stdin.flush()
+        while True:
+            try:
+                line = self.lines.get(timeout=LOOK_EVERY)
+            except Empty:
+                if not is_wanted():
+                    self.close()
+                    raise ClusterError("nobody waits for this unit any more.") from None
+                continue
+            if line is None:
+                code = self.process.wait()
+                raise MeasurerGoneError(f"the process that measures ended with code {code}")
+            event = json.loads(line)
+            if event["what"] == "done":
+                return ""
+            if event["what"] == "refused":
+                return str(event["why"])
+            if event["what"] == "failed":
+                raise ClusterError(event["why"])
+            tell(event)
+
+    def close(self) -> None:
+        """End it, with all that it started."""
+        self.process.kill()
+        self.process.wait()
+
+
+class MeasurerGoneError(ClusterError):
+    """The process that measures ended without an answer."""
+
+
+_measurers: list[Measurer] = []
+
+
+def _measurer() -> Measurer:
+    """Return the process that measures; a new one where there is none, or none any more."""
+    if _measurers and _measurers[0].process.poll() is None:
+        return _measurers[0]
+    _measurers[:] = [Measurer()]
+    return _measurers[0]
+
+
+def _environment() -> dict[str, str]:
+    """Return this process's environment without what dask set for its own workers' memory."""
+    theirs = dask.config.get("distributed.nanny.pre-spawn-environ", {})
+    found = dict(os.environ)
+    for name, value in theirs.items():
+        if found.get(name) == str(value):
+            with suppress(KeyError):
+                del found[name]
+    return found

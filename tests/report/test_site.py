@@ -1,0 +1,73 @@
+"""Several runs as a site that needs no network."""
+
+import re
+
+import pytest
+
+from cembench.core.errors import ParameterError, RecordError
+from cembench.report import site
+from cembench.report.content.evidence import Evidence
+from cembench.report.document import Report
+from cembench.report.site import about, history, publish
+from tests.results.test_machines import record_of, run_of
+
+
+def published(tmp_path, number, ldm_seconds, *meshes, **more):
+    records = [record_of("cem", mesh, f"e{number}", 1.0) for mesh in meshes]
+    records += [record_of("ldm", mesh, f"e{number}", ldm_seconds) for mesh in meshes]
+    store = run_of(tmp_path / f"run-{number}", f"node-{number}", *records, **more)
+    return about(Evidence.of(store.folder), f"run-{number}")
+
+
+def test_history_averages_over_the_surfaces_that_runs_have_in_common(tmp_path):
+    first = published(tmp_path, 1, 4.0, "hat", "cap", git={"commit": "a" * 40, "dirty": True})
+    second = published(tmp_path, 2, 9.0, "hat")
+    told = history([first, second])
+    assert [one.ratio for one in told["ldm"]] == pytest.approx([4.0, 9.0])
+    assert all(one.common for one in told["ldm"])
+    assert [one.surfaces for one in told["ldm"]] == [1, 1]
+    assert first.commits == ("aaaaaaaaaa+",)
+    assert first.machines == {"node-1": 4}
+
+
+def test_runs_without_a_surface_in_common_are_starred(tmp_path):
+    told = history([published(tmp_path, 1, 4.0, "hat"), published(tmp_path, 2, 9.0, "cap")])
+    assert [str(one) for one in told["ldm"]] == ["4.00 (1*)", "9.00 (1*)"]
+
+
+def test_ratios_are_never_formed_over_two_machines(tmp_path):
+    run_of(tmp_path / "a", "node-1", record_of("cem", "hat", "e1"))
+    store = run_of(tmp_path / "a", "node-2", record_of("ldm", "hat", "e2"))
+    assert about(Evidence.of(store.folder), "a").ratios == {}
+
+
+def test_what_cannot_be_published_is_said(tmp_path):
+    with pytest.raises(ParameterError, match="each once"):
+        publish([tmp_path, tmp_path / "."], tmp_path / "site")
+    with pytest.raises(RecordError, match="holds no run"):
+        publish([tmp_path / "nowhere"], tmp_path / "site")
+    assert not (tmp_path / "site").exists()
+
+
+def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, monkeypatch):
+    shown = []
+
+    def small_report(evidence, folder, command):
+        shown.append(evidence.store.folder.name)
+        return Report(command, command, (), ())
+
+    monkeypatch.setattr(site, "build_report", small_report)  # reports have tests of their own
+    for number in (1, 2):
+        published(tmp_path, number, 4.0, "hat")
+    runs = [tmp_path / "run-2", tmp_path / "run-1"]
+    found = publish(runs, tmp_path / "site")
+    assert shown == ["run-2", "run-1"]
+    assert [run.name for run in found] == ["run-1", "run-2"]
+    page = (tmp_path / "site/index.html").read_text()
+    links = re.findall(r'(?:href|src)="([^"]+)"', page)
+    assert {"runs/run-1/index.html", "runs/run-2/index.html", "figures/history.svg"} == set(links)
+    assert all((tmp_path / "site" / link).is_file() for link in links)
+    assert "://" not in page
+    publish(runs[:1], tmp_path / "site")
+    kept = [path for path in (tmp_path / "site/runs").rglob("*") if path.is_file()]
+    assert kept == [tmp_path / "site/runs/run-2/index.html"]
