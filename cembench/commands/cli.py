@@ -321,8 +321,8 @@ def run(
         raise ParameterError("--limit needs --set: add --set NAME, or leave --limit out.")
     if mend and sets:
         raise ParameterError(
-            "--repair works with --mesh and --mesh-dir: mend the files of a set with `cembench repair`, "
-            "or leave it out."
+            "--repair works with --mesh and --mesh-dir: repair the files of a set with "
+            "`cembench repair`, or leave it out."
         )
     with err.status("reading surfaces", spinner="line"):
         found, standing = gather_surfaces(registry, chosen, files, generated, faces, mend=mend)
