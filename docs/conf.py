@@ -24,7 +24,6 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]
@@ -35,7 +34,7 @@ needs_sphinx = "8.0"
 suppress_warnings = ["config.cache"]  # the gallery's functions cannot be pickled
 
 # Pages are Markdown. Links to headings work down to the third level.
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 
 # Pages of the API: one for each public name, its docstring in the sections of numpydoc.
@@ -48,7 +47,7 @@ numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 add_module_names = False
 
-# The formulas are set by the browser: nothing is fetched, since no page loads a library for them.
+# Nothing is fetched to build the site or to read it, so formulas are plain text.
 html_theme = "furo"
 html_title = "cembench"
 html_static_path = ["_static", "preview.png"]

@@ -11,8 +11,8 @@ from pathlib import Path
 import cembench
 
 # %%
-# It lies in ``examples/external`` of the repository, with the file that declares it; this program is
-# run from ``examples/gallery``.
+# It lies in ``examples/external`` of the repository, with the file that declares it; the program
+# here is run from ``examples/gallery``.
 
 folder = Path("../external")
 print((folder / "tutte_program.py").read_text())
