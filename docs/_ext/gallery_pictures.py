@@ -18,7 +18,8 @@ def figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]
     drawn = names.setdefault("__drawn__", [])
     paths = []
     for value in list(names.values()):
-        if not isinstance(value, Figure) or any(value is one for one in drawn):
+        known = any(value is one for one in drawn)
+        if not isinstance(value, Figure) or value.canvas.manager is not None or known:
             continue
         drawn.append(value)
         path = next(block_vars["image_path_iterator"])

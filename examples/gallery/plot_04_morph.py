@@ -35,9 +35,11 @@ path = cembench.morph([first, second], landmarks)
 # %%
 # The path at five moments. Every moment is a mesh with the triangles of the first.
 
-fig, axes = plt.subplots(1, 5, figsize=(12, 2.8), subplot_kw={"projection": "3d"})
+fig, axes = plt.subplots(1, 5, figsize=(12, 3), subplot_kw={"projection": "3d"})
 for ax, time in zip(axes, np.linspace(0, 1, 5), strict=True):
     V = path.at(time)
-    ax.plot_trisurf(*V.T, triangles=first.F, color="tan", edgecolor="none")
-    ax.set(title=f"t = {time:.2f}", xticks=[], yticks=[], zticks=[], box_aspect=np.ptp(V, axis=0))
+    ax.plot_trisurf(*V.T, triangles=first.F, color="tan", linewidth=0, antialiased=False)
+    ax.set_title(f"t = {time:.2f}")
+    ax.set_box_aspect(np.ptp(V, axis=0), zoom=1.5)
+    ax.set_axis_off()
 plt.show()
