@@ -39,7 +39,7 @@ left = fig.add_subplot(1, 2, 1, projection="3d")
 left.plot_trisurf(*V.T, triangles=F, color="lightgrey", alpha=0.4)
 for edge in opened.edges:
     left.plot(*V[edge].T, color="tab:red")
-left.set_box_aspect(np.ptp(V, axis=0), zoom=1.7)
+left.set_box_aspect(np.ptp(V, axis=0), zoom=1.35)
 left.set_axis_off()
 right = fig.add_subplot(1, 2, 2, aspect="equal")
 right.triplot(*result.uv.T, disk.F, color="lightgrey", linewidth=0.5)
