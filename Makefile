@@ -1,12 +1,14 @@
 # Two targets do everything, set-up included, on a machine with Python 3.11+, make and a package index.
 #   make reproduce   run the main job and say where its results lie
 #   make test        lint, types, tests
+# And one more builds the site into docs/_build/html, its examples run:
+#   make docs
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 READY  := $(VENV)/ready
 
-.PHONY: reproduce test test-slow lint types tests bench bench-kernels fuzz clean
+.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels fuzz clean
 
 reproduce: $(READY)
 	$(BIN)/cembench reproduce
@@ -25,6 +27,9 @@ types: $(READY)
 
 tests: $(READY)
 	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile
+
+docs: $(READY)
+	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html
 
 bench: $(READY)
 	$(BIN)/python benchmarks/cem_against_factorisation.py
@@ -45,4 +50,4 @@ $(READY): pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) docs/_build docs/api docs/gallery docs/cli.md build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -6,6 +6,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 #: What lies at the top and is not needed to build or to test.
 AT_THE_TOP = {"reports", "results", "build", "dist"}
+#: What is made, anywhere.
+MADE = {"__pycache__", "_build"}
 
 
 def copy_source(folder):
@@ -16,7 +18,7 @@ def copy_source(folder):
         return {
             name
             for name in names
-            if name.startswith(".") or name == "__pycache__" or name.endswith(".egg-info")
+            if name.startswith(".") or name in MADE or name.endswith(".egg-info")
         } | at_the_top & set(names)
 
     shutil.copytree(ROOT, folder, ignore=left_out)

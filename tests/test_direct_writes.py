@@ -21,6 +21,7 @@ ALLOWED = {
     "cembench/running/external/exchange.py:write_input": "a program's own folder, temporary",
     "cembench/running/external/call.py:_ended": "what a program prints, in a temporary folder",
     "algorithms/peers/blender_unwrap.py:main": "a program's own folder, temporary",
+    "examples/external/tutte.py": "a program on its own, in a folder that is deleted",
     "cembench/running/plugins.py:_main": "between processes, in a temporary folder",
     "cembench/running/returned.py:_extras": "pydantic_core.to_json gives text",
     "cembench/running/process.py": "the output of a process, in the scratch folder",

@@ -36,7 +36,7 @@ def test_the_extras_are_those_of_the_package():
         assert names(declared[extra]) == {DISTRIBUTIONS.get(m, m) for m in modules}
     everything = declared["all"][0].removeprefix("cembench[").removesuffix("]").split(",")
     assert set(everything) == set(Extra) - {Extra.PARDISO, Extra.XATLAS}
-    assert set(declared) == {*Extra, "all", "test"}
+    assert set(declared) == {*Extra, "all", "docs", "test"}
 
 
 def test_no_extra_is_in_the_default_installation():
