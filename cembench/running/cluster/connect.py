@@ -143,7 +143,7 @@ def _local(where: ClusterPlace) -> Any:
         threads_per_worker=1,
         memory_limit=0,
         silence_logs=logging.CRITICAL,
-        dashboard_address=None,
+        dashboard_address=":0",
         local_directory=str(place() / "dask"),
         preload=["cembench.running.cluster.worker"],
     )
@@ -170,7 +170,7 @@ def _slurm(where: ClusterPlace) -> Any:
         job_name="cembench",
         local_directory=str(place() / "dask"),
         log_directory=str(logs),
-        scheduler_options={"dashboard_address": None},
+        scheduler_options={"dashboard_address": ":0"},
     )
     try:
         wanted = int(chosen["machines"])
