@@ -157,7 +157,7 @@ def _workers(names: Sequence[str]) -> str:
 def hours(
     tasks: Sequence[Task], costs: Sequence[Estimate | None], budget: float | None
 ) -> dict[str, Any]:
-    """How long would so many machines take, and what keeps them from taking less?
+    """Return the hours that so many machines would take, and what limits them.
 
     Returns
     -------

@@ -114,7 +114,7 @@ def _names(kind: Any) -> str:
 
 
 def shows_trailing_block() -> bool:
-    """Does a factor, as systems are solved here, show its trailing block, so that solves halve?"""
+    """Whether factors show their trailing block here, so that solves can be halved."""
     how = _current.get()
     return how.solves == "reuse" and how.backend == "cvxopt"
 
@@ -142,11 +142,11 @@ class Cholesky:
     ----------
     A : sparse (n, n)
         Symmetric positive definite, both triangles stored.
-    lower : bool
-        A holds its lower triangle alone, each column from top to bottom.
     leading : int, optional
         Also solve with the block ``A[:leading, :leading]``. Under "reuse" the same factor is used,
         unless more than :data:`LARGEST_DENSE` rows follow the block; then it has its own factor.
+    lower : bool
+        A holds its lower triangle alone, each column from top to bottom.
 
     Raises
     ------

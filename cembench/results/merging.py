@@ -115,7 +115,7 @@ def _best(
 
 
 def _leaders(best: Mapping[tuple[str, str], Held]) -> dict[str, str]:
-    """Which machine's cells stand in the run, for each surface under each policy?"""
+    """Return the machine whose cells go into the run, by surface and policy."""
     oks: dict[str, dict[str, list[tuple[bool, str]]]] = defaultdict(lambda: defaultdict(list))
     for held in best.values():
         oks[circumstances(held.record.cell)][held.machine].append(held.rank)

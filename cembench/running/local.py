@@ -98,7 +98,7 @@ class Options:
     jobs: int = 1
 
     def measures_again(self, kept: Record) -> bool:
-        """Is a cell measured although there is this record of it?"""
+        """Whether a cell is measured again although it has this record."""
         return self.fresh or (self.rerun_failed and kept.outcome.status != "ok")
 
 
@@ -273,7 +273,7 @@ class _Run:
         return (task.cell.label not in self.checks) + max(0, self._last(task, done) - done)
 
     def _last(self, task: Task, done: int) -> int:
-        """After which round is a cell over, or looked at next?"""
+        """Return the number of the round after which a cell ends, or is looked at next."""
         return task.cell.repeats or next_look(done, self.options.most_rounds)
 
     def _check_all(self, pending: Sequence[Task]) -> None:
@@ -854,7 +854,7 @@ def _with_note(answer: Answer, left: int) -> Answer:
 
 
 def _outcome_of(ending: ProcessEnd, seconds: float, memory_bytes: int | None) -> Outcome:
-    """As what is a process recorded that left no answer?"""
+    """Return the outcome of a process that left no answer."""
     seen = {"traceback": ending.said or None, "peak_memory_bytes": ending.seen_bytes or None}
     if ending.limit == "time":
         told = f"not finished after {seconds:g} s"

@@ -38,6 +38,13 @@ class Repair:
     notices : tuple of Notice
         What the reader of the file changed or ignored.
 
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> cembench.repair("flat.obj").mesh.m
+    200
+
     """
 
     meshes: tuple[TriangleMesh, ...]

@@ -114,7 +114,7 @@ def parcel(
 
 
 def _plugins(tasks: Sequence[Task]) -> tuple[tuple[str, ...], PluginFiles]:
-    """Which plug-ins do these tasks need, and which files are those made of?
+    """Return the plug-ins that these tasks need, and the files that those are made of.
 
     A module, or a program's command line, has to be on the workers: only its name travels.
     """
