@@ -42,8 +42,8 @@ class Repair:
     --------
     >>> import cembench
     >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
-    >>> cembench.repair("flat.obj").mesh.m
-    200
+    >>> len(cembench.repair("flat.obj").meshes)
+    1
 
     """
 
