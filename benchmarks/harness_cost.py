@@ -33,8 +33,8 @@ from cembench.results.comparison import compare_ratios
 from cembench.results.records import Outcome, Round
 from cembench.results.store import Store
 from cembench.running.environment import with_threads
+from cembench.running.judging import Checked
 from cembench.running.local import Launcher, Options, run_tasks
-from cembench.running.measure import Checked
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 
 BARE = """
@@ -132,7 +132,7 @@ class NoProcess(Launcher):
     def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
         return Outcome(status="ok", uv_hash="x"), np.ones(task.mesh.n, complex)
 
-    def time(self, task: Task) -> Round | Outcome:
+    def time(self, task: Task, checked: Checked) -> Round | Outcome:
         return Round(calls=(1e-3,) * 5, uv_hash="x")
 
 
