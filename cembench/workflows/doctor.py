@@ -26,6 +26,7 @@ _REQUIRED = {
 }
 #: Purpose of each extra.
 _FOR = {
+    Extra.CLUSTER: "measures on several machines",
     Extra.FETCH: "fetches public surfaces",
     Extra.FORMATS: "reads VTK, glTF and GIFTI files, writes geometry images as EXR",
     Extra.PARDISO: "adds another linear-algebra back end",

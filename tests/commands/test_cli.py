@@ -127,7 +127,8 @@ def test_run_records_shows_and_resumes(cli, cap):
 
 
 def test_run_goes_on_after_a_failure_and_exits_with_1(cli, cap):
-    code, out, _ = cli("run", "--mesh", cap, "-a", "raises,good", "--plugin", FAULTY, "-o", "here")
+    names = ("-a", "raises,good", "--plugin", FAULTY)
+    code, out, _ = cli("run", "--mesh", cap, *names, "--rounds", 1, "-o", "here")
     assert code == 1
     assert "ZeroDivisionError: by nothing" in out
     assert [line.split()[-1] for line in out.splitlines()[1:3]] == ["failed", "ok"]

@@ -238,7 +238,7 @@ def test_two_pictures_of_one_name_are_refused(tmp_path, cli):
     for file in files:
         file.write_text(text)
     code, _, err = cli("map", *files, "-a", "lscm", "--preview")
-    assert (code, "two pictures would be a_lscm.png" in err) == (2, True)
+    assert (code, "two pictures would be written to a_lscm.png" in err) == (2, True)
 
 
 def test_disks_and_surfaces_with_holes_are_mapped_together(tmp_path, cli):

@@ -115,9 +115,9 @@ def test_48_of_48_are_fetched_and_checked(cli, served):
     assert len(out.splitlines()) == 48
     assert all(is_fetched(d) for d in datasets)
     assert "48 files, 0 already here; to fetch: 3 kB." in err
-    assert "48 of 48 are there." in err
+    assert "48 of 48 fetched." in err
     assert "mesh05: " in out
-    assert out.count("no licence stated: do not pass it on") == 1
+    assert out.count("no licence stated: do not redistribute") == 1
     cli("fetch", "--group", "disks")
     assert set(asked.values()) == {1}
 

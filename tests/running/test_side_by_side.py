@@ -79,7 +79,7 @@ def test_a_fault_of_a_checker_is_raised_and_the_others_are_stopped():
 
 def test_a_run_with_two_jobs_has_the_records_of_one_with_one(tmp_path):
     registry = load_registry()
-    chosen = [registry.algorithm(name) for name in ("lscm", "harmonic-circle", "cem")]
+    chosen = [registry.algorithm(name) for name in ("lscm", "harmonic-circle")]
     meshes = [flat_disk(60), spherical_cap(96)]
     tasks = plan_cells(chosen, meshes, {}, MeasurementSettings(repeats=1))
     both = [

@@ -115,6 +115,7 @@ def test_bad_usage_is_said_before_anything_is_run(here, cli, plugin, arguments, 
     assert not list(cli.folder.iterdir())
 
 
+@pytest.mark.slow
 def test_quadratic_growth_is_a_fault(here):
     code, out, _ = here("quadratic", *TINY, "--json")
     said = json.loads(out)["verdict"]

@@ -205,7 +205,7 @@ class Measurer:
         self.process.wait()
 
 
-class MeasurerGoneError(ClusterError):
+class MeasurerGoneError(Exception):
     """The process that measures ended without an answer."""
 
 
