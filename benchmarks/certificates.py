@@ -62,7 +62,7 @@ def row(name: str, mesh: DiskMesh) -> str:
     for algorithm in map(registry.algorithm, ALGORITHMS):
         try:
             uv = algorithm.function(mesh, **algorithm.arguments({})).uv
-            cells.append(f"{abs(found.off(uv[found.corners])):.0e}")
+            cells.append(f"{abs(found.off(uv[found.corners])):.0e}".replace("e-0", "e-"))
         except AlgorithmFailed:
             cells.append("failed")
     return f"| {' | '.join(cells)} |"
