@@ -346,6 +346,8 @@ def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progre
     try:
         download(dataset.url, file, None)
     except requests.RequestException as error:
+        if error.response is not None:  # refused: nobody has read it to its end
+            error.response.close()
         raise DatasetError(
             f"cannot fetch {dataset.file} from {dataset.url}: {type(error).__name__}: {error}. "
             f"Check the network, set {MIRROR_VARIABLE} to a mirror, or put the file at "

@@ -130,8 +130,9 @@ def test_server_down(tiny, monkeypatch):
 
 def test_missing_on_the_mirror(server, tiny, monkeypatch):
     monkeypatch.setenv("CEMBENCH_DATA_URL", server.url + "/elsewhere")
-    with pytest.raises(DatasetError, match="404"):
+    with pytest.raises(DatasetError, match="404") as refused:
         fetch(tiny)
+    assert refused.value.__cause__.response.raw.closed, "the connection is left to the collector"
 
 
 def test_cache_that_is_no_folder(tiny, tmp_path):
