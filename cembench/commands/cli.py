@@ -6,8 +6,7 @@ Other codes (a closed pipe, a signal, a fault of cembench itself) are in
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
@@ -74,7 +73,6 @@ from cembench.results.looks import USUAL_MOST_ROUNDS
 from cembench.results.paper.profiles import Profile
 
 if TYPE_CHECKING:
-    from cembench.commands.progress import PlainProgress
     from cembench.registry import Algorithm, Registry, Surface
     from cembench.report.surface_facts import SurfaceFacts
     from cembench.results.records import Record
@@ -450,18 +448,11 @@ for verb, example in (entry for module in _MORE for entry in module.VERBS):
 
 def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
     """Run the tasks, with a live table on a terminal and one line per cell elsewhere."""
+    from cembench.commands.progress import progress_on
     from cembench.running.local import run_tasks
 
-    with resumable(), _progress(len(tasks)) as progress:
+    with resumable(), progress_on(err, len(tasks)) as progress:
         return run_tasks(tasks, store, options, progress)
-
-
-@contextmanager
-def _progress(cells: int) -> Iterator[PlainProgress]:
-    from cembench.commands.progress import LiveProgress, PlainProgress
-
-    with (LiveProgress if err.is_terminal else PlainProgress)(err, cells) as progress:
-        yield progress
 
 
 def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None:

@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cembench.commands.console import err, out
 from cembench.commands.ending import resumable
-from cembench.commands.progress import LiveProgress, PlainProgress, Remaining, duration
-from cembench.running.local import Step
-from cembench.running.plan import Task
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rich.console import Console
-
     from cembench.results.records import Record
     from cembench.results.store import Store
     from cembench.running.cluster.connect import ClusterPlace
     from cembench.running.estimate import Estimate
     from cembench.running.local import Options
+    from cembench.running.plan import Task
 
 Cluster = Annotated[
     str | None,
@@ -78,10 +71,11 @@ def measure(
     same_environment: bool,
 ) -> list[Record]:
     """Run the tasks on a cluster, with a live table on a terminal."""
+    from cembench.commands.progress import progress_on
     from cembench.running.cluster.client import run_on_cluster
     from cembench.running.cluster.connect import connected
 
-    with resumable(), _progress(len(tasks)) as progress:
+    with resumable(), progress_on(err, len(tasks), on_cluster=True) as progress:
         progress.tells("starting workers" if where.kind != "address" else "connecting")
         with connected(where) as client:
             return run_on_cluster(
@@ -93,65 +87,6 @@ def measure(
                 faces=faces,
                 same_environment=same_environment,
             )
-
-
-@contextmanager
-def _progress(cells: int) -> Iterator[PlainProgress]:
-    with (LiveOnCluster if err.is_terminal else PlainOnCluster)(err, cells) as progress:
-        yield progress
-
-
-class SharedRemaining(Remaining):
-    """What is left is shared by several machines."""
-
-    machines = 1
-
-    @property
-    def seconds(self) -> float | None:
-        """Of what is left, if all machines are at work to the end."""
-        alone = super().seconds
-        return None if alone is None else alone / self.machines
-
-
-class PlainOnCluster(PlainProgress):
-    """A line for each cell that is finished and for what happens to machines."""
-
-    def __init__(self, console: Console, cells: int) -> None:
-        super().__init__(console, cells)
-        self.remaining: SharedRemaining = SharedRemaining()
-
-    def starts(self, task: Task, step: Step) -> None:
-        """Nothing: several machines are at several steps."""
-
-    def machines(self, names: Sequence[str]) -> None:
-        """Say how many workers there are; those of one machine take turns."""
-        self.remaining.machines = max(1, len(set(names)))
-        self._say(_workers(names))
-
-    def tells(self, words: str) -> None:
-        """Say it."""
-        self._say(words)
-
-
-class LiveOnCluster(LiveProgress):
-    """The live table; what happens to machines stands below it, and stays."""
-
-    def __init__(self, console: Console, cells: int) -> None:
-        super().__init__(console, cells)
-        self.remaining: SharedRemaining = SharedRemaining()
-
-    def machines(self, names: Sequence[str]) -> None:
-        """Say how many workers there are."""
-        self.remaining.machines = max(1, len(set(names)))
-        self.tells(_workers(names))
-
-    def tells(self, words: str) -> None:
-        """Say it above the table."""
-        self.console.print(words, markup=False, soft_wrap=True)
-
-
-def _workers(names: Sequence[str]) -> str:
-    return f"{len(names)} worker{'' if len(names) == 1 else 's'} there"
 
 
 def hours(
@@ -187,6 +122,8 @@ def hours(
 
 def show_hours(found: dict[str, Any]) -> None:
     """Print what :func:`hours` found."""
+    from cembench.commands.progress import duration
+
     for machines, seconds in found["seconds"].items():
         longest = found["longest_seconds"] or 0.0
         limit = (

@@ -60,7 +60,7 @@ def peers(
     fails or maps badly is a result: the exit code is 1 only if one of our
     algorithms fails.
     """
-    from cembench.commands.progress import LiveProgress, PlainProgress
+    from cembench.commands.progress import progress_on
     from cembench.commands.report import make_report
     from cembench.core import folders
     from cembench.results import run_folder
@@ -86,8 +86,7 @@ def peers(
     how = MeasurementSettings(repeats=repeats)
     tasks = plan_cells(chosen, found, {}, how, plugins, standing)
     options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
-    shown = LiveProgress if err.is_terminal else PlainProgress
-    with resumable(), shown(err, len(tasks)) as progress:
+    with resumable(), progress_on(err, len(tasks)) as progress:
         records = run_tasks(tasks, Store(output), options, progress)
     _, folder = make_report(output, None, f"cembench peers -o {output}")
     if as_json:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Any, Self
 
 from rich.console import Console, Group, RenderableType
@@ -27,6 +28,8 @@ class Remaining:
     def __init__(self) -> None:
         self.processes = 0
         self.done = 0
+        #: So many share what is left.
+        self.machines = 1
         self._left: dict[str, int] = {}
         self._last: dict[str, float] = {}
 
@@ -56,7 +59,8 @@ class Remaining:
             return None
         known = sum(self._left.get(cell, 0) * last for cell, last in self._last.items())
         unknown = self.processes - self.done - sum(self._left.values())
-        return known + max(unknown, 0) * sum(self._last.values()) / len(self._last)
+        alone = known + max(unknown, 0) * sum(self._last.values()) / len(self._last)
+        return alone / self.machines
 
 
 class PlainProgress(Watcher):
@@ -107,8 +111,24 @@ class PlainProgress(Watcher):
             f"[{self.finished_cells}/{self.cells}] {task.cell.mesh} / {task.cell.algorithm}: {how}"
         )
 
+    def machines(self, names: Sequence[str]) -> None:
+        """Print the number of workers; those of one machine take turns."""
+        self.remaining.machines = max(1, len(set(names)))
+        self.tells(f"{len(names)} worker{'' if len(names) == 1 else 's'} there")
+
+    def tells(self, words: str) -> None:
+        """Print what happened on a cluster; a live display stays below it."""
+        self.console.print(words, markup=False, soft_wrap=True)
+
     def _say(self, line: str) -> None:
         self.console.print(line, markup=False, soft_wrap=True)
+
+
+class PlainOnCluster(PlainProgress):
+    """As its base, without lines for rounds: several machines are at several rounds."""
+
+    def starts(self, task: Task, step: Step) -> None:
+        """Print nothing."""
 
 
 class LiveProgress(PlainProgress):
@@ -170,6 +190,13 @@ class LiveProgress(PlainProgress):
         )
         bar.columns[0].width = 30
         return Group(table, bar, *([Text(self._notice)] if self._notice else []))
+
+
+def progress_on(console: Console, cells: int, *, on_cluster: bool = False) -> PlainProgress:
+    """Return the live table on a terminal, and one line per event elsewhere."""
+    if console.is_terminal:
+        return LiveProgress(console, cells)
+    return (PlainOnCluster if on_cluster else PlainProgress)(console, cells)
 
 
 def rounds_left(step: Step) -> int:

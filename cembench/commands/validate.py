@@ -6,6 +6,7 @@ import shlex
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
@@ -186,13 +187,13 @@ def _folder(output: Path | None) -> Iterator[Path]:
 
 def _telling() -> ValidationHooks:
     """Return hooks that print a line for each stage and the progress of timing."""
-    from cembench.commands.progress import LiveProgress, PlainProgress
+    from cembench.commands.progress import progress_on
     from cembench.validation.examine import ValidationHooks
 
-    def watcher(cells: int) -> PlainProgress:
-        return (LiveProgress if err.is_terminal else PlainProgress)(err, cells)
+    def stage_begins(stage: str) -> None:
+        err.print(f"{stage} ...", style="dim")
 
-    return ValidationHooks(lambda stage: err.print(f"{stage} ...", style="dim"), watcher)
+    return ValidationHooks(stage_begins, partial(progress_on, err))
 
 
 def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:
