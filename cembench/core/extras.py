@@ -26,6 +26,7 @@ class Extra(StrEnum):
     STANDINS = "standins"
     TABLES = "tables"
     VIDEO = "video"
+    VTP = "vtp"
     XATLAS = "xatlas"
 
 
@@ -40,6 +41,7 @@ MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.STANDINS: ("skimage", "pymeshlab"),
     Extra.TABLES: ("pandas",),
     Extra.VIDEO: ("imageio_ffmpeg",),
+    Extra.VTP: ("vtk",),
     Extra.XATLAS: ("xatlas",),
 }
 

@@ -23,6 +23,7 @@ from cembench.mesh.ply_reader import read_ply
 from cembench.mesh.soup import Soup
 from cembench.mesh.stl_reader import read_stl
 from cembench.mesh.vtk_reader import read_vtk
+from cembench.mesh.vtp_reader import read_vtp
 
 READERS: dict[str, Callable[[Path], Soup]] = {
     ".obj": read_obj,
@@ -33,6 +34,7 @@ READERS: dict[str, Callable[[Path], Soup]] = {
     ".npz": read_npz,
     ".vtk": read_vtk,
     ".vtu": read_vtk,
+    ".vtp": read_vtp,
     ".glb": read_gltf,
     ".gltf": read_gltf,
     ".gii": read_gii,

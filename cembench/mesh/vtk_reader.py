@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import redirect_stderr
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +23,8 @@ def read_vtk(path: Path) -> Soup:
     import meshio
 
     try:
-        mesh = meshio.read(path)
+        with redirect_stderr(StringIO()):  # it prints what its error says as well
+            mesh = meshio.read(path)
     except (SystemExit, Exception) as error:  # meshio calls sys.exit on some damaged files
         raise damaged(
             f"it cannot be read as {path.suffix[1:].upper()}: {type(error).__name__}: {error}"

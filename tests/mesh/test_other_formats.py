@@ -103,6 +103,27 @@ def test_vtk_files_keep_every_triangle_and_tell_of_lines(disk, tmp_path, name):
     ]
 
 
+def test_vtp_keeps_every_bit_and_tells_of_lines(disk, tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    faces = np.column_stack([np.full(disk.m, 3), disk.F])
+    for binary in (False, True):
+        data = pyvista.PolyData(disk.V, faces=faces.ravel(), lines=[2, 0, 1])
+        data.save(tmp_path / "a.vtp", binary=binary)
+        mesh = read_mesh(tmp_path / "a.vtp", TriangleMesh)
+        assert np.array_equal(mesh.F, disk.F)
+        assert np.allclose(mesh.V, disk.V, rtol=0 if binary else 1e-6, atol=0 if binary else 1e-6)
+        assert [n.text for n in mesh.notices if n.kind is NoticeKind.LINES_IGNORED] == [
+            "cells that are not faces were ignored: 1 lines"
+        ]
+    strips = pyvista.PolyData(disk.V, strips=[4, 0, 1, 2, 3])
+    strips.save(tmp_path / "strips.vtp")
+    with pytest.raises(MeshError, match="triangle strips"):
+        read_mesh(tmp_path / "strips.vtp")
+    pyvista.PolyData(disk.V).save(tmp_path / "points.vtp")
+    with pytest.raises(MeshError):
+        read_mesh(tmp_path / "points.vtp")
+
+
 def test_gltf_with_the_seams_closed(disk, tmp_path):
     pytest.importorskip("trimesh")
     write_mesh(tmp_path / "a.glb", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
@@ -128,12 +149,13 @@ def test_gifti(disk, tmp_path):
         read_mesh(tmp_path / "b.gii")
 
 
-@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".glb", ".gii"])
-def test_a_file_cut_short_or_of_another_kind_is_an_error(disk, tmp_path, suffix):
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".vtp", ".glb", ".gii"])
+def test_a_file_cut_short_or_of_another_kind_is_an_error(disk, tmp_path, suffix, capfd):
     pytest.importorskip("meshio")
+    pytest.importorskip("vtk")
     pytest.importorskip("nibabel")
     whole = tmp_path / f"whole{suffix}"
-    if suffix == ".glb":
+    if suffix in (".glb", ".vtp"):
         write_mesh(whole, disk)
     elif suffix == ".gii":
         test_gifti(disk, tmp_path)
@@ -148,11 +170,19 @@ def test_a_file_cut_short_or_of_another_kind_is_an_error(disk, tmp_path, suffix)
     (tmp_path / f"text{suffix}").write_text("hello")
     with pytest.raises(MeshError, match="cannot be read as"):
         read_mesh(tmp_path / f"text{suffix}", TriangleMesh)
+    assert not capfd.readouterr().err, "a library prints on the terminal"
 
 
-@pytest.mark.parametrize(("suffix", "module"), [(".vtu", "meshio"), (".glb", "trimesh")])
-def test_a_missing_library_is_named_with_its_extra(monkeypatch, tmp_path, suffix, module):
+@pytest.mark.parametrize(
+    ("suffix", "module", "extra"),
+    [
+        (".vtu", "meshio", "formats"),
+        (".glb", "trimesh", "formats"),
+        (".vtp", "vtk", "vtp"),
+    ],
+)
+def test_a_missing_library_is_named_with_its_extra(monkeypatch, tmp_path, suffix, module, extra):
     monkeypatch.setitem(__import__("sys").modules, module, None)
     (tmp_path / f"a{suffix}").write_bytes(b"x")
-    with pytest.raises(MissingExtra, match=rf"{module}.*cembench\[formats\]"):
+    with pytest.raises(MissingExtra, match=rf"{module}.*cembench\[{extra}\]"):
         read_mesh(tmp_path / f"a{suffix}")
