@@ -1,7 +1,7 @@
 """The paper's four public models: printed beside measured, and what numbering alone decides.
 
-Fills docs/paper_models.md from the files of the models (`cembench fetch --group paper`; Nefertiti
-comes with CGAL) and from other coarse disks::
+Fills docs/paper_models.md, and the short table of README.md, from the files of the models
+(`cembench fetch --group paper`; Nefertiti comes with CGAL) and from other coarse disks::
 
     python -m benchmarks.paper_models FOLDER_OF_MESHES
 """
@@ -9,7 +9,7 @@ comes with CGAL) and from other coarse disks::
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -92,22 +92,66 @@ RUNS: tuple[tuple[str, str, Callable[[DiskMesh, str], Parameterization]], ...] =
 )
 
 
-def beside(folder: Path) -> Iterable[str]:
-    """Yield the lines of the table of printed beside measured figures."""
-    yield "| model | algorithm | printed E_C | mean | SD | measured E_C | mean | SD | digits |"
-    yield "|---|---|---:|---:|---:|---:|---:|---:|---|"
+@dataclass(frozen=True)
+class Row:
+    """One algorithm on one model: the three printed figures and those measured."""
+
+    model: str
+    column: str
+    title: str
+    said: tuple[str, str, str]
+    found: tuple[str, str, str]
+
+
+def measured(folder: Path) -> Iterable[Row]:
+    """Yield what every call of :data:`RUNS` finds on every model."""
     for model, file in MODELS.items():
         mesh = read_mesh(folder / file)
         for column, title, call in RUNS:
-            said, found = printed(model, column), cells(mesh, call(mesh.fresh(), model)).shown()
-            differ = [
-                name
-                for name, a, b in zip(("E_C", "mean", "SD"), said, found, strict=True)
-                if a != b
-            ]
-            agreed = "all agree" if not differ else f"not {', '.join(differ)}"
-            yield f"| {model} | {title} | {' | '.join(said)} | {' | '.join(found)} | {agreed} |"
+            found = cells(mesh, call(mesh.fresh(), model)).shown()
+            yield Row(model, column, title, printed(model, column), found)
             print(model, title, flush=True)
+
+
+def beside(rows: Sequence[Row]) -> Iterable[str]:
+    """Yield the lines of the table of printed beside measured figures."""
+    yield "| model | algorithm | printed E_C | mean | SD | measured E_C | mean | SD | digits |"
+    yield "|---|---|---:|---:|---:|---:|---:|---:|---|"
+    for row in rows:
+        differ = [
+            name
+            for name, a, b in zip(("E_C", "mean", "SD"), row.said, row.found, strict=True)
+            if a != b
+        ]
+        agreed = "all agree" if not differ else f"not {', '.join(differ)}"
+        yield (
+            f"| {row.model} | {row.title} | {' | '.join(row.said)} | {' | '.join(row.found)} "
+            f"| {agreed} |"
+        )
+
+
+#: What README.md shows of each of the paper's columns.
+SHORT = {
+    "QIEM": "QIEM",
+    "FDM, public program": "FDM",
+    "LDM": "LDM",
+    "CEM, as many iterations": "CEM",
+}
+
+
+def short(rows: Sequence[Row]) -> Iterable[str]:
+    """Yield the lines of a table by model: measured, and printed in brackets where it differs."""
+    yield f"| E_C, mean, SD | {' | '.join(SHORT.values())} |"
+    yield f"|---|{'---|' * len(SHORT)}"
+    for model in MODELS:
+        shown = {row.title: brackets(row) for row in rows if row.model == model}
+        yield f"| {model} | {' | '.join(shown[title] for title in SHORT)} |"
+
+
+def brackets(row: Row) -> str:
+    """Return the measured figures, each with the printed one in brackets where that differs."""
+    pairs = zip(row.said, row.found, strict=True)
+    return ", ".join(here if here == said else f"{here} ({said})" for said, here in pairs)
 
 
 def ldm_choices(mesh: DiskMesh) -> list[Cells]:
@@ -188,7 +232,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    parts = ["## Printed beside measured", "", *beside(folder), "", "## What numbering decides", ""]
+    rows = list(measured(folder))
+    fill(ROOT / "README.md", "paper_models", "\n".join(short(rows)))
+    parts = ["## Printed beside measured", "", *beside(rows), "", "## What numbering decides", ""]
     parts += [nefertiti(folder), "", *ranges(folder)]
     fill(PAGE, "paper_models", "\n".join(parts))
 

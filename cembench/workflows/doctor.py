@@ -35,6 +35,7 @@ _FOR = {
     Extra.STANDINS: "makes stand-ins for the paper's models",
     Extra.TABLES: "gives a run's figures as pandas DataFrames",
     Extra.VIDEO: "writes films as MP4",
+    Extra.VTP: "reads VTP files",
     Extra.XATLAS: "unwraps surfaces into islands",
 }
 
