@@ -40,16 +40,7 @@ class Angles:
             # The six rows of each triangle: the sums at its corners, then the wheels.
             self._rows = np.concatenate([self.number[mesh.F], self.number[mesh.F]], axis=1)
             self._rows[:, 3:] += np.where(self._rows[:, 3:] >= 0, self.k, 0)
-            i = np.repeat(self._rows, 6, axis=1).ravel()
-            j = np.tile(self._rows, (1, 6)).ravel()
-            self._inside = (i >= 0) & (j >= 0)
-            size = 2 * self.k
-            keys = j[self._inside] * size + i[self._inside]
-            unique, self._place = np.unique(keys, return_inverse=True)
-            pointers = np.searchsorted(unique // size, np.arange(size + 1))
-            self._A = sparse.csc_array(
-                (np.zeros(len(unique)), unique % size, pointers), shape=(size, size)
-            )
+            self._A, self._place, self._inside = _pattern(self.number[mesh.F], self.k)
 
     @property
     def wanted(self) -> Real:
@@ -149,6 +140,39 @@ class Angles:
         """Return the sums of the triangles' row values (m, 6) per row, (2 k,)."""
         there = self._rows >= 0
         return np.bincount(self._rows[there], values[there], 2 * self.k).astype(np.float64)
+
+
+def _pattern(
+    corners: NDArray[np.intp], k: int
+) -> tuple[sparse.csc_array, NDArray[np.intp], NDArray[np.bool_]]:
+    """Return the system's matrix (2 k, 2 k) of zeros, and where the triangles' blocks lie in it.
+
+    `corners` (m, 3) are numbers of interior vertices, -1 at the boundary. The matrix has four
+    blocks of order k, sums and wheels by sums and wheels, with one pattern. Of the entries of all
+    triangles' blocks (m, 6, 6), flattened, those of the mask's are in it, at these places.
+    """
+    i, j = np.repeat(corners, 3, axis=1), np.tile(corners, (1, 3))
+    inside = (i >= 0) & (j >= 0)
+    unique, inverse = np.unique(j[inside] * k + i[inside], return_inverse=True)
+    column, row = np.divmod(unique, k)
+    degree = np.bincount(column, minlength=k)
+    start = np.concatenate([[0], np.cumsum(degree)])
+    # A column holds its rows among the sums, then the same rows among the wheels.
+    block = len(unique)
+    among_sums = np.arange(block) + start[column]
+    rows = np.empty(4 * block, dtype=np.intp)
+    for wheel in (0, 2 * block):
+        rows[among_sums + wheel] = row
+        rows[among_sums + wheel + degree[column]] = row + k
+    pointers = np.concatenate([2 * start[:-1], 2 * (block + start)])
+    A = sparse.csc_array((np.zeros(4 * block), rows, pointers), shape=(2 * k, 2 * k))
+    found = np.zeros(inside.shape, dtype=np.intp)
+    found[inside] = inverse
+    place = np.tile(among_sums[found].reshape(-1, 3, 3), (1, 2, 2))
+    place[:, 3:] += np.tile(degree[column][found].reshape(-1, 3, 3), (1, 1, 2))
+    place[:, :, 3:] += 2 * block
+    inside = np.tile(inside.reshape(-1, 3, 3), (1, 2, 2)).ravel()
+    return A, place.ravel()[inside], inside
 
 
 def kept_positive(angles: Real, e: Real) -> tuple[Real, float]:
