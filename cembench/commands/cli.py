@@ -465,8 +465,9 @@ def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None
 
 
 def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
+    from cembench.report.content.many import MANY
     from cembench.report.render.terminal import results_table, speedups_table
-    from cembench.report.render.terminal_many import MANY, machines_told, many_table
+    from cembench.report.render.terminal_many import machines_told, many_table
     from cembench.results.record_rows import REFERENCE, rows
     from cembench.results.store import Store
 

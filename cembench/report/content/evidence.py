@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,8 @@ from cembench.results.store import Store
 
 REFERENCE = frame.REFERENCE
 DISK = "disk"
+#: The metric by which maps of all targets are compared: mean angle error in degrees.
+ANGLE = "angle_error_mean_deg"
 Row = Mapping[str, Any]
 #: Parameters that distinguish two cells of an algorithm, besides surface and policy.
 Variant = tuple[tuple[str, str], ...]
@@ -284,6 +287,20 @@ class Evidence:
             why = f"it has {len(uv)} vertices, the record {record.mesh.vertices}"
             raise damaged(file, f"the map of {record.cell.label}", why)
         return uv
+
+
+def figure_of(record: Record, metric: str) -> float:
+    """Return a figure of a map; infinite if the cell did not end ok."""
+    found = record.outcome.metrics.get(metric)
+    return inf if record.outcome.status != "ok" or found is None else float(found)
+
+
+def figure(
+    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str, metric: str
+) -> float | None:
+    """Return a figure of a map; infinite if the cell did not end ok, None if not tried."""
+    record = evidence.find(surface, series, policy)
+    return None if record is None else figure_of(record, metric)
 
 
 def model_surface(model: str) -> str:

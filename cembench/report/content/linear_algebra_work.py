@@ -6,7 +6,7 @@ from math import exp, log
 
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import POLICIES
-from cembench.report.document import Column, Table, Value, missing, words
+from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.records import LinearAlgebraWork
 
 CAPTION = (
@@ -73,7 +73,7 @@ def _table(evidence: Evidence, policy: str) -> Table:
     for series in evidence.series:
         factored, solved = ratios[series.label]
         means += [_mean(factored), _mean(solved), words("")]
-        counts += [Value(str(len(factored)), len(factored), "derived"), words(""), words("")]
+        counts += [count(len(factored)), words(""), words("")]
     return Table(
         f"linear-algebra-work-{policy}",
         "Factorisations and solves of a map, compared with those of CEM",

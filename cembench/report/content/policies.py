@@ -8,7 +8,7 @@ from cembench.report.content.averages import geometric_rate
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.content.table_2 import measured_rates
-from cembench.report.document import Column, Gap, Table, Value, missing, words
+from cembench.report.document import Column, Gap, Table, Value, count, missing, words
 from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.report.plots import PlotSeries as Bars
 
@@ -69,7 +69,7 @@ def policies_table(evidence: Evidence) -> Table:
         mean = geometric_rate([r - 1 for r in found]) + 1 if found else None
         value = missing("nothing to average") if mean is None else Value(f"{mean:.2f}", mean)
         means += [words(""), words(""), value]
-        counts += [words(""), words(""), Value(str(len(found)), len(found), "derived")]
+        counts += [words(""), words(""), count(len(found))]
     return Table(
         "reuse-against-backslash",
         "Seconds with factorisations reused (reuse) or repeated at every solve (backslash)",
@@ -104,7 +104,7 @@ def speedups_table(evidence: Evidence) -> Table:
                     Value(f"{mean:.2f}", mean, "derived"),
                     Value(f"{geometric:.2f}", geometric, "derived"),
                 ]
-            cells.append(Value(str(len(rates)), len(rates), "derived"))
+            cells.append(count(len(rates)))
         rows.append(tuple(cells))
     return Table(
         "speedup-by-policy",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.document import Column, Table, Value, missing, words
+from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results import paper
 from cembench.results.comparison import UNSTABLE_WIDTH
 from cembench.results.records import Record
@@ -172,7 +172,7 @@ def _footer_rows(
             for c in columns
         ]
         lines.append((words(footer.label), words(""), *cells))
-    counts = [Value(str(len(c)), len(c), "derived") for c in columns]
+    counts = [count(len(c)) for c in columns]
     return [*lines, (words("n, surfaces counted"), words(""), *counts)]
 
 

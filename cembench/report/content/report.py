@@ -56,8 +56,6 @@ PICTURES = (
 PAPER = "Conformal surface parameterizations: the paper's tables and figures, measured"
 #: Names of plots for the head, the first that is there: accuracy against time, or its profiles.
 FIRST_PLOTS = ("accuracy-against-time", "accuracy-profiles")
-#: Name of the plot shown with the accuracy profiles in a report on many surfaces.
-PROFILE = "performance-profile"
 
 #: Words for surfaces by origin.
 _KINDS: Mapping[MeshOrigin, str] = {
@@ -257,10 +255,9 @@ def _pictures(
 
 
 def _beyond(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
-    items: list[Item] = _drawn(
-        [performance_profile(evidence), accuracy_against_time(evidence), time_by_phase(evidence)],
-        folder,
-    )
+    # Over many surfaces, the profile of the time stands beside those of accuracy.
+    profiles = [performance_profile(evidence)] if by_surface else []
+    items = _drawn([*profiles, accuracy_against_time(evidence), time_by_phase(evidence)], folder)
     if not evidence.models:  # otherwise it is below Table 2
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
@@ -298,9 +295,8 @@ def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Sec
 
 
 def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
-    """Return the section on cost over all surfaces; time profiles are with those of accuracy."""
-    kept = [item for item in beyond.items if isinstance(item, Table | Figure)]
-    items: list[Item] = [item for item in kept if item.name != PROFILE]
+    """Return the section on cost over all surfaces."""
+    items: list[Item] = [item for item in beyond.items if isinstance(item, Table | Figure)]
     items += _drawn([cost_by_faces(evidence)], folder)
     items.append(exponents_table(evidence))
     return Section("costs", "What maps cost", tuple(items))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
 from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
-from cembench.report.document import Column, Table, Value, missing, words
+from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import Comparison, compare, paired_ratios
 from cembench.results.many import FEWEST_SURFACES, average_interval, corrected, sign_test
 
@@ -85,7 +85,7 @@ def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ..
     interval = average_interval(compared.ratios, _geometric)
     return (
         words(compared.series.label),
-        _count(len(figures)),
+        count(len(figures)),
         *_verdicts(compared.found),
         *_verdicts(together),
         Value(f"{wins} of {wins + losses}", wins, "derived"),
@@ -101,11 +101,7 @@ def _verdicts(found: Sequence[Comparison]) -> list[Value]:
     """Return the numbers of surfaces on which CEM is faster, slower, or undecided."""
     counts = Counter(one.verdict for one in found)
     faster, slower = counts["slower"], counts["faster"]  # the verdict is about the other algorithm
-    return [_count(faster), _count(slower), _count(len(found) - faster - slower)]
-
-
-def _count(number: int) -> Value:
-    return Value(str(number), number, "derived")
+    return [count(faster), count(slower), count(len(found) - faster - slower)]
 
 
 def _geometric(ratios: NDArray[np.float64]) -> NDArray[np.float64]:

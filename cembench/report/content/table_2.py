@@ -23,7 +23,7 @@ from cembench.report.content.printed_beside_measured import (
     policy_suffix,
 )
 from cembench.report.content.sure_speedups import sure_speedups
-from cembench.report.document import Column, Table, Value, missing, words
+from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.records import Record
 
 CAPTION = (
@@ -100,7 +100,7 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
     counts = [words("n, models counted")]
     for algorithm in COMPARED:
         counts.append(words(""))
-        counts += [Value(str(len(r)), len(r), "derived") for r in sets[algorithm]]
+        counts += [count(len(r)) for r in sets[algorithm]]
     origins = sorted({s.origin for s in evidence.models})
     return Table(
         name=f"averages{policy_suffix(policy, evidence)}",

@@ -13,8 +13,6 @@ from cembench.report.render.grid import figures, grid, names
 from cembench.results.machines import Environments, marks
 from cembench.results.records import Record
 
-#: With more surfaces than this, runs are summarised instead of shown cell by cell.
-MANY = 24
 #: Maximum number of causes listed.
 TOLD = 8
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.document import Column, Table, Value, missing, words
+from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.report.palette import SeriesStyle, looks
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, through
 from cembench.results import paper
@@ -129,4 +129,4 @@ def _fit_cells(law: Fit | None) -> list[Value]:
     if law is None:
         return [missing(f"fewer than {FEWEST} sizes"), missing("no fit")]
     text = f"{law.exponent:.2f} ± {law.error:.2f}"
-    return [Value(text, law.exponent, "derived"), Value(str(law.n), law.n, "derived")]
+    return [Value(text, law.exponent, "derived"), count(law.n)]

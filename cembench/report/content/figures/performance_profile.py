@@ -12,10 +12,16 @@ from __future__ import annotations
 from math import inf
 
 from cembench.report.content.as_good import AS_GOOD, DEGREES, as_good
-from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.plots import Axis, Plot, PlotPanel
-from cembench.report.plots import PlotSeries as Line
-from cembench.results.records import Record
+from cembench.report.content.evidence import (
+    ANGLE,
+    AlgorithmSeries,
+    Evidence,
+    MeasuredSurface,
+    figure,
+    figure_of,
+)
+from cembench.report.content.staircases import profile_panel
+from cembench.report.plots import Plot
 
 
 def time_of(
@@ -26,20 +32,14 @@ def time_of(
     if record is None:
         return None
     seconds = record.outcome.median_seconds
-    error = _angle(record)
+    error = figure_of(record, ANGLE)
     good = error < inf and as_good([error], [_best_angle(evidence, surface, policy)])
     return seconds if good and seconds is not None else inf
 
 
-def _angle(record: Record) -> float:
-    """Return the mean angle error in degrees; infinite if the cell did not end ok."""
-    error = record.outcome.metrics.get("angle_error_mean_deg")
-    return inf if record.outcome.status != "ok" or error is None else float(error)
-
-
 def _best_angle(evidence: Evidence, surface: MeasuredSurface, policy: str) -> float:
-    found = [evidence.find(surface, s, policy) for s in evidence.disk_series]
-    return min((_angle(record) for record in found if record is not None), default=inf)
+    found = (figure(evidence, surface, s, policy, ANGLE) for s in evidence.disk_series)
+    return min((error for error in found if error is not None), default=inf)
 
 
 def shown_series(evidence: Evidence, policy: str) -> tuple[AlgorithmSeries, ...]:
@@ -75,7 +75,8 @@ def performance_profile(evidence: Evidence) -> Plot | None:
         found, used = ratios(evidence, policy)
         if not used or len(found) < 2:
             continue
-        panels.append(_panel(evidence, found, len(used), policy))
+        title = f"solves: {policy}"
+        panels.append(profile_panel(evidence, found, len(used), best="the fastest", title=title))
         counts.append(f"{len(used)} of {len(evidence.surfaces)} ({policy})")
     if not panels:
         return None
@@ -96,20 +97,3 @@ def _left_out(evidence: Evidence) -> str:
     shown = {s.label for policy in evidence.policies for s in shown_series(evidence, policy)}
     names = [s.label for s in evidence.disk_series if s.label not in shown]
     return f" Left out, as they were tried on fewer surfaces: {', '.join(names)}." if names else ""
-
-
-def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: str) -> PlotPanel:
-    finite = [r for values in found.values() for r in values if r < inf]
-    last = 1.15 * max(finite)
-    lines = []
-    for series in (s for s in evidence.disk_series if s.label in found):
-        ordered = sorted(r for r in found[series.label] if r < inf)
-        x = [1.0, *ordered, last]
-        y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
-        lines.append(Line(series.label, x, y, "steps", evidence.looks[series.label]))
-    return PlotPanel(
-        Axis("tau, times the fastest", log=True, low=1.0, high=last),
-        Axis("surfaces (%)", low=0, high=104),
-        tuple(lines),
-        f"solves: {policy}, n = {n}",
-    )

@@ -10,8 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import inf
 
-from cembench.report.content.evidence import DISK, AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
+from cembench.report.content.evidence import ANGLE, DISK, Evidence, figure
+from cembench.report.content.staircases import profile_panel
+from cembench.report.plots import Plot, PlotPanel
 
 #: Larger factors are not distinguished.
 FARTHEST = 100.0
@@ -29,10 +30,10 @@ class _Panel:
 
 
 _PANELS = (
-    _Panel("angle_error_mean_deg", "mean angle error", (DISK, "free boundary")),
+    _Panel(ANGLE, "mean angle error", (DISK, "free boundary")),
     _Panel("beltrami_area_mean", "mean |mu|", (DISK, "free boundary")),
     _Panel("common_gauge_energy", "E_C in the common gauge", (DISK,)),
-    _Panel("angle_error_mean_deg", "mean angle error, surfaces with holes", ("circular holes",)),
+    _Panel(ANGLE, "mean angle error, surfaces with holes", ("circular holes",)),
 )
 
 
@@ -68,27 +69,6 @@ def _panel(evidence: Evidence, policy: str, wanted: _Panel) -> PlotPanel | None:
             ratios[one.label].append(max(value, SMALLEST) / best)
     if not n:
         return None
-    last = min(FARTHEST, 1.15 * max(r for found in ratios.values() for r in found if r < inf))
-    lines = []
-    for one in series:
-        ordered = sorted(r for r in ratios[one.label] if r <= last)
-        x = [1.0, *ordered, last]
-        y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
-        lines.append(PlotSeries(one.label, x, y, "steps", evidence.looks[one.label]))
-    return PlotPanel(
-        Axis("tau, times the best", log=True, low=1.0, high=max(last, 1.01)),
-        Axis("surfaces (%)", low=0, high=104),
-        tuple(lines),
-        f"{wanted.title}, n = {n}",
+    return profile_panel(
+        evidence, ratios, n, best="the best", title=wanted.title, farthest=FARTHEST
     )
-
-
-def figure(
-    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str, metric: str
-) -> float | None:
-    """Return a figure of a map; infinite if the cell did not end ok, None if not tried."""
-    record = evidence.find(surface, series, policy)
-    if record is None:
-        return None
-    found = record.outcome.metrics.get(metric)
-    return inf if record.outcome.status != "ok" or found is None else float(found)

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from cembench.conformal.metrics import in_common_gauge, is_disk_map
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
-from cembench.report.content.many.accuracy_profiles import figure
+from cembench.report.content.evidence import ANGLE, DISK, Evidence, MeasuredSurface, figure
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through
 from cembench.report.surface_facts import factor_spans
 from cembench.results.records import Record
@@ -62,7 +61,7 @@ def best_record(evidence: Evidence, surface: MeasuredSurface, policy: str) -> Re
     best: tuple[bool, float] = (True, inf)
     found = None
     for series in evidence.series:
-        angle = figure(evidence, surface, series, policy, "angle_error_mean_deg")
+        angle = figure(evidence, surface, series, policy, ANGLE)
         rank = (series.target != DISK, inf if angle is None else angle)
         if rank[1] < inf and rank < best:
             best, found = rank, evidence.find(surface, series, policy)
@@ -122,7 +121,7 @@ def errors_by_difficulty(
         for one in series[:DRAWN]:
             points = []
             for surface in surfaces:
-                error = figure(evidence, surface, one, policy, "angle_error_mean_deg")
+                error = figure(evidence, surface, one, policy, ANGLE)
                 if error is not None and 0 < error < inf:
                     points.append(Point(place(surface), error, surface.title))
             clouds.append(through(one.label, points, "points", evidence.looks[one.label]))

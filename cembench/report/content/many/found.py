@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from math import inf
 
-from cembench.report.content.evidence import AlgorithmSeries, Evidence
-from cembench.report.content.many.accuracy_profiles import figure
+from cembench.report.content.evidence import ANGLE, Evidence, figure
 from cembench.report.content.many.success import records_of
 from cembench.report.document import Finding, Findings
-
-_ANGLE = "angle_error_mean_deg"
 
 
 def many_findings(evidence: Evidence, policy: str) -> Findings | None:
@@ -56,7 +53,7 @@ def _best_angles(evidence: Evidence, policy: str) -> tuple[Counter[str], int]:
     won: Counter[str] = Counter()
     tried = 0
     for surface in evidence.surfaces:
-        found = {s.label: figure(evidence, surface, s, policy, _ANGLE) for s in series}
+        found = {s.label: figure(evidence, surface, s, policy, ANGLE) for s in series}
         known = {label: error for label, error in found.items() if error is not None}
         if len(known) < 2 or min(known.values()) == inf:
             continue
@@ -67,14 +64,11 @@ def _best_angles(evidence: Evidence, policy: str) -> tuple[Counter[str], int]:
 
 def _worst(evidence: Evidence, policy: str) -> tuple[float, str, str] | None:
     """Return the largest mean angle error of a valid map, of whom, and on which surface."""
-
-    def errors(series: AlgorithmSeries) -> list[tuple[float, str, str]]:
-        return [
-            (error, series.label, surface.title)
-            for surface in evidence.surfaces
-            if (error := figure(evidence, surface, series, policy, _ANGLE)) not in (None, inf)
-            and error is not None
-        ]
-
-    found = [one for series in evidence.series if series.main for one in errors(series)]
+    found = (
+        (error, series.label, surface.title)
+        for series in evidence.series
+        if series.main
+        for surface in evidence.surfaces
+        if (error := figure(evidence, surface, series, policy, ANGLE)) is not None and error < inf
+    )
     return max(found, default=None)

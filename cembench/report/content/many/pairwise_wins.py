@@ -6,8 +6,13 @@ from collections.abc import Callable
 from itertools import combinations
 from math import inf, isclose
 
-from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.many.accuracy_profiles import figure
+from cembench.report.content.evidence import (
+    ANGLE,
+    AlgorithmSeries,
+    Evidence,
+    MeasuredSurface,
+    figure,
+)
 from cembench.report.content.printed_beside_measured import policy_suffix
 from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.intervals import ERROR
@@ -23,7 +28,7 @@ def pairwise_wins(evidence: Evidence, policy: str) -> list[Table]:
     """Return tables of angles and seconds for maps to the disk, if there are several."""
 
     def angle(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
-        return figure(evidence, surface, series, policy, "angle_error_mean_deg")
+        return figure(evidence, surface, series, policy, ANGLE)
 
     def seconds(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
         record = evidence.find(surface, series, policy)

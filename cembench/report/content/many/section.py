@@ -8,6 +8,7 @@ from pathlib import Path
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.figures.performance_profile import performance_profile
 from cembench.report.content.inspection import Inspection
+from cembench.report.content.many import MANY
 from cembench.report.content.many.accuracy_profiles import accuracy_profiles
 from cembench.report.content.many.difficulty import difficulties, errors_by_difficulty
 from cembench.report.content.many.pairwise_wins import pairwise_wins
@@ -15,7 +16,6 @@ from cembench.report.content.many.success import success_table
 from cembench.report.content.many.worst import hardest_gallery, hardest_table, spread_table
 from cembench.report.document import Item, Section, Text
 from cembench.report.plots import write_plot
-from cembench.report.render.terminal_many import MANY
 
 
 def is_many(evidence: Evidence) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence
-from cembench.report.document import Column, Table, Value, words
+from cembench.report.document import Column, Table, Value, count, words
 from cembench.results.intervals import LEVEL
 from cembench.results.records import Record, Status
 
@@ -66,11 +66,11 @@ def _row(
     return (
         words(series.label),
         words(series.target),
-        _count(n),
-        _count(ok),
+        count(n),
+        count(ok),
         Value(f"{100 * ok / n:.1f}", 100 * ok / n, "derived"),
         Value(f"{100 * low:.1f} to {100 * high:.1f}", None, "derived"),
-        *(_count(counts[status]) for status in statuses),
+        *(count(counts[status]) for status in statuses),
         words(told or "none"),
     )
 
@@ -85,7 +85,3 @@ def share_interval(successes: int, n: int) -> tuple[float, float]:
 
     found = binomtest(successes, n).proportion_ci(LEVEL, method="wilson")
     return float(found.low), float(found.high)
-
-
-def _count(number: int) -> Value:
-    return Value(str(number), number, "derived")

@@ -7,16 +7,14 @@ from math import inf
 
 import numpy as np
 
-from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface, figure
 from cembench.report.content.inspection import Inspection
-from cembench.report.content.many.accuracy_profiles import figure
 from cembench.report.content.many.difficulty import best_record
 from cembench.report.content.many.success import records_of
-from cembench.report.document import Column, Gallery, Table, Value, missing, words
+from cembench.report.document import Column, Gallery, Table, Value, count, missing, words
 
 #: Number of surfaces shown.
 HARDEST = 10
-_ANGLE = "angle_error_mean_deg"
 
 
 def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
@@ -27,7 +25,7 @@ def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
 
     def error(surface: MeasuredSurface) -> float:
         best = best_record(evidence, surface, policy)
-        found = None if best is None else best.outcome.metrics.get(_ANGLE)
+        found = None if best is None else best.outcome.metrics.get(ANGLE)
         return inf if found is None else float(found)
 
     return tuple(sorted(evidence.surfaces, key=error, reverse=True)[:HARDEST])
@@ -41,7 +39,7 @@ def spread_table(evidence: Evidence, policy: str) -> Table:
             (float(error), record)
             for record in records_of(evidence, series, policy)
             if record.outcome.status == "ok"
-            and (error := record.outcome.metrics.get(_ANGLE)) is not None
+            and (error := record.outcome.metrics.get(ANGLE)) is not None
         ]
         if not found:
             continue
@@ -51,7 +49,7 @@ def spread_table(evidence: Evidence, policy: str) -> Table:
         rows.append(
             (
                 words(series.label),
-                Value(str(len(found)), len(found), "derived"),
+                count(len(found)),
                 *(Value(f"{value:.2f}", float(value), "derived") for value in figures),
                 Value(f"{worst:.2f}", worst, "derived", where.cell.key),
                 words(where.cell.mesh),
@@ -80,7 +78,7 @@ def hardest_table(evidence: Evidence, policy: str, surfaces: tuple[MeasuredSurfa
         cells = []
         for series in tried:
             record = evidence.find(surface, series, policy)
-            error = figure(evidence, surface, series, policy, _ANGLE)
+            error = figure(evidence, surface, series, policy, ANGLE)
             if record is None:
                 cells.append(missing("not tried"))
             elif error is None or error == inf:
