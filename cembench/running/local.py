@@ -4,10 +4,10 @@ First every cell is checked: one call in a process of its own, whose map is veri
 memory is measured. What ends ok is then timed in rounds. A round has a fresh process for every
 cell, in a random order, so a machine that slows down slows them all. A cell has a fixed number of
 rounds, or is measured until its intervals are narrow (:mod:`cembench.running.until_precise`), as
-long as time is left. Where that is possible the processes of a round are forked from one that has
-loaded the libraries (:mod:`cembench.running.fork_server`), another one each round: what differs
-from one interpreter to the next (addresses, hash seeds) is the same for all cells of a round, and
-averaged over.
+long as time is left. Where that is possible the processes are forked from one that has loaded the
+libraries (:mod:`cembench.running.fork_server`), one for the checks and another one each round: what
+differs from one interpreter to the next (addresses, hash seeds) is the same for all cells of a
+round, and averaged over.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import uuid
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from collections.abc import Set as AbstractSet
-from contextlib import closing, suppress
+from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
@@ -188,7 +188,8 @@ def map_once(
     started = _now()
     try:
         with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
-            outcome, uv = Launcher(Path(folder), options or Options()).check(task)
+            # One process: loading a server's libraries would be no quicker than loading its own.
+            outcome, uv = Launcher(Path(folder), options or Options(), forks=False).check(task)
     except OSError as error:
         raise RecordError(
             f"the temporary folder cannot be used: {error.strerror or error}. Make room in it, or "
@@ -288,10 +289,13 @@ class _Run:
                     outcome, uv = self.launcher.check(task)
                 self._keep_check(task, outcome, uv)
             return
-        launchers = self.launcher.for_checks(self.options.jobs)
-        for task, (outcome, uv), launcher in check_side_by_side(new, launchers, self._checking):
-            self.launcher.take_over(launcher, task)
-            self._keep_check(task, outcome, uv)
+        with ExitStack() as stack:
+            launchers = self.launcher.for_checks(self.options.jobs)
+            for launcher in launchers:
+                stack.callback(launcher.close)
+            for task, (outcome, uv), launcher in check_side_by_side(new, launchers, self._checking):
+                self.launcher.take_over(launcher, task)
+                self._keep_check(task, outcome, uv)
 
     def _checking(self, task: Task) -> _Process:
         return _Process(self.watcher, task, self._step(task, None))
@@ -495,8 +499,8 @@ def record_of(task: Task, outcome: Outcome, environment: str, started: str) -> R
 class Launcher:
     """Starts the processes; `scratch` is where they and it exchange files.
 
-    Those that time are forked from a server where `forks` allows it and the system can. It stands
-    until :meth:`close`; the next process gets a new one.
+    They are forked from a server where `forks` allows it and the system can. It stands until
+    :meth:`close`; the next process gets a new one.
     """
 
     scratch: Path
@@ -695,8 +699,7 @@ class Launcher:
             **more,
         )
         limits = Limits(seconds, self.options.memory_bytes)
-        forked = {"time": self._forked, "again": self._forked}
-        ending = (self._by_judges if judges else forked.get(what, _never))(job, limits, log)
+        ending = (self._by_judges if judges else self._forked)(job, limits, log)
         ending = ending or self._started(job, limits, log)
         with suppress(OSError):  # there may be no folder any more
             _remove(self.scratch / PROGRAMS)  # of a program that was ended
@@ -739,7 +742,8 @@ class Launcher:
                 return None
         path = self._write(job.model_copy(update={"parent": self._server.pid}))
         try:
-            return run_limited(self._server.forking(path), limits, log)
+            forking = self._server.forking(path)
+            return run_limited(forking, limits, log, stopped=self._stopped.is_set)
         except ServerGoneError:
             self.close()
             return None
@@ -774,10 +778,6 @@ class Launcher:
                 np.save(file, array)
                 self._written[file] = _stamp(file)
         return files
-
-
-def _never(job: Job, limits: Limits, log: Path) -> None:
-    """Fork nothing: a check has an interpreter of its own."""
 
 
 @cache

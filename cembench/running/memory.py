@@ -17,9 +17,10 @@ T = TypeVar("T")
 class Memory:
     """Resident bytes of this process; None if the system does not report them."""
 
-    #: Peak resident memory, including mesh and libraries.
+    #: Peak resident memory, including the mesh and the libraries as far as they were used.
     peak: int | None
-    #: The peak less the resident memory before the call.
+    #: The peak less the resident memory before the call, and less the pages of files that came in
+    #: during it: libraries' code that a call is the first to use is not its own memory.
     increase: int | None
 
 
@@ -32,10 +33,11 @@ def memory_of_call(call: Callable[[], T]) -> tuple[T, Memory]:
     gc.collect()
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
-    before = resident_bytes()
+    before, files = resident_bytes(), _told_by_linux("RssFile") or 0
     result = call()
     peak = peak_memory_bytes()
-    return result, Memory(peak, None if peak is None else max(0, peak - before))
+    came_in = max(0, (_told_by_linux("RssFile") or 0) - files)
+    return result, Memory(peak, None if peak is None else max(0, peak - before - came_in))
 
 
 def resident_bytes() -> int:
@@ -48,14 +50,22 @@ def resident_bytes() -> int:
 
 def peak_memory_bytes() -> int | None:
     """Return the peak resident memory of this process; None if the system does not report it."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        for line in status.read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return int(line.split()[1]) * 1024
+    peak = _told_by_linux("VmHWM")
+    if peak is not None:
+        return peak
     try:
         import resource
     except ImportError:  # Windows
         return None
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    peak = int(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     return peak if sys.platform == "darwin" else peak * 1024
+
+
+def _told_by_linux(field: str) -> int | None:
+    """Return a figure of this process in bytes, as Linux tells it; None elsewhere."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        for line in status.read_text().splitlines():
+            if line.startswith(f"{field}:"):
+                return int(line.split()[1]) * 1024
+    return None

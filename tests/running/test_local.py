@@ -1,5 +1,6 @@
 import dataclasses
 import re
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,15 @@ from cembench.registry import load_registry
 from cembench.results.records import FaultKind
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment, with_threads
-from cembench.running.local import Options, Watcher, in_random_order, map_once, run_tasks
+from cembench.running.fork_server import can_fork
+from cembench.running.local import (
+    Launcher,
+    Options,
+    Watcher,
+    in_random_order,
+    map_once,
+    run_tasks,
+)
 from cembench.running.plan import MeasurementSettings, plan_cells
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
@@ -158,6 +167,19 @@ def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(tmp_path):
     assert outcome.peak_memory_bytes > 2**24
     assert 0 <= outcome.memory_increase_bytes < outcome.peak_memory_bytes
     np.testing.assert_array_equal(store.uv(task.cell), task.algorithm.function(task.mesh).uv)
+
+
+@pytest.mark.skipif(not can_fork(1), reason="processes cannot be forked here")
+def test_the_memory_of_a_call_means_the_same_in_forked_and_started_processes(tmp_path):
+    (task,) = tasks_of("good", faces=20_000)
+    found = {}
+    for forks in (True, False):
+        with closing(Launcher(tmp_path / str(forks), Options(), forks=forks)) as launcher:
+            found[forks], _ = launcher.check(task)
+    assert found[True].uv_hash == found[False].uv_hash
+    increases = [found[forks].memory_increase_bytes for forks in (True, False)]
+    assert abs(increases[0] - increases[1]) < 4 * 2**20, increases
+    assert min(increases) > 8 * (3 * task.mesh.n + 2 * task.mesh.n), "the call's arrays at least"
 
 
 def test_what_is_in_the_store_is_not_measured_again(tmp_path):
