@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.free_boundary import far_apart, pinned_map, with_area_pi
 from cembench.conformal.laplacian import laplacian_of_weights
@@ -47,7 +47,7 @@ class Angles:
             keys = j[self._inside] * size + i[self._inside]
             unique, self._place = np.unique(keys, return_inverse=True)
             pointers = np.searchsorted(unique // size, np.arange(size + 1))
-            self._A = sparse.csc_array(
+            self._A = scipy.sparse.csc_array(
                 (np.zeros(len(unique)), unique % size, pointers), shape=(size, size)
             )
 

@@ -143,7 +143,7 @@ def list_(
     them, and where their thumbnails are. Only stand-ins that were measured are
     shown; --measure measures the others.
     """
-    from cembench.report.render.terminal import algorithms_table, facts_table, surfaces_table
+    from cembench.report.render.terminal_lists import algorithms_table, surfaces_table
 
     registry = registry_with(plugin)
     if measure and kind is not Kind.surfaces:
@@ -162,6 +162,8 @@ def list_(
     if kind in (None, Kind.surfaces):
         out.print(surfaces_table(list(registry.surfaces.values()), verbose=verbose))
     if facts:
+        from cembench.report.render.terminal import facts_table
+
         known = {name: found for name, found in facts.items() if found}
         if known:
             out.print()
