@@ -21,7 +21,7 @@ import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field, fields, replace
-from importlib.metadata import EntryPoint, EntryPoints, entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any, Literal, TypeVar, get_args
@@ -674,7 +674,7 @@ def _installed() -> Registry:
     return Registry(algorithms, families, surfaces, peers, parts)
 
 
-def _all_datasets(installed: EntryPoints) -> dict[str, Dataset]:
+def _all_datasets(installed: Any) -> dict[str, Dataset]:
     """Return the datasets of all entry points; each holds one dataset or a tuple of them."""
     known: dict[str, Dataset] = {}
     for entry in _by_name(installed, _GROUPS[Dataset]):
@@ -685,11 +685,12 @@ def _all_datasets(installed: EntryPoints) -> dict[str, Dataset]:
     return known
 
 
-def _by_name(installed: EntryPoints, group: str) -> list[EntryPoint]:
+def _by_name(installed: Any, group: str) -> list[EntryPoint]:
+    """Return the entry points of a group; the type of what is installed changed in Python 3.12."""
     return sorted(installed.select(group=group), key=lambda entry: entry.name)
 
 
-def _all_declared(installed: EntryPoints, kind: type[R], group: str) -> dict[str, R]:
+def _all_declared(installed: Any, kind: type[R], group: str) -> dict[str, R]:
     known: dict[str, R] = {}
     for entry in _by_name(installed, group):
         _add(known, _declared_at(entry, kind))
