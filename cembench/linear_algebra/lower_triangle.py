@@ -24,7 +24,7 @@ def permuted_lower(A: scipy.sparse.csr_array, order: NDArray[np.int64]) -> scipy
 
     Examples
     --------
-    >>> A = sparse.csr_array([[4.0, 1.0, 2.0], [1.0, 5.0, 0.0], [2.0, 0.0, 6.0]])
+    >>> A = scipy.sparse.csr_array([[4.0, 1.0, 2.0], [1.0, 5.0, 0.0], [2.0, 0.0, 6.0]])
     >>> permuted_lower(A, np.array([2, 0])).toarray()
     array([[6., 0.],
            [2., 4.]])
