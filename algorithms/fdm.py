@@ -6,9 +6,9 @@ from functools import partial
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import sparse
 
 from cembench.conformal.beltrami import (
     beltrami_coefficients,
@@ -113,7 +113,7 @@ def _mean_modulus(mu: Complex) -> float:
     return float(np.nan_to_num(np.abs(unfolded(mu)), nan=1.0).mean())
 
 
-def _start(mesh: DiskMesh, L: sparse.csc_array) -> Complex:
+def _start(mesh: DiskMesh, L: scipy.sparse.csc_array) -> Complex:
     """Return the harmonic map that keeps arc length; with uniform weights if that one fails."""
     circle = arc_length_circle(mesh) * np.exp(2j * np.pi / 100)
     try:
@@ -127,7 +127,7 @@ def _start(mesh: DiskMesh, L: sparse.csc_array) -> Complex:
 
 
 def _corrected_in_half_plane(
-    mesh: DiskMesh, z: Complex, L: sparse.csc_array | None, public_program: bool
+    mesh: DiskMesh, z: Complex, L: scipy.sparse.csc_array | None, public_program: bool
 ) -> Complex:
     """Make the map conformal except near z = 1, where it is kept ("north pole").
 
@@ -178,7 +178,7 @@ def _corrected_by_reflection(
     double: DoubledSurface,
     z: Complex,
     mu: Complex,
-    L: sparse.csc_array | None,
+    L: scipy.sparse.csc_array | None,
 ) -> Complex:
     """Solve on the map and its mirror image at once, then put the boundary on the circle."""
     b = mesh.boundary

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.beltrami import (
     beltrami_coefficients,
@@ -108,7 +108,7 @@ def _weights(z: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArra
 
 
 def _corrected_at_north(
-    double: DoubledSurface, V: NDArray[np.float64], z: Complex, L: sparse.csc_array | None
+    double: DoubledSurface, V: NDArray[np.float64], z: Complex, L: scipy.sparse.csc_array | None
 ) -> Complex:
     """Make the map conformal at the north pole too; return it as projected from the south pole.
 

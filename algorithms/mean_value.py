@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import linalg
 
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import interior_without_folds
@@ -48,7 +47,7 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
         W = _weights(mesh)
     with phase("assembly"):
         rows = W[i]
-        A = sparse.csc_array(sparse.diags_array(rows.sum(axis=1)) - rows[:, i])
+        A = scipy.sparse.csc_array(scipy.sparse.diags_array(rows.sum(axis=1)) - rows[:, i])
         z = np.zeros(mesh.n, dtype=np.complex128)
         z[b] = arc_length_circle(mesh)
         right = rows[:, b] @ z[b]
@@ -63,10 +62,10 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
     return Parameterization(z, extras=repair)
 
 
-def _factored(A: sparse.csc_array) -> linalg.SuperLU:
+def _factored(A: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU:
     """Factor the matrix of mean value weights."""
     try:
-        return linalg.splu(
+        return scipy.sparse.linalg.splu(
             A, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
         )
     except RuntimeError as error:  # the only error of SuperLU
@@ -76,7 +75,7 @@ def _factored(A: sparse.csc_array) -> linalg.SuperLU:
         ) from error
 
 
-def _weights(mesh: DiskMesh) -> sparse.csr_array:
+def _weights(mesh: DiskMesh) -> scipy.sparse.csr_array:
     """Return the mean value weights (n, n) from i to j."""
     F = mesh.F
     dots, double_area = corner_products(mesh.V, F)
@@ -90,4 +89,4 @@ def _weights(mesh: DiskMesh) -> sparse.csr_array:
     i = np.concatenate([F.ravel(), F.ravel()])
     j = np.concatenate([after.ravel(), before.ravel()])
     w = np.concatenate([(tangent / to_after).ravel(), (tangent / to_before).ravel()])
-    return sparse.csr_array(sparse.coo_array((w, (i, j)), shape=(mesh.n, mesh.n)))
+    return scipy.sparse.csr_array(scipy.sparse.coo_array((w, (i, j)), shape=(mesh.n, mesh.n)))

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import sparse
 
 from cembench.conformal.balancing import moebius_centred
 from cembench.conformal.doubling import doubled, doubled_laplacian
@@ -87,7 +87,7 @@ def qiem(
 
 
 def _flow(
-    L: sparse.csc_array, S: Real, tolerance: float, max_iterations: int
+    L: scipy.sparse.csc_array, S: Real, tolerance: float, max_iterations: int
 ) -> tuple[Real, list[float]]:
     """Run the heat flow to its limit; return the map S (n, 3) and the energy of every step."""
     step = _Step(L)
@@ -128,7 +128,7 @@ def _flow(
 class _Step:
     """One quasi-implicit Euler step; the matrix's pattern is analysed once."""
 
-    def __init__(self, L: sparse.csc_array) -> None:
+    def __init__(self, L: scipy.sparse.csc_array) -> None:
         self._L = L
         self._A = L.copy()
         columns = np.repeat(np.arange(L.shape[1]), np.diff(L.indptr))

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import linalg, sparse
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.curvature import mixed_vertex_areas
@@ -120,16 +120,16 @@ def _dense_form(S: Real, W: Real) -> tuple[Apply, Apply]:
     return lambda X: H @ X, solve
 
 
-def _sparse_form(L: sparse.csc_array, b: NDArray[np.int64], W: Real) -> tuple[Apply, Apply]:
+def _sparse_form(L: scipy.sparse.csc_array, b: NDArray[np.int64], W: Real) -> tuple[Apply, Apply]:
     """Return the same over all vertices in real numbers: (u, v) instead of u + i v."""
     n = L.shape[0]
     Q = conformal_energy_form(L, b)
     kept = np.delete(np.arange(2 * n), [b[-1], b[-1] + n])
     try:
-        factor = Cholesky(sparse.csc_array(sparse.csr_array(Q)[kept][:, kept]))
+        factor = Cholesky(scipy.sparse.csc_array(scipy.sparse.csr_array(Q)[kept][:, kept]))
     except NotPositiveDefinite:
         kept = np.arange(2 * n)
-        factor = Cholesky(Q + sparse.diags_array(_shift(Q, np.tile(W, 2))))
+        factor = Cholesky(Q + scipy.sparse.diags_array(_shift(Q, np.tile(W, 2))))
 
     def solve(Y: Complex) -> Complex:
         x = np.zeros((2 * n, Y.shape[1]))
@@ -166,7 +166,7 @@ def _least(
         X, _ = np.linalg.qr(X - share @ X)
         X -= share @ X
         HX = H(X)
-        values, turn = linalg.eigh(X.conj().T @ HX, X.conj().T @ (W[:, None] * X))
+        values, turn = scipy.linalg.eigh(X.conj().T @ HX, X.conj().T @ (W[:, None] * X))
         X, HX = X @ turn, HX @ turn
         away = (HX[:, 0] - values[0] * W * X[:, 0])[k]
         off = float(np.linalg.norm(away / np.sqrt(W[k])))

@@ -21,7 +21,7 @@ import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field, fields, replace
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FrameType, ModuleType
 from typing import Any, Literal, TypeVar, get_args
@@ -663,17 +663,21 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
 @functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
     """Return the registry of all entry points."""
-    found = _all_datasets()
+    installed = entry_points()  # once: it reads the files of every installed package
+    found = _all_datasets(installed)
     surfaces = {name: dataset for name, dataset in found.items() if dataset.part is None}
     parts = {name: dataset for name, dataset in found.items() if dataset.part is not None}
-    kinds = _all_declared(Algorithm), _all_declared(Surface), surfaces
-    return Registry(*kinds, _all_declared(Algorithm, PEERS), parts)
+    algorithms, peers = (
+        _all_declared(installed, Algorithm, group) for group in (_GROUPS[Algorithm], PEERS)
+    )
+    families = _all_declared(installed, Surface, _GROUPS[Surface])
+    return Registry(algorithms, families, surfaces, peers, parts)
 
 
-def _all_datasets() -> dict[str, Dataset]:
+def _all_datasets(installed: Any) -> dict[str, Dataset]:
     """Return the datasets of all entry points; each holds one dataset or a tuple of them."""
     known: dict[str, Dataset] = {}
-    for entry in sorted(entry_points(group=_GROUPS[Dataset]), key=lambda entry: entry.name):
+    for entry in _by_name(installed, _GROUPS[Dataset]):
         loaded = _load_entry(entry)
         several = isinstance(loaded, tuple) and all(isinstance(one, Dataset) for one in loaded)
         for dataset in loaded if several else (_declared_at(entry, Dataset),):
@@ -681,10 +685,14 @@ def _all_datasets() -> dict[str, Dataset]:
     return known
 
 
-def _all_declared(kind: type[R], group: str = "") -> dict[str, R]:
+def _by_name(installed: Any, group: str) -> list[EntryPoint]:
+    """Return the entry points of a group; the type of what is installed changed in Python 3.12."""
+    return sorted(installed.select(group=group), key=lambda entry: entry.name)
+
+
+def _all_declared(installed: Any, kind: type[R], group: str) -> dict[str, R]:
     known: dict[str, R] = {}
-    found = entry_points(group=group or _GROUPS[kind])
-    for entry in sorted(found, key=lambda entry: entry.name):
+    for entry in _by_name(installed, group):
         _add(known, _declared_at(entry, kind))
     return known
 

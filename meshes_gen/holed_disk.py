@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.spatial import Delaunay
 
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import surface_family
@@ -51,7 +51,7 @@ def disk_with_holes(centres: Complex, radii: Real, faces: int) -> tuple[Real, ND
     centres, radii = np.asarray(centres, dtype=complex), np.asarray(radii, dtype=float)
     h = np.sqrt(np.pi * (1 - (radii**2).sum()) * 4 / np.sqrt(3) / faces)
     z, rim = _points(centres, radii, h)
-    F = Delaunay(np.stack([z.real, z.imag], axis=1)).simplices.astype(np.int64)
+    F = scipy.spatial.Delaunay(np.stack([z.real, z.imag], axis=1)).simplices.astype(np.int64)
     # Triangles with all corners on one hole lie inside it.
     F = F[(rim[F] != rim[F[:, :1]]).any(axis=1) | (rim[F[:, 0]] <= 0)]
     areas = np.imag(np.conj(z[F[:, 1]] - z[F[:, 0]]) * (z[F[:, 2]] - z[F[:, 0]]))

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.spatial import KDTree
 
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
@@ -252,6 +252,6 @@ def _decimated(V: Real, F: Ints, faces: int) -> tuple[Ints, Ints]:
     )
     made = meshes.current_mesh()
     made.compact()
-    apart, kept = KDTree(V).query(made.vertex_matrix())
+    apart, kept = scipy.spatial.KDTree(V).query(made.vertex_matrix())
     assert apart.max() == 0, "a vertex of the decimated face is not a vertex of the model"
     return kept.astype(np.int64), made.face_matrix().astype(np.int64)

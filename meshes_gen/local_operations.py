@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 Real = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -158,7 +158,7 @@ def collapse(
     # Link condition: the ends share exactly the corners opposite to their edge.
     i, j = edges.ends.T
     ones = np.ones(len(i), dtype=np.int32)
-    A = sparse.csr_array((np.r_[ones, ones], (np.r_[i, j], np.r_[j, i])), shape=(n, n))
+    A = scipy.sparse.csr_array((np.r_[ones, ones], (np.r_[i, j], np.r_[j, i])), shape=(n, n))
     shared = np.asarray(A[ends[:, 0]].multiply(A[ends[:, 1]]).sum(axis=1)).ravel()
     good = shared == np.where(rim, 1, 2)
     ends, rim, length = ends[good], rim[good], length[good]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
-from scipy.special import ellipj, ellipkm1
 
 Complex = NDArray[np.complex128]
 
@@ -46,15 +45,17 @@ def rectangle_to_disk(z: Complex, aspect: float) -> Complex:
 
     def off(t: float) -> float:  # t is the logit of the complementary parameter
         m1 = 1 / (1 + np.exp(t))
-        return float(2 * ellipkm1(m1) / ellipkm1(1 / (1 + np.exp(-t))) - aspect)
+        return float(
+            2 * scipy.special.ellipkm1(m1) / scipy.special.ellipkm1(1 / (1 + np.exp(-t))) - aspect
+        )
 
-    t = brentq(off, -30, 30, xtol=1e-14, rtol=1e-14)
+    t = scipy.optimize.brentq(off, -30, 30, xtol=1e-14, rtol=1e-14)
     m, m1 = 1 / (1 + np.exp(-t)), 1 / (1 + np.exp(t))
-    K, K1 = ellipkm1(m1), ellipkm1(m)
+    K, K1 = scipy.special.ellipkm1(m1), scipy.special.ellipkm1(m)
 
     def sn(w: Complex) -> Complex:
-        s, c, d, _ = ellipj(w.real, m)
-        s1, c1, d1, _ = ellipj(w.imag, m1)
+        s, c, d, _ = scipy.special.ellipj(w.real, m)
+        s1, c1, d1, _ = scipy.special.ellipj(w.imag, m1)
         return (s * d1 + 1j * c * d * s1 * c1) / (c1**2 + m * (s * s1) ** 2)
 
     w = (z / aspect - 0.5).real * 2 * K + 1j * z.imag * K1

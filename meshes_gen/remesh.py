@@ -15,8 +15,7 @@ from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
-from scipy import ndimage
-from scipy.spatial import cKDTree
+import scipy
 
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra, missing, require
@@ -133,7 +132,7 @@ def march(body: Body) -> tuple[Real, Faces, Body, float]:
 def _remove_strays(values: Real, spacing: float) -> None:
     """Fill bubbles and drop islands in place, since they are not part of the surface."""
     for inside in (True, False):
-        labels, count = ndimage.label(values < 0 if inside else values >= 0)
+        labels, count = scipy.ndimage.label(values < 0 if inside else values >= 0)
         if count > 1:
             sizes = np.bincount(labels.ravel())
             sizes[0] = 0
@@ -262,7 +261,7 @@ class Sizes:
 
     def __init__(self, V: Real, F: Faces, inside: float, rim: float) -> None:
         self.inside, self.rim = inside, rim
-        self._tree = cKDTree(V[boundary_mask(F, len(V))])
+        self._tree = scipy.spatial.cKDTree(V[boundary_mask(F, len(V))])
         # The length changes by at most a quarter of the distance.
         self._reach = 4 * max(abs(rim - inside), 0.25 * min(rim, inside))
 

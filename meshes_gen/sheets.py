@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.interpolate import PchipInterpolator
 
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
@@ -60,7 +60,9 @@ def swiss_roll(
     length = 0.5 * (t * np.sqrt(1 + t * t) + np.arcsinh(t))
     length -= length[0]
     scale = aspect / length[-1]
-    at = PchipInterpolator(scale * length, t)(np.clip(z.real, 0, scale * length[-1]))
+    at = scipy.interpolate.PchipInterpolator(scale * length, t)(
+        np.clip(z.real, 0, scale * length[-1])
+    )
     V = np.stack([scale * at * np.cos(at), scale * at * np.sin(at), z.imag], axis=1)
     return DiskMesh.from_arrays(V, F, name="swiss-roll")
 

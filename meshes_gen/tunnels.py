@@ -9,9 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from .implicit import Field, Real, join
 from .local_operations import Faces, edges_of
@@ -59,8 +58,8 @@ def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
     edges = edges_of(F, n)
     i, j = edges.ends.T
     length = np.linalg.norm(V[i] - V[j], axis=1) + 1e-12
-    graph = sparse.coo_array((length, (i, j)), shape=(n, n)).tocsr()
-    distance, before = csgraph.dijkstra(
+    graph = scipy.sparse.coo_array((length, (i, j)), shape=(n, n)).tocsr()
+    distance, before = scipy.sparse.csgraph.dijkstra(
         graph, directed=False, indices=root, return_predecessors=True
     )
     in_tree = (before[i] == j) | (before[j] == i)
@@ -69,10 +68,10 @@ def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
     weight = -(distance[i] + distance[j] + length)
     weight = weight - weight.min() + 1
     outside = np.where(edges.face[:, 1] < 0, m, edges.face[:, 1])
-    dual = sparse.coo_array(
+    dual = scipy.sparse.coo_array(
         (weight[free], (edges.face[free, 0], outside[free])), shape=(m + 1, m + 1)
     )
-    tree = csgraph.minimum_spanning_tree(dual.tocsr()).tocoo()
+    tree = scipy.sparse.csgraph.minimum_spanning_tree(dual.tocsr()).tocoo()
     taken = np.minimum(tree.row, tree.col) * np.int64(m + 1) + np.maximum(tree.row, tree.col)
     a, b = edges.face[free, 0], outside[free]
     left = free[~np.isin(np.minimum(a, b) * (m + 1) + np.maximum(a, b), taken)]

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from .implicit import Body, Noise, Real, box, carve, halfspace, join, meet, ring
 
 
 def revolve(p: Real, profile: NDArray[np.float64]) -> Real:
     """Return about the distance to a surface of revolution; rows of `profile` are (z, radius)."""
-    radius = PchipInterpolator(profile[:, 0], profile[:, 1])
+    radius = scipy.interpolate.PchipInterpolator(profile[:, 0], profile[:, 1])
     z = np.clip(p[:, 2], profile[0, 0], profile[-1, 0])
     slope = np.clip(radius.derivative()(z), -3, 3)
     return (np.hypot(p[:, 0], p[:, 1]) - radius(z)) / np.sqrt(1 + slope**2)

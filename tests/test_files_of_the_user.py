@@ -22,6 +22,8 @@ from cembench.results.records import Cell, MeshFacts, Outcome, Record
 from cembench.results.store import Store
 from tests.limits import files_of_at_most, tree
 
+pytestmark = pytest.mark.usefixtures("one_server")
+
 DECOYS = {
     "thesis.txt": b"years of work",
     "scratch/thesis.txt": b"and its copy",

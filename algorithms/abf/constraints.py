@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.free_boundary import far_apart, pinned_map, with_area_pi
 from cembench.conformal.laplacian import laplacian_of_weights
@@ -144,7 +144,7 @@ class Angles:
 
 def _pattern(
     corners: NDArray[np.intp], k: int
-) -> tuple[sparse.csc_array, NDArray[np.intp], NDArray[np.bool_]]:
+) -> tuple[scipy.sparse.csc_array, NDArray[np.intp], NDArray[np.bool_]]:
     """Return the system's matrix (2 k, 2 k) of zeros, and where the triangles' blocks lie in it.
 
     `corners` (m, 3) are numbers of interior vertices, -1 at the boundary. The matrix has four
@@ -165,7 +165,7 @@ def _pattern(
         rows[among_sums + wheel] = row
         rows[among_sums + wheel + degree[column]] = row + k
     pointers = np.concatenate([2 * start[:-1], 2 * (block + start)])
-    A = sparse.csc_array((np.zeros(4 * block), rows, pointers), shape=(2 * k, 2 * k))
+    A = scipy.sparse.csc_array((np.zeros(4 * block), rows, pointers), shape=(2 * k, 2 * k))
     found = np.zeros(inside.shape, dtype=np.intp)
     found[inside] = inverse
     place = np.tile(among_sums[found].reshape(-1, 3, 3), (1, 2, 2))

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import iterate_boundary, on_circle, pole
@@ -280,7 +280,7 @@ def _around(z: Complex, centre: complex) -> Complex:
     return in_order(circle) if backward_arcs(circle) else circle
 
 
-def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> sparse.csc_array:
+def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> scipy.sparse.csc_array:
     """Return the cotangent Laplacian of an image."""
     with np.errstate(divide="ignore", invalid="ignore"):
         L = cotangent_laplacian(points, F)

@@ -9,9 +9,9 @@ from enum import StrEnum
 from typing import Annotated, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy import sparse
 
 from cembench.conformal.free_boundary import far_apart
 from cembench.conformal.harmonic import arc_length_circle
@@ -116,12 +116,12 @@ def _by_tutte(mesh: DiskMesh, circle: NDArray[np.float64]) -> NDArray[np.float64
     """Return the map (n, 2) in which each interior vertex is the mean of its neighbours."""
     import igl
 
-    A = sparse.csr_array(igl.adjacency_matrix(mesh.F.copy()), dtype=np.float64)
+    A = scipy.sparse.csr_array(igl.adjacency_matrix(mesh.F.copy()), dtype=np.float64)
     i, b = mesh.interior, mesh.boundary
-    L = sparse.diags_array(np.asarray(A.sum(axis=1)).ravel()).tocsr() - A
+    L = scipy.sparse.diags_array(np.asarray(A.sum(axis=1)).ravel()).tocsr() - A
     uv = np.empty((mesh.n, 2))
     uv[b] = circle
-    uv[i] = Cholesky(sparse.csc_array(L[i][:, i])).solve(-(L[i][:, b] @ circle))
+    uv[i] = Cholesky(scipy.sparse.csc_array(L[i][:, i])).solve(-(L[i][:, b] @ circle))
     return uv
 
 

@@ -43,6 +43,7 @@ from cembench.commands.console import (
 from cembench.commands.ending import Verbs, ending, resumable
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
+    USUAL_MOST_ROUNDS,
     Backend,
     BackendOption,
     Budget,
@@ -69,7 +70,6 @@ from cembench.commands.options import (
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
-from cembench.results.looks import USUAL_MOST_ROUNDS
 from cembench.results.paper.profiles import Profile
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def list_(
     them, and where their thumbnails are. Only stand-ins that were measured are
     shown; --measure measures the others.
     """
-    from cembench.report.render.terminal import algorithms_table, facts_table, surfaces_table
+    from cembench.report.render.terminal_lists import algorithms_table, surfaces_table
 
     registry = registry_with(plugin)
     if measure and kind is not Kind.surfaces:
@@ -162,6 +162,8 @@ def list_(
     if kind in (None, Kind.surfaces):
         out.print(surfaces_table(list(registry.surfaces.values()), verbose=verbose))
     if facts:
+        from cembench.report.render.terminal import facts_table
+
         known = {name: found for name, found in facts.items() if found}
         if known:
             out.print()

@@ -14,13 +14,16 @@ from typing import Annotated
 import typer
 
 from cembench.core.errors import ParameterError
-from cembench.results.looks import LOOKS, USUAL_PRECISION
 from cembench.results.paper.profiles import Profile
 
 #: A process needs more than a hundred MiB to load the libraries.
 LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
 LONGEST = 10_000_000.0
 MOST_FACES = 1_000_000_000
+#: Those of :mod:`cembench.results.looks`, which loads too much to be imported for a help text. A
+#: test holds that they are the same.
+SECOND_LOOK, LAST_LOOK = 10, 80
+USUAL_MOST_ROUNDS = 56
 
 
 def finite(value: float) -> float:
@@ -92,8 +95,8 @@ MostRounds = Annotated[
     int,
     typer.Option(
         "--max-rounds",
-        min=LOOKS[1],
-        max=LOOKS[-1],
+        min=SECOND_LOOK,
+        max=LAST_LOOK,
         help="Maximum number of rounds with --precision.",
     ),
 ]
@@ -214,6 +217,8 @@ def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, 
         Both are given, or the precision is not allowed.
 
     """
+    from cembench.results.looks import USUAL_PRECISION
+
     if rounds is not None and precision is not None:
         raise ParameterError(
             "--rounds fixes the number of rounds, and --precision chooses it: give only one of "

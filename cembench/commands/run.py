@@ -13,7 +13,7 @@ from cembench.commands.console import Json, complain, note, out, print_json, pri
 from cembench.commands.options import Verify
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.outputs import refuse_inputs
-from cembench.report.export import Format
+from cembench.report.export_format import Format
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -18,9 +18,9 @@ from cembench.commands.console import Json, assignments, err, out, print_json, s
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import MOST_FACES, Parameters, Repeats, Timeout
 from cembench.core.errors import ParameterError
+from cembench.results.intervals import DEFAULT_ROUNDS
 from cembench.results.paper.profiles import Profile
-from cembench.results.records import DEFAULT_ROUNDS
-from cembench.validation.verdict import Requirement
+from cembench.validation.requirement import Requirement
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh

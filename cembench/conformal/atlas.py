@@ -12,9 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from cembench.conformal.metrics import METRICS, MapFigures, Metric, computed
 from cembench.conformal.planar import folded_triangles, signed_areas
@@ -93,8 +92,8 @@ def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
     one, other = order[twins], order[twins + 1]
     together = (in_plane[one] == in_plane[other]).all(axis=1)
     pairs = triangle[one[together]], triangle[other[together]]
-    graph = sparse.coo_array((np.ones(len(pairs[0])), pairs), shape=(m, m))
-    _, island = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array((np.ones(len(pairs[0])), pairs), shape=(m, m))
+    _, island = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return island.astype(np.int64), edges[twins[~together]]
 
 

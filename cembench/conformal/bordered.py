@@ -8,8 +8,8 @@ from itertools import accumulate, pairwise
 from typing import Any, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
@@ -70,7 +70,7 @@ class BorderedLaplacian:
     def __init__(
         self,
         mesh: TriangleMesh,
-        L: sparse.sparray,
+        L: scipy.sparse.sparray,
         loops: Sequence[NDArray[np.int64]],
         *,
         iterations: int = 0,
@@ -94,7 +94,7 @@ class BorderedLaplacian:
         leading = len(self.interior) - (len(self.beside) if self._ringed else 0)
         self._whole = Cholesky(pinned, leading=leading, lower=True)
 
-    def _ring(self, L: sparse.sparray, iterations: int) -> NDArray[np.int64]:
+    def _ring(self, L: scipy.sparse.sparray, iterations: int) -> NDArray[np.int64]:
         """The interior vertices that get values: the boundary's neighbours if that pays, or all."""
         if not iterations or not shows_trailing_block():
             return self.interior
@@ -107,21 +107,21 @@ class BorderedLaplacian:
         return ring if short and ring_pays(*sizes, iterations) else self.interior
 
     @cached_property
-    def L_bi(self) -> sparse.csr_array:
+    def L_bi(self) -> scipy.sparse.csr_array:
         """The boundary's rows of L, the columns of `beside`: all others are zero."""
         with phase("assembly"):
             return self._boundary_rows[:, self.beside].sorted_indices()
 
     @cached_property
-    def _L_ib(self) -> sparse.csr_array:
+    def _L_ib(self) -> scipy.sparse.csr_array:
         with phase("assembly"):
-            return sparse.csr_array(self.L_bi.T)
+            return scipy.sparse.csr_array(self.L_bi.T)
 
     @cached_property
-    def L_bb(self) -> sparse.csc_array:
+    def L_bb(self) -> scipy.sparse.csc_array:
         """The boundary's rows and columns of L."""
         with phase("assembly"):
-            return sparse.csc_array(self._boundary_rows[:, self.boundary])
+            return scipy.sparse.csc_array(self._boundary_rows[:, self.boundary])
 
     def in_order(self, f_i: NDArray[T], f_b: NDArray[T]) -> NDArray[T]:
         """Return values on the interior and the boundary as one array (n,) in mesh order."""

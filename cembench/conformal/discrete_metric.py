@@ -7,8 +7,8 @@ vertex by u multiplies each of its edges by exp(u / 2).
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.mesh.gluing import edges_of_half_edges
 
@@ -98,7 +98,9 @@ class BlockPattern:
         diagonal = np.arange(size)
         rows, columns = np.concatenate([i, j, diagonal]), np.concatenate([j, i, diagonal])
         entry = np.arange(1, len(rows) + 1)
-        self._A = sparse.csc_array(sparse.coo_array((entry, (rows, columns)), shape=(size, size)))
+        self._A = scipy.sparse.csc_array(
+            scipy.sparse.coo_array((entry, (rows, columns)), shape=(size, size))
+        )
         self._A.sort_indices()
         self._entry = self._A.data - 1
         self._A = self._A.astype(np.float64)
@@ -110,14 +112,14 @@ class BlockPattern:
             self._edge, weights=np.roll(weights, 1, axis=1).ravel(), minlength=len(self._ends)
         ).astype(np.float64)
 
-    def block(self, weights: Real) -> sparse.csc_array:
+    def block(self, weights: Real) -> scipy.sparse.csc_array:
         """Return the rows and columns of the kept vertices of the Laplacian with weights (m, 3)."""
         w = self.weights_of_edges(weights)
         return self._filled(-w[self._inside], self._degrees(w))
 
     def dirichlet(
         self, weights: Real, fixed: NDArray[np.bool_], f: NDArray[np.complex128]
-    ) -> tuple[sparse.csc_array, NDArray[np.complex128]]:
+    ) -> tuple[scipy.sparse.csc_array, NDArray[np.complex128]]:
         """Return A and b of A x = b for the harmonic map that is f (n,) at fixed vertices (n,).
 
         All vertices that are not kept are fixed. Kept vertices that are fixed have the equation x =
@@ -141,7 +143,7 @@ class BlockPattern:
     def _degrees(self, w: Real) -> Real:
         return np.bincount(self._ends.ravel(), np.repeat(w, 2), self._n).astype(np.float64)
 
-    def _filled(self, inside: Real, diagonal: Real) -> sparse.csc_array:
+    def _filled(self, inside: Real, diagonal: Real) -> scipy.sparse.csc_array:
         values = np.concatenate([inside, inside, diagonal[self.kept]])
         self._A.data[:] = values[self._entry]
         return self._A.copy()

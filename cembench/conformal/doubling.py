@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.mesh.triangle_mesh import DiskMesh
 
@@ -53,10 +53,10 @@ def doubled(mesh: DiskMesh) -> DoubledSurface:
     )
 
 
-def doubled_laplacian(L: sparse.csc_array, double: DoubledSurface) -> sparse.csc_array:
+def doubled_laplacian(L: scipy.sparse.csc_array, double: DoubledSurface) -> scipy.sparse.csc_array:
     """Return the Laplacian of the doubled surface: the sum of L (n, n) over both copies."""
-    one = sparse.coo_array(L)
+    one = scipy.sparse.coo_array(L)
     i = np.concatenate([one.row, double.mirror[one.row]])
     j = np.concatenate([one.col, double.mirror[one.col]])
-    both = sparse.coo_array((np.tile(one.data, 2), (i, j)), shape=(double.size, double.size))
-    return sparse.csc_array(both)
+    both = scipy.sparse.coo_array((np.tile(one.data, 2), (i, j)), shape=(double.size, double.size))
+    return scipy.sparse.csc_array(both)

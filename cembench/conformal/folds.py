@@ -9,8 +9,8 @@ folds at the expense of its angles is useless.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.planar import backward_arcs, folded_triangles
@@ -37,7 +37,7 @@ MOST_BACKWARD = 0.1
 RINGS = (1, 2, 4, 8, 16)
 
 
-def without_folds(mesh: DiskMesh, L: sparse.csc_array, z: Complex) -> tuple[Complex, int]:
+def without_folds(mesh: DiskMesh, L: scipy.sparse.csc_array, z: Complex) -> tuple[Complex, int]:
     """Repair the folds of a map to the disk that is nearly harmonic for L.
 
     Boundary vertices that changed places on the circle get the nearest angles in order, and the

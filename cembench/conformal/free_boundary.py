@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import interior_without_folds
@@ -19,12 +19,16 @@ from cembench.mesh.triangle_mesh import DiskMesh
 Complex = NDArray[np.complex128]
 
 
-def conformal_energy_form(L: sparse.csc_array, b: NDArray[np.int64]) -> sparse.csc_array:
+def conformal_energy_form(
+    L: scipy.sparse.csc_array, b: NDArray[np.int64]
+) -> scipy.sparse.csc_array:
     """Return Q with E_C = x^T Q x / 2, x = (u, v): diag(L, L) minus the area's Hessian (Eq. 8)."""
     after = np.roll(b, -1)
     half = np.full(len(b), 0.5)
-    D = sparse.coo_array((np.r_[half, -half], (np.r_[b, after], np.r_[after, b])), shape=L.shape)
-    return sparse.block_array([[L, -D], [D, L]], format="csc")
+    D = scipy.sparse.coo_array(
+        (np.r_[half, -half], (np.r_[b, after], np.r_[after, b])), shape=L.shape
+    )
+    return scipy.sparse.block_array([[L, -D], [D, L]], format="csc")
 
 
 def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
@@ -35,14 +39,14 @@ def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
     return mesh.boundary[[first, second]]
 
 
-def pinned_map(L: sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np.int64]) -> Complex:
+def pinned_map(L: scipy.sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np.int64]) -> Complex:
     """Return the map (n,) of least E_C with two vertices `pins` (2,) at -1 and 1.
 
     L (n, n) is the Laplacian, b the boundary loop.
     """
     n = L.shape[0]
     with phase("assembly"):
-        Q = sparse.csr_array(conformal_energy_form(L, b))
+        Q = scipy.sparse.csr_array(conformal_energy_form(L, b))
         fixed = np.concatenate([pins, pins + n])
         free = np.delete(np.arange(2 * n), fixed)
         x = np.zeros(2 * n)

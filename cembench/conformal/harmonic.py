@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.laplacian import by_rows
 from cembench.core.clock import phase
@@ -47,7 +47,7 @@ def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
 
 
 def harmonic_extension(
-    L: sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[Any]
+    L: scipy.sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[Any]
 ) -> NDArray[Any]:
     """Return the map that is harmonic for L and has these values at the fixed vertices (Eq. 10).
 

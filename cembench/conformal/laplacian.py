@@ -7,8 +7,8 @@ cotangents opposite to edge ij. It is positive exactly if an interior edge is no
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
 from cembench.core.clock import phase
@@ -62,25 +62,27 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
 
 def laplacian_of_weights(
     F: NDArray[np.int64], weights: NDArray[np.float64], n: int
-) -> sparse.csc_array:
+) -> scipy.sparse.csc_array:
     """Return the Laplacian of `weights` (m, 3), for the edges opposite to the corners.
 
     The weights of the two triangles of an edge are added.
     """
     F = F.astype(np.int32 if n < 2**31 else np.int64)  # as SciPy will have them
     i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
-    one_way = sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
+    one_way = scipy.sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
     # Symmetric to the last bit, so its rows are its columns.
-    return sparse.csc_array(sparse.csr_array(sparse.diags_array(W.sum(axis=1)) - W).T)
+    return scipy.sparse.csc_array(
+        scipy.sparse.csr_array(scipy.sparse.diags_array(W.sum(axis=1)) - W).T
+    )
 
 
-def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> sparse.csc_array:
+def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> scipy.sparse.csc_array:
     """Return the positive semi-definite cotangent Laplacian (n, n) of Eq. (6); V (n, 2 or 3)."""
     return laplacian_of_weights(F, half_cotangents(V, F), len(V))
 
 
-def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array:
+def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc_array:
     """Return the cotangent Laplacian of a mesh, in the phase "laplacian".
 
     All algorithms share this function.
@@ -122,9 +124,9 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> sparse.csc_array
         return laplacian_of_weights(F, weights, mesh.n)
 
 
-def by_rows(L: sparse.csc_array) -> sparse.csr_array:
+def by_rows(L: scipy.sparse.csc_array) -> scipy.sparse.csr_array:
     """Return a Laplacian stored by rows; by symmetry these are its columns."""
-    return sparse.csr_array(L.T)
+    return scipy.sparse.csr_array(L.T)
 
 
 def non_delaunay_share(mesh: TriangleMesh) -> float:

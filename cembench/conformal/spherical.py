@@ -7,8 +7,8 @@ image in the plane surrounds all others; the plane is the sphere without its nor
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.conformal.harmonic import harmonic_extension
 
@@ -16,7 +16,7 @@ Complex = NDArray[np.complex128]
 
 
 def balanced_planar_map(
-    L: sparse.csc_array, V: NDArray[np.float64], F: NDArray[np.int64]
+    L: scipy.sparse.csc_array, V: NDArray[np.float64], F: NDArray[np.int64]
 ) -> Complex:
     """Return the planar map (n,) from which a spherical map starts.
 
@@ -35,7 +35,7 @@ def most_regular_triangle(V: NDArray[np.float64], F: NDArray[np.int64]) -> int:
 
 
 def harmonic_around_triangle(
-    L: sparse.csc_array, V: NDArray[np.float64], triangle: NDArray[np.int64]
+    L: scipy.sparse.csc_array, V: NDArray[np.float64], triangle: NDArray[np.int64]
 ) -> Complex:
     """Return the planar map (n,) that is harmonic for L and keeps the shape of one triangle (3,).
 

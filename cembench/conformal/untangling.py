@@ -17,9 +17,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from cembench.conformal.laplacian import corner_products
 from cembench.core.errors import NotPositiveDefinite
@@ -47,7 +46,7 @@ REGULAR = 1e-10
 
 
 def untangled(
-    mesh: TriangleMesh, z: Complex, free: NDArray[np.bool_], graph: sparse.csr_array
+    mesh: TriangleMesh, z: Complex, free: NDArray[np.bool_], graph: scipy.sparse.csr_array
 ) -> tuple[Complex, Indices]:
     """Lay out the free vertices of a planar map without folds, if possible.
 
@@ -101,11 +100,11 @@ class _Patches:
         mesh: TriangleMesh,
         z: Complex,
         free: NDArray[np.bool_],
-        graph: sparse.csr_array,
+        graph: scipy.sparse.csr_array,
     ) -> None:
         self.vertices = np.flatnonzero(free)
         among = graph[self.vertices][:, self.vertices]
-        count, label = csgraph.connected_components(among, directed=False)
+        count, label = scipy.sparse.csgraph.connected_components(among, directed=False)
         self.count, self._label = int(count), label
         patch = np.full(mesh.n, -1)
         patch[self.vertices] = label
@@ -175,11 +174,13 @@ class _Patches:
         i = np.broadcast_to(row[:, :, None], H.shape)
         j = np.broadcast_to(row[:, None, :], H.shape)
         inside = (i >= 0) & (j >= 0)
-        A = sparse.coo_array((H[inside], (i[inside], j[inside])), shape=(2 * k, 2 * k)).tocsc()
+        A = scipy.sparse.coo_array(
+            (H[inside], (i[inside], j[inside])), shape=(2 * k, 2 * k)
+        ).tocsc()
         gradient = np.bincount(row[row >= 0], g[row >= 0], 2 * k).astype(np.float64)
-        scale = sparse.diags_array(1 / np.sqrt(A.diagonal()))
-        A = scale @ A @ scale + REGULAR * sparse.eye_array(2 * k)
-        step = -(scale @ Cholesky(sparse.csc_array(A)).solve(scale @ gradient))
+        scale = scipy.sparse.diags_array(1 / np.sqrt(A.diagonal()))
+        A = scale @ A @ scale + REGULAR * scipy.sparse.eye_array(2 * k)
+        step = -(scale @ Cholesky(scipy.sparse.csc_array(A)).solve(scale @ gradient))
         return step[:k] + 1j * step[k:], gradient[:k] + 1j * gradient[k:]
 
     def line_search(

@@ -14,8 +14,8 @@ from functools import cached_property, partial
 from typing import Any, Literal, Protocol, get_args
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite, ParameterError
@@ -120,13 +120,13 @@ def shows_trailing_block() -> bool:
 
 
 Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-SolverOf = Callable[[sparse.csc_array], Solver]
+SolverOf = Callable[["scipy.sparse.csc_array"], Solver]
 
 
 class _Factor(Protocol):
     """The interface of the factors of all back ends."""
 
-    def update(self, A: sparse.csc_array) -> None: ...
+    def update(self, A: scipy.sparse.csc_array) -> None: ...
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
     def schur_factor(self) -> NDArray[np.float64] | None: ...
@@ -165,9 +165,9 @@ class Cholesky:
     """
 
     def __init__(
-        self, A: sparse.sparray, *, leading: int | None = None, lower: bool = False
+        self, A: scipy.sparse.sparray, *, leading: int | None = None, lower: bool = False
     ) -> None:
-        self._given, self._lower = sparse.csc_array(A), lower
+        self._given, self._lower = scipy.sparse.csc_array(A), lower
         self._leading = leading
         self._how = _current.get()
         self._kept: _Factor | None = None
@@ -175,21 +175,21 @@ class Cholesky:
             self._kept = _factor(self._how.backend, self._read, leading)
 
     @property
-    def _read(self) -> sparse.csc_array:
+    def _read(self) -> scipy.sparse.csc_array:
         """What the library is given: CHOLMOD reads no more than the lower triangle."""
         return self._given if self._how.backend == "cvxopt" else self._A
 
     @cached_property
-    def _A(self) -> sparse.csc_array:
+    def _A(self) -> scipy.sparse.csc_array:
         """Both triangles."""
         return both_triangles(self._given) if self._lower else self._given
 
-    def update(self, A: sparse.sparray) -> None:
+    def update(self, A: scipy.sparse.sparray) -> None:
         """Turn to another matrix with the same pattern; under "reuse" its analysis is kept.
 
         Both triangles are stored, or one, as at construction.
         """
-        self._given = sparse.csc_array(A)
+        self._given = scipy.sparse.csc_array(A)
         vars(self).pop("_A", None)
         if self._kept is not None:
             self._kept.update(self._read)
@@ -257,7 +257,7 @@ class Cholesky:
             if found is not None:
                 _count(b, 0.5)
                 return found
-        return b[k:] - sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
+        return b[k:] - scipy.sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
 
     def extended(self, x: NDArray[Any]) -> NDArray[Any]:
         """Return the y with B y + E^T x = 0 for given trailing values x, real or complex.
@@ -269,12 +269,12 @@ class Cholesky:
             _count(x, 0.5)
             with phase("solves"):
                 return by_real_columns(self._kept.extended, x)
-        return -self.solve_leading(sparse.csr_array(self._A[:k, k:]) @ x)
+        return -self.solve_leading(scipy.sparse.csr_array(self._A[:k, k:]) @ x)
 
     def schur_times(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return S x for the Schur complement S of :meth:`schur_factor`, by one solve; x (m, k)."""
         k = self._leading
-        E, D = sparse.csr_array(self._A[k:, :k]), self._A[k:, k:]
+        E, D = scipy.sparse.csr_array(self._A[k:, :k]), self._A[k:, k:]
         return D @ x - E @ self.solve_leading(E.T @ x)
 
     def schur_solved(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -287,7 +287,7 @@ class Cholesky:
         k = self._leading
         solve = self._kept.solve_leading if self._kept else self._leading_factor().solve
         with phase("schur complement"):
-            E = sparse.csr_array(self._A[k:, :k])
+            E = scipy.sparse.csr_array(self._A[k:, :k])
             S = self._A[k:, k:].toarray()
             for first in range(0, E.shape[0], _COLUMNS_AT_ONCE):
                 chosen = slice(first, first + _COLUMNS_AT_ONCE)
@@ -302,7 +302,7 @@ class Cholesky:
                 ) from None
 
     def _leading_factor(self) -> _Factor:
-        block = sparse.csc_array(self._A[: self._leading, : self._leading])
+        block = scipy.sparse.csc_array(self._A[: self._leading, : self._leading])
         return _factor(self._how.backend, block, None)
 
 
@@ -312,7 +312,7 @@ def _count(b: NDArray[Any], share: float = 1.0) -> None:
     count_columns(share * columns * (2 if np.iscomplexobj(b) else 1))
 
 
-def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Factor:
+def _factor(backend: Backend, A: scipy.sparse.csc_array, leading: int | None) -> _Factor:
     """Factor a matrix with a back end."""
     if backend == "cvxopt" and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
         from cembench.linear_algebra.cholmod import cholmod_solver
@@ -321,7 +321,7 @@ def _factor(backend: Backend, A: sparse.csc_array, leading: int | None) -> _Fact
     return _factor_class(backend)(A, leading)
 
 
-def _factor_class(backend: Backend) -> Callable[[sparse.csc_array, int | None], _Factor]:
+def _factor_class(backend: Backend) -> Callable[[scipy.sparse.csc_array, int | None], _Factor]:
     """Return the constructor of a back end's factors."""
     # Imported on demand: an extra may be missing, and start-up should not load a solver.
     if backend == "cvxopt":
@@ -343,11 +343,11 @@ class _SeparateFactors:
     The leading block is factored when first used; nothing is kept after an update.
     """
 
-    def __init__(self, solver_of: SolverOf, A: sparse.csc_array, leading: int | None) -> None:
+    def __init__(self, solver_of: SolverOf, A: scipy.sparse.csc_array, leading: int | None) -> None:
         self._solver_of, self._leading = solver_of, leading
         self.update(A)
 
-    def update(self, A: sparse.csc_array) -> None:
+    def update(self, A: scipy.sparse.csc_array) -> None:
         self._solve = self._solver_of(A)
         self._solve_leading: Solver | None = None
         self._A = A
@@ -358,7 +358,7 @@ class _SeparateFactors:
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         if self._solve_leading is None:
             k = self._leading
-            self._solve_leading = self._solver_of(sparse.csc_array(self._A[:k, :k]))
+            self._solve_leading = self._solver_of(scipy.sparse.csc_array(self._A[:k, :k]))
         return self._solve_leading(B)
 
     def schur_factor(self) -> None:

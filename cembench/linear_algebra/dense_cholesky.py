@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
@@ -30,8 +30,8 @@ class DenseCholesky:
     def __init__(self, A: NDArray[Any]) -> None:
         with phase("dense factorisation"):
             try:
-                self._C, _ = linalg.cho_factor(A, lower=True, check_finite=False)
-            except linalg.LinAlgError as error:
+                self._C, _ = scipy.linalg.cho_factor(A, lower=True, check_finite=False)
+            except scipy.linalg.LinAlgError as error:
                 raise NotPositiveDefinite(
                     f"the dense matrix of order {len(A)} is not positive definite ({error})"
                 ) from None
@@ -42,7 +42,7 @@ class DenseCholesky:
         """Return x with A x = b, real or complex."""
         with phase("solves"):
             if np.iscomplexobj(self._C):
-                return np.asarray(linalg.cho_solve((self._C, True), b, check_finite=False))
+                return np.asarray(scipy.linalg.cho_solve((self._C, True), b, check_finite=False))
             return by_real_columns(self._solve, b)
 
     def _solve(self, B: Real) -> Real:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
 
 
-def permuted_lower(A: sparse.csr_array, order: NDArray[np.int64]) -> sparse.csc_array:
+def permuted_lower(A: scipy.sparse.csr_array, order: NDArray[np.int64]) -> scipy.sparse.csc_array:
     """Return the lower triangle of ``A[order][:, order]``, in one pass over A.
 
     Parameters
@@ -24,7 +24,7 @@ def permuted_lower(A: sparse.csr_array, order: NDArray[np.int64]) -> sparse.csc_
 
     Examples
     --------
-    >>> A = sparse.csr_array([[4.0, 1.0, 2.0], [1.0, 5.0, 0.0], [2.0, 0.0, 6.0]])
+    >>> A = scipy.sparse.csr_array([[4.0, 1.0, 2.0], [1.0, 5.0, 0.0], [2.0, 0.0, 6.0]])
     >>> permuted_lower(A, np.array([2, 0])).toarray()
     array([[6., 0.],
            [2., 4.]])
@@ -38,12 +38,12 @@ def permuted_lower(A: sparse.csr_array, order: NDArray[np.int64]) -> sparse.csc_
     columns = place[rows.indices]
     kept = columns <= np.repeat(np.arange(k, dtype=kind), np.diff(rows.indptr))
     ends = np.concatenate([[0], np.cumsum(kept)])[rows.indptr].astype(kind)
-    lower = sparse.csr_array((rows.data[kept], columns[kept], ends), shape=(k, k)).tocsc()
+    lower = scipy.sparse.csr_array((rows.data[kept], columns[kept], ends), shape=(k, k)).tocsc()
     # Turning rows into columns takes them one after the other.
     lower.has_sorted_indices = True
     return lower
 
 
-def both_triangles(lower: sparse.csc_array) -> sparse.csc_array:
+def both_triangles(lower: scipy.sparse.csc_array) -> scipy.sparse.csc_array:
     """Return the symmetric matrix with this lower triangle."""
-    return sparse.csc_array(lower + sparse.tril(lower, -1).T)
+    return scipy.sparse.csc_array(lower + scipy.sparse.tril(lower, -1).T)

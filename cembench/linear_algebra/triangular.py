@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.blas import dtrmm, dtrmv, dtrsm, dtrsv
 
 Real = NDArray[np.float64]
 
@@ -17,15 +17,15 @@ _FEW = 4
 def triangle_times(C: Real, X: Real, *, transposed: bool = False) -> Real:
     """Return C X or C^T X for lower triangular C (B, B) in Fortran order and X (B, k)."""
     if X.shape[1] > _FEW:
-        return np.asarray(dtrmm(1.0, C, X, lower=1, trans_a=transposed))
-    return _by_column(lambda x: dtrmv(C, x, lower=1, trans=transposed), X)
+        return np.asarray(scipy.linalg.blas.dtrmm(1.0, C, X, lower=1, trans_a=transposed))
+    return _by_column(lambda x: scipy.linalg.blas.dtrmv(C, x, lower=1, trans=transposed), X)
 
 
 def triangle_solved(C: Real, X: Real, *, transposed: bool = False) -> Real:
     """Return C^-1 X or C^-T X; arguments as for :func:`triangle_times`."""
     if X.shape[1] > _FEW:
-        return np.asarray(dtrsm(1.0, C, X, lower=1, trans_a=transposed))
-    return _by_column(lambda x: dtrsv(C, x, lower=1, trans=transposed), X)
+        return np.asarray(scipy.linalg.blas.dtrsm(1.0, C, X, lower=1, trans_a=transposed))
+    return _by_column(lambda x: scipy.linalg.blas.dtrsv(C, x, lower=1, trans=transposed), X)
 
 
 def _by_column(one: Callable[[Real], Real], X: Real) -> Real:

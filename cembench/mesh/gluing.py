@@ -11,9 +11,8 @@ triangle, as in :mod:`cembench.mesh.topology`.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from cembench.mesh.topology import half_edges
 
@@ -77,8 +76,8 @@ def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
     start = np.where(alike, right, following[right])
     end = np.where(alike, following[right], right)
     i, j = np.concatenate([left, following[left]]), np.concatenate([start, end])
-    graph = sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(F.size, F.size))
-    _, fan = csgraph.connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(F.size, F.size))
+    _, fan = scipy.sparse.csgraph.connected_components(graph, directed=False)
     first = np.unique(fan, return_index=True)[1]  # one corner of each fan
     owner = vertex[first]
     order = np.lexsort((first, owner))

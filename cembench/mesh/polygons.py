@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 Indices = NDArray[np.int64]
@@ -68,6 +67,8 @@ def _good(V: NDArray[np.float64], fans: Indices) -> NDArray[np.bool_]:
 
 def _delaunay(P: NDArray[np.float64]) -> Indices | None:
     """Return triangles (c - 2, 3) of one polygon's corners (c, 3); None if it crosses itself."""
+    import shapely  # slow to load, and rarely needed
+
     P = P - P.mean(axis=0)
     normal = np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0)  # Newell: twice the vector area
     if not normal.any():

@@ -8,9 +8,8 @@ F is an int64 (m, 3) array of vertex indices. Half-edge ``c`` of face ``t`` runs
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 Faces = NDArray[np.int64]
 
@@ -37,18 +36,20 @@ def repeated_half_edges(F: Faces) -> Faces:
     return np.stack([keys // stride, keys % stride], axis=1)
 
 
-def vertex_graph(F: Faces, n: int) -> sparse.csr_array:
+def vertex_graph(F: Faces, n: int) -> scipy.sparse.csr_array:
     """Return the adjacency matrix (n, n) of the vertices; its values are meaningless."""
     i, j = half_edges(F).T
     ones = np.ones(len(i))
-    return sparse.coo_array((np.r_[ones, ones], (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsr()
+    return scipy.sparse.coo_array(
+        (np.r_[ones, ones], (np.r_[i, j], np.r_[j, i])), shape=(n, n)
+    ).tocsr()
 
 
 def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
     """Return the number of connected components, and the component of each vertex."""
     i, j = half_edges(F).T
-    graph = sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
-    count, labels = csgraph.connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
+    count, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)
 
 
@@ -94,12 +95,14 @@ def boundary_loops(F: Faces, n: int) -> list[NDArray[np.int64]]:
         return []
     vertices, local = np.unique(directed, return_inverse=True)
     tail, head = local.reshape(-1, 2).T
-    successor = sparse.csr_array(
+    successor = scipy.sparse.csr_array(
         (np.ones(len(tail)), (tail, head)), shape=(len(vertices), len(vertices))
     )
-    _, labels = csgraph.connected_components(successor, directed=False)
+    _, labels = scipy.sparse.csgraph.connected_components(successor, directed=False)
     starts = np.unique(labels, return_index=True)[1]
     return [
-        vertices[csgraph.breadth_first_order(successor, start, return_predecessors=False)]
+        vertices[
+            scipy.sparse.csgraph.breadth_first_order(successor, start, return_predecessors=False)
+        ]
         for start in np.sort(starts)
     ]

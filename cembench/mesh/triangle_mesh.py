@@ -14,8 +14,8 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import csgraph
 
 from cembench.core.clock import phase
 from cembench.core.errors import MeshError, ParameterError
@@ -405,7 +405,9 @@ def _breaks_of_definition_1(
         yield "(ii), (iv) broken: the mesh has no interior vertex"
         return
     interior = np.flatnonzero(inside)
-    pieces, _ = csgraph.connected_components(graph[interior][:, interior], directed=False)
+    pieces, _ = scipy.sparse.csgraph.connected_components(
+        graph[interior][:, interior], directed=False
+    )
     if pieces > 1:
         yield f"(ii) broken: the interior vertices form {pieces} pieces, not one"
     for loop in loops:

@@ -5,21 +5,12 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable, Sequence
-from enum import StrEnum
 from pathlib import Path
 from typing import Any
 
 from cembench.core.atomic import write
 from cembench.core.extras import Extra, require
-
-
-class Format(StrEnum):
-    """Export formats."""
-
-    csv = "csv"
-    parquet = "parquet"
-    json = "json"
-
+from cembench.report.export_format import Format
 
 Rows = Sequence[dict[str, Any]]
 

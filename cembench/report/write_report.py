@@ -21,7 +21,8 @@ from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import Progress, build_report
 from cembench.report.document import Report
-from cembench.report.export import Format, export_rows
+from cembench.report.export import export_rows
+from cembench.report.export_format import Format
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv

@@ -16,6 +16,9 @@ from math import comb
 LEVEL = 0.95
 #: Probability that it misses.
 ERROR = 0.05
+#: The fewest rounds whose smallest and largest figure enclose the median with 95 %: the probability
+#: that all are on one side of it is 2 / 2^6.
+DEFAULT_ROUNDS = 6
 
 
 @dataclass(frozen=True)

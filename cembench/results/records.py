@@ -24,13 +24,10 @@ from pydantic import (
 
 from cembench.core.names import file_name, printable
 from cembench.core.notices import Notice, notice_of_old
+from cembench.results.intervals import DEFAULT_ROUNDS as DEFAULT_ROUNDS
 
 #: Raised when the meaning of records changes; runs do not resume from other versions.
 SCHEMA_VERSION = 1
-
-#: The fewest rounds whose smallest and largest figure enclose the median with 95 %: the probability
-#: that all are on one side of it is 2 / 2^6.
-DEFAULT_ROUNDS = 6
 
 #: With this many cores busy with other work, a process counts as measured on a busy machine.
 BUSY_CORES = 0.25

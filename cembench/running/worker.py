@@ -34,7 +34,7 @@ from cembench.running.processor import keep_orphans
 from cembench.running.returned import outcome_of_error
 
 #: Modules loaded on demand elsewhere, because each takes a tenth of a second.
-_LOADED_LATE = ("igl", "scipy.optimize")
+_LOADED_LATE = ("igl", "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg")
 #: The folder next to the answer for the folders of external programs.
 PROGRAMS = "programs"
 #: The kinds of surfaces, by the names that jobs have for them.

@@ -28,9 +28,10 @@ from cembench.validation.quality import (
     together,
     without_map,
 )
+from cembench.validation.requirement import Requirement
 from cembench.validation.scaling import growths, scales, sizes
 from cembench.validation.solver import Solver
-from cembench.validation.verdict import Requirement, Validation, unmet
+from cembench.validation.verdict import Validation, unmet
 
 #: Rounds of the scaling stage; an exponent is fitted to each.
 SCALING_ROUNDS = 2

@@ -1,16 +1,6 @@
-import gc
-
 import pytest
 
 from cembench.validation import surfaces
-
-
-@pytest.fixture(scope="package", autouse=True)
-def without_old_objects():
-    """What is loaded already need not be looked at by the collection before each measured call."""
-    gc.freeze()
-    yield
-    gc.unfreeze()
 
 
 @pytest.fixture(scope="package", autouse=True)

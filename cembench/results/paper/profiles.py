@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cembench.core.errors import RegistryError
-from cembench.registry import Registry
 from cembench.results import paper
+
+if TYPE_CHECKING:
+    from cembench.registry import Registry
 
 #: Number of smallest models in `quick`, and the most triangles in `standard`.
 QUICK_MODELS = 8

@@ -1,0 +1,60 @@
+"""The command line and the package start quickly: each loads only what it needs."""
+
+import subprocess
+import sys
+
+import pytest
+
+from cembench.commands import options
+from cembench.results import looks
+
+#: Each takes a tenth of a second to load, or more.
+SLOW = ("numpy", "scipy", "pydantic", "matplotlib", "igl", "shapely", "cvxopt", "PIL")
+PARTS_OF_SCIPY = ("scipy.sparse", "scipy.linalg", "scipy.spatial", "scipy.ndimage")
+WATCHED = (*SLOW, *PARTS_OF_SCIPY, "cembench.results.records", "cembench.running")
+
+
+def loaded(statements):
+    """The watched modules that a fresh interpreter has loaded after these statements."""
+    code = f"""if True:
+        import sys
+        {statements}
+        print(*[name for name in {WATCHED!r} if name in sys.modules], file=sys.stderr)
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stderr.split())
+
+
+def command(*words):
+    return (
+        f"sys.argv = ['cembench', *{words!r}]\n"
+        "        from cembench.commands.cli import main\n"
+        "        try: main()\n"
+        "        except SystemExit as ended: assert not ended.code"
+    )
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["--version"]])
+def test_a_help_text_needs_no_numerical_library(words):
+    # Where a command has options, the library of the command line loads pydantic.
+    assert loaded(command(*words)) <= {"pydantic"}
+
+
+def test_a_list_needs_no_scipy_and_no_records():
+    # The command line library itself loads pydantic, where a command has options.
+    assert loaded(command("list")) == {"numpy", "scipy", "pydantic"}
+
+
+def test_the_modules_are_seen_where_they_are_loaded():
+    assert loaded("import numpy, scipy.sparse, cembench.running") >= {
+        "numpy",
+        "scipy.sparse",
+        "cembench.running",
+    }
+
+
+def test_the_bounds_of_rounds_are_those_of_the_looks():
+    """They stand in two places, because `looks` loads the records."""
+    assert looks.LOOKS[1] == options.SECOND_LOOK
+    assert looks.LOOKS[-1] == options.LAST_LOOK
+    assert looks.USUAL_MOST_ROUNDS == options.USUAL_MOST_ROUNDS
