@@ -9,6 +9,7 @@ from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.many.accuracy_profiles import figure
 from cembench.report.content.many.success import records_of
 from cembench.report.document import Finding, Findings
+from cembench.results.stability import stability_words
 
 _ANGLE = "angle_error_mean_deg"
 
@@ -43,6 +44,7 @@ def many_findings(evidence: Evidence, policy: str) -> Findings | None:
         figures.append(
             Finding(f"{error:.1f}°", f"the worst mean angle error of a valid map: {label}, {where}")
         )
+    sentence = f"{sentence} {stability_words(evidence.records)}".rstrip()
     return Findings(sentence, tuple(figures))
 
 
