@@ -36,8 +36,9 @@ LEAST_UP_TO = 900
 FIRST_ROUNDS = 2
 #: Maximum number of rounds: four looks.
 MOST_ROUNDS = LOOKS[3]
-#: Seconds after which no rounds are added, unless the growth looks too steep without an interval.
-MOST_SECONDS = 75.0
+#: Seconds that the rounds up to the first look may take after the first ones, and the stage with
+#: later looks; what looks too steep gets its first look however long that takes.
+MOST_SECONDS = 60.0
 #: Our CPU seconds count if they are this share of the wall clock; else the solver waits.
 _LEAST_CPU = 0.1
 #: Phase whose growth is shown too.
@@ -164,10 +165,10 @@ def more_rounds(
     if rounds >= MOST_ROUNDS or found.answer != "cannot tell":
         return 0
     more = next_look(rounds, MOST_ROUNDS) - rounds
-    if spent + more * seconds_a_round <= most:
+    first = found.ours.low is None
+    if more * seconds_a_round + (0 if first else spent) <= most:
         return more
-    suspect = found.ours.low is None and found.ours.exponent > MOST_EXPONENT
-    return more if suspect else 0
+    return more if first and found.ours.exponent > MOST_EXPONENT else 0
 
 
 def seconds_a_round(records: Sequence[Record]) -> float:

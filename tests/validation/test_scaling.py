@@ -143,7 +143,8 @@ def test_rounds_are_added_until_the_answer_is_clear_or_time_is_used_up():
     )
     assert more_rounds(two, 0, 1.0) == 5
     assert more_rounds(seven, 0, 1.0) == 3
-    assert more_rounds(seven, 74, 1.0) == 0
+    assert more_rounds(seven, 59, 1.0) == 0
+    assert more_rounds(two, 59, 1.0) == 5
     assert more_rounds(found(1.2), 0, 1.0) == 0
     # Slow: what looks fine is left without an interval, and what looks too steep gets one.
     assert more_rounds(two, 0, 60.0) == 0
