@@ -57,7 +57,7 @@ def simulate(
     for exponents, differences in zip(own.tolist(), above.tolist(), strict=True):
         for n in (look for look in LOOKS if look <= MOST_ROUNDS):
             answer = answer_of(exponents[:n], differences[:n])
-            if answer != "cannot tell":
+            if answer is not GrowthAnswer.cannot_tell:
                 break
         answers[answer] += 1
         rounds += n
@@ -74,7 +74,10 @@ def table(runs: int) -> str:
     for model in noise.MODELS:
         found = [simulate(model, runs, ours, REFERENCE) for ours in SOLVERS]
         found.append(simulate(model, runs, 1.68, STEEP_REFERENCE, dearer=4 / 3))
-        cells = [f"{one.share('too steep'):.1%} / {one.share('fine'):.1%}" for one in found]
+        cells = [
+            f"{one.share(GrowthAnswer.too_steep):.1%} / {one.share(GrowthAnswer.fine):.1%}"
+            for one in found
+        ]
         lines.append(f"| {model} | {' | '.join(cells)} |")
     told = f"*too steep* / *fine* of {runs:,} simulated validations; the rest cannot be told. "
     told += f"The reference grows like faces^{REFERENCE:g}, in the last column like faces."

@@ -11,6 +11,7 @@ interval holds for any noise. Rounds are added until the answer is clear
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import StrEnum
 from math import log
 from statistics import median
 from typing import Literal, NamedTuple
@@ -44,9 +45,16 @@ _LEAST_CPU = 0.1
 #: Phase whose growth is shown too.
 _FACTORISATION = "factorisation"
 
-#: "cannot tell": the interval contains the limit, or there is none.
-GrowthAnswer = Literal["fine", "too steep", "cannot tell"]
 Clock = Literal["cpu", "wall"]
+
+
+class GrowthAnswer(StrEnum):
+    """Whether a growth is allowed."""
+
+    fine = "fine"
+    too_steep = "too_steep"
+    #: The intervals contain the limits, or there are none yet.
+    cannot_tell = "cannot_tell"
 
 
 class Growth(BaseModel):
@@ -111,12 +119,13 @@ def answer_of(exponents: Sequence[float], above: Sequence[float] | None) -> Grow
     """
     own = _interval(exponents)
     if own is None:
-        return "cannot tell"
+        return GrowthAnswer.cannot_tell
     beside = None if above is None else _interval(above)
     if own.low > MOST_EXPONENT and (beside is None or beside.low > MOST_ABOVE_REFERENCE):
-        return "too steep"
-    kept = own.high <= MOST_EXPONENT
-    return "fine" if kept or (beside and beside.high <= MOST_ABOVE_REFERENCE) else "cannot tell"
+        return GrowthAnswer.too_steep
+    if own.high <= MOST_EXPONENT or (beside and beside.high <= MOST_ABOVE_REFERENCE):
+        return GrowthAnswer.fine
+    return GrowthAnswer.cannot_tell
 
 
 def growth_of(
@@ -162,7 +171,7 @@ def more_rounds(
     What looks too steep after the first rounds is not left there: it gets its interval.
     """
     rounds = found.ours.rounds
-    if rounds >= MOST_ROUNDS or found.answer != "cannot tell":
+    if rounds >= MOST_ROUNDS or found.answer is not GrowthAnswer.cannot_tell:
         return 0
     more = next_look(rounds, MOST_ROUNDS) - rounds
     first = found.ours.low is None
@@ -189,8 +198,8 @@ def scales(found: GrowthComparison | None) -> ValidationFinding:
     return ValidationFinding(
         stage="scaling",
         name="growth of the seconds",
-        ok=found is not None and found.answer != "too steep",
-        undecided=found is not None and found.answer == "cannot tell",
+        ok=found is not None and found.answer is not GrowthAnswer.too_steep,
+        undecided=found is not None and found.answer is GrowthAnswer.cannot_tell,
         measured=measured,
         allowed=f"an exponent of {MOST_EXPONENT:g} at most, or {MOST_ABOVE_REFERENCE:g} more than "
         "the reference's in the same rounds; factoring a planar Laplacian has 1.5",
@@ -206,7 +215,7 @@ def _words(found: GrowthComparison) -> str:
     if found.above is not None:
         told += f", {found.above:.2f}{_range(found.above_low, found.above_high)} above "
         told += ", ".join(f"{other.what} {other.exponent:.2f}" for other in found.others[:1])
-    if found.answer == "cannot tell":
+    if found.answer is GrowthAnswer.cannot_tell:
         few = ours.low is None
         why = f"{ours.rounds} rounds are too few" if few else f"not after {ours.rounds} rounds"
         told += f"; whether that is too steep cannot be told ({why})"

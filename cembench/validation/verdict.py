@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict
 from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
-from cembench.validation.scaling import GrowthComparison
+from cembench.validation.scaling import GrowthAnswer, GrowthComparison
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
@@ -93,7 +93,7 @@ def sentence(validation: Validation) -> str:
             if against.solve_time:
                 told += f", in the solve time of the external program ({against.solve_time})"
             parts.append(told)
-    if validation.growth is not None and validation.growth.answer == "cannot tell":
+    if validation.growth is not None and validation.growth.answer is GrowthAnswer.cannot_tell:
         parts.append("whether its seconds grow too steeply cannot be told")
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
