@@ -7,7 +7,7 @@ speedups in two runs overlap. Stopped, it goes on where it was when called again
 
     python -m benchmarks.aa                      # a machine with nothing else to do
     python -m benchmarks.aa --busy 1             # beside so many processes that never rest
-    python -m benchmarks.aa --profile quick --runs 2 --budget 150s -o results/aa-quick
+    python -m benchmarks.aa --profile quick --runs 2 --budget 4m -o results/aa-quick
     python -m benchmarks.aa --write-docs         # both, as far as they are there, in the page
 
 What was found is in OUTPUT/quiet.json and OUTPUT/busy.json; the runs themselves are beside.
@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--profile", help="instead of these surfaces, as in `cembench run`")
     parser.add_argument("--algorithms", default=",".join(ALGORITHMS))
     parser.add_argument("--precision", default="10%")
-    parser.add_argument("--budget", default="70s", help="of each run, see `cembench run`")
+    parser.add_argument("--budget", default="4m", help="of each run, see `cembench run`")
     parser.add_argument("--busy", type=int, default=0, metavar="N", help="start N busy loops")
     parser.add_argument("-o", "--output", type=Path, default=Path("results/aa"))
     parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md; no runs")

@@ -1,32 +1,88 @@
-"""How much faster is CEM? Fills README's table from the tables of the kept report.
+"""How much faster is CEM? Fills README's table from the tables of a kept report.
 
 python -m benchmarks.readme_speedups
+python -m benchmarks.readme_speedups --report reports/standard --print
+
+Averages have a 95 % interval over surfaces and rounds (hierarchical bootstrap, as in the report's
+table of certainty) where most cells have the rounds for one.
 """
 
 from __future__ import annotations
 
+import argparse
 import csv
+import json
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
+from statistics import median
+
+import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.pages import ROOT, fill
+from cembench.results.many import average_interval
 
-TABLES = ROOT / "reports/paper/tables"
+REPORT = ROOT / "reports/paper"
+TABLES = REPORT / "tables"
 README = ROOT / "README.md"
 #: A policy of solving and the table of its averages.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
 #: The readings that are shown, by the beginning of their rows.
 MEAN, GEOMETRIC = "mean rate (as the paper)", "geometric mean of ratios - 1"
+#: The same of ratios t / t_CEM, along the last axis.
+AVERAGES: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    MEAN: lambda ratios: ratios.mean(axis=-1) - 1,
+    GEOMETRIC: lambda ratios: np.exp(np.log(ratios).mean(axis=-1)) - 1,
+}
+#: Rounds of a cell without which rounds say nothing of an average.
+FEWEST_ROUNDS = 6
 
 
 def averages(file: Path) -> dict[str, dict[str, str]]:
     """Read a table of averages, its rows by their reading."""
-    with file.open(encoding="utf-8", newline="") as lines:
-        return {row["reading"]: row for row in csv.DictReader(lines)}
+    return {row["reading"]: row for row in _rows(file)}
+
+
+def ratios(records: Path, algorithm: str, policy: str) -> list[list[float]]:
+    """Return t / t_CEM of each round, for every model of the paper once.
+
+    A model that was measured itself counts, and not its stand-in; of a method with several sets of
+    parameters the one that was measured on most surfaces.
+    """
+    there = [row for row in _rows(records) if row["solves"] == policy and row["status"] == "ok"]
+    counts = Counter((row["algorithm"], row["parameters"]) for row in there)
+    found: dict[tuple[str, str], dict[str, list[float]]] = {}
+    for row in sorted(there, key=lambda row: counts[row["algorithm"], row["parameters"]]):
+        seconds = json.loads(row["seconds_raw"] or "[]")
+        if row["paper_row"] and seconds:
+            found.setdefault((row["paper_row"], row["origin"]), {})[row["algorithm"]] = seconds
+    both = {
+        model: [a / b for a, b in zip(by[algorithm], by["cem"], strict=False)]
+        for (model, _), by in sorted(found.items(), key=lambda one: one[0][1] == "model")
+        if algorithm in by and "cem" in by
+    }
+    return list(both.values())
+
+
+def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
+    """Return the interval of an average in words; nothing where cells have too few rounds."""
+    if not records.exists():
+        return ""
+    by_surface = ratios(records, algorithm, policy)
+    if not by_surface or median(map(len, by_surface)) < FEWEST_ROUNDS:
+        return ""
+    found = average_interval(by_surface, AVERAGES[reading])
+    return f" ({found.low:.1f} to {found.high:.1f})" if found else ""
 
 
 def table(folder: Path = TABLES) -> str:
-    """Return README's table in Markdown."""
-    found = {policy: averages(folder / file) for policy, file in POLICIES.items()}
+    """Return README's table in Markdown, from the tables of a report and its records."""
+    records = folder.parent / "records.csv"
+    there = {policy: folder / file for policy, file in POLICIES.items()}
+    found = {policy: averages(file) for policy, file in there.items() if file.exists()}
+    if not found:
+        raise SystemExit(f"{folder} holds no {' or '.join(POLICIES.values())}.")
     heads = [f"`{policy}`: mean | geometric" for policy in found]
     lines = [
         f"| CEM against | printed: mean | geometric | {' | '.join(heads)} |",
@@ -34,12 +90,33 @@ def table(folder: Path = TABLES) -> str:
     ]
     printed = next(iter(found.values()))
     for name in ("QIEM", "FDM", "LDM"):
-        columns = [printed[reading][f"{name} printed, all"] for reading in (MEAN, GEOMETRIC)]
-        for rows in found.values():
-            columns += [rows[reading][f"{name} here"] for reading in (MEAN, GEOMETRIC)]
-        lines.append(f"| {name} | " + " | ".join(f"{float(c):.1f}" for c in columns) + " |")
+        cells = [f"{float(printed[r][f'{name} printed, all']):.1f}" for r in (MEAN, GEOMETRIC)]
+        for policy, rows in found.items():
+            for reading in (MEAN, GEOMETRIC):
+                told = f"{float(rows[reading][f'{name} here']):.1f}"
+                cells.append(told + interval(records, name.lower(), policy, reading))
+        lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
+def _rows(file: Path) -> list[dict[str, str]]:
+    csv.field_size_limit(2**31 - 1)
+    with file.open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def main() -> None:
+    """Fill the page, or print its table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--report", type=Path, default=REPORT, help="a kept report")
+    parser.add_argument("--print", action="store_true", help="print the table, change nothing")
+    chosen = parser.parse_args()
+    text = table(chosen.report / "tables")
+    if chosen.print:
+        print(text)
+    else:
+        fill(README, Path(__file__).stem, text)
+
+
 if __name__ == "__main__":
-    fill(README, "readme_speedups", table())
+    main()

@@ -107,9 +107,14 @@ def hours(
     known = {t.cell.label: cost for t, cost in zip(tasks, costs, strict=True) if cost is not None}
     groups = grouped([task for task in tasks if task.cell.label in known])
     found = {}
+    priced = [[known[t.cell.label] for t in group] for group in groups]
+    whole = sum(one.seconds for group in priced for one in group)
     for machines in ESTIMATED_FOR:
-        share = None if budget is None else budget * machines / max(1, len(groups))
-        seconds = [planned_seconds([known[t.cell.label] for t in g], share) for g in groups]
+        share = None if budget is None else budget * machines / (whole or 1.0)
+        seconds = [
+            planned_seconds(g, None if share is None else share * sum(one.seconds for one in g))
+            for g in priced
+        ]
         found[machines] = makespan(seconds, machines) if seconds else 0.0
     longest = max(zip(seconds, groups, strict=True), key=lambda one: one[0], default=None)
     return {

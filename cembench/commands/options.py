@@ -104,8 +104,9 @@ Budget = Annotated[
     str | None,
     typer.Option(
         metavar="TIME",
-        help="Time after which only the first 7 rounds of each cell are completed, e.g. 30m "
-        "(default: 150s for `quick`, 1h for `standard`, 4h for `paper`, else 30m).",
+        help="Time of the run, e.g. 30m. While it lasts cells get rounds, the cheapest their first "
+        "7 before others; each has one (default: 150s for `quick`, 1h for `standard`, 4h for "
+        "`paper`, else 30m).",
     ),
 ]
 RepeatBusy = Annotated[
@@ -156,7 +157,7 @@ Verify = Annotated[
 ]
 
 
-#: Seconds after which a cell gets no rounds beyond the first look at its intervals.
+#: Seconds after which cells get no more rounds.
 USUAL_BUDGETS = {Profile.quick: 150.0, Profile.standard: 3600.0, Profile.paper: 4 * 3600.0}
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 

@@ -101,6 +101,7 @@ def row(record: Record) -> dict[str, Any]:
         "seconds_min": min((min(r.calls) for r in outcome.rounds), default=None),
         "seconds_calls": [list(r.calls) for r in outcome.rounds],
         "unstable": is_unstable(record),
+        "ended": outcome.ended,
         "cpu_seconds": outcome.cpu_seconds,
         "busy_rounds": sum(bool(r.neighbours and r.neighbours.busy) for r in outcome.rounds),
         "start_seconds": outcome.start_seconds,

@@ -68,6 +68,11 @@ Figure = Annotated[
 NamePart = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=128)]
 
 
+#: Why a cell that is measured until it is precise got no more rounds: it was precise, the time was
+#: used up, or it had the maximum number of rounds.
+Ended = Literal["precise", "budget", "rounds"]
+
+
 class Cell(BaseModel):
     """A surface, an algorithm and its settings; cells with equal content are measured once."""
 
@@ -334,6 +339,8 @@ class Outcome(BaseModel):
     traceback: str | None = None
     #: The rounds in order; empty if no call was timed.
     rounds: tuple[Round, ...] = ()
+    #: None for a fixed number of rounds, and in older records.
+    ended: Ended | None = None
     #: Figures computed by the harness (cembench.conformal.metrics); null if infinite.
     metrics: dict[str, Figure] = Field(default_factory=dict)
     #: For surfaces with holes: the fitted circles of the boundaries, the outer one first.

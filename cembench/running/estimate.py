@@ -14,7 +14,6 @@ from math import exp, log
 from statistics import mean
 from typing import Literal
 
-from cembench.results.looks import LOOKS
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
@@ -62,7 +61,7 @@ class Estimate:
     seconds: float
     memory_bytes: float
     basis: Basis
-    #: The seconds up to the first look, which are spent whatever the budget is.
+    #: The seconds of the check and of the rounds that are made whatever the budget is.
     least_seconds: float = 0.0
 
 
@@ -90,7 +89,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
     calls = CALLS_A_ROUND if call < LONG_CALL else 1
     round_ = start + calls * call
-    least = (cell.repeats or LOOKS[0]) * round_
+    least = (cell.repeats or 1) * round_
     rounds = (cell.repeats or USUAL_ROUNDS) * round_
     return Estimate(call, check + rounds, memory, basis, check + least)
 

@@ -4,10 +4,11 @@ First every cell is checked: one call in a process of its own, whose map is veri
 memory is measured. What ends ok is then timed in rounds. A round has a fresh process for every
 cell, in a random order, so a machine that slows down slows them all. A cell has a fixed number of
 rounds, or is measured until its intervals are narrow (:mod:`cembench.running.until_precise`), as
-long as time is left. Where that is possible the processes are forked from one that has loaded the
-libraries (:mod:`cembench.running.fork_server`), one for the checks and another one each round: what
-differs from one interpreter to the next (addresses, hash seeds) is the same for all cells of a
-round, and averaged over.
+long as time is left; where that does not last for the first look of all, the dearest end early.
+Where that is possible the processes are forked from one that has loaded the libraries
+(:mod:`cembench.running.fork_server`), one for the checks and another one each round: what differs
+from one interpreter to the next (addresses, hash seeds) is the same for all cells of a round, and
+averaged over.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cache
-from math import inf
+from math import inf, isinf
 from pathlib import Path
+from statistics import median
 from time import monotonic
 from typing import Any, Self
 
@@ -43,7 +45,16 @@ from cembench.linear_algebra.backends import default_backend
 from cembench.results.comparison import circumstances
 from cembench.results.looks import USUAL_MOST_ROUNDS, is_look, next_look
 from cembench.results.record_rows import REFERENCE
-from cembench.results.records import Fault, FaultKind, Outcome, Record, Round, Status, not_ok
+from cembench.results.records import (
+    Ended,
+    Fault,
+    FaultKind,
+    Outcome,
+    Record,
+    Round,
+    Status,
+    not_ok,
+)
 from cembench.results.samples import Samples
 from cembench.results.store import Store
 from cembench.running.comparable import impossible, incomparable, is_cold
@@ -59,15 +70,18 @@ from cembench.running.neighbours import counters, neighbours
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
 from cembench.running.side_by_side import check_side_by_side
-from cembench.running.until_precise import affordable, cost, lack
+from cembench.running.until_precise import affordable, cheapest, cost, lack
 from cembench.running.worker import PROGRAMS, Answer, Job, JobTask
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
 #: Wall-clock seconds that judging a map may take at least.
 JUDGE_SECONDS = 600.0
-#: Seconds after which no cell goes on that has had its first look, unless the user says otherwise.
+#: Seconds after which no cell goes on, unless the user says otherwise.
 USUAL_BUDGET = 1800.0
+#: By what share of the budget a plan may exceed it later than after the first round: prices
+#: scatter, and a cell that is left out cannot come back.
+_TOLERATED = 0.1
 #: The largest answer that is read: what a worker keeps takes a few megabytes at most.
 LARGEST_ANSWER_BYTES = 2**24
 
@@ -90,7 +104,8 @@ class Options:
     reference: str = REFERENCE
     #: Rounds of a cell that is measured until it is precise, at most.
     most_rounds: int = USUAL_MOST_ROUNDS
-    #: Wall-clock seconds after which no cell goes on that has had its first look; None: no limit.
+    #: Wall-clock seconds after which no cell goes on that has had a round; None: no limit.
+    #: Cells with a fixed number of rounds have all of them.
     budget: float | None = None
     #: How often a process is run again beside which the machine was busy; the quietest counts.
     repeat_busy: int = 0
@@ -231,10 +246,12 @@ class _Run:
     environment: dict[str, Any]
     sitting: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     records: dict[str, Record] = field(default_factory=dict)
-    since: float = field(default_factory=monotonic)
+    since: float = field(default_factory=lambda: monotonic())
     #: What the journals hold, by the cells' labels.
     checks: dict[str, Outcome] = field(default_factory=dict)
     rounds: dict[str, dict[int, Round]] = field(default_factory=dict)
+    #: Seconds of the processes that were timed in this sitting, by the cells' labels.
+    took: dict[str, list[float]] = field(default_factory=dict)
 
     def measure(self, tasks: Sequence[Task]) -> None:
         asked = {task.cell.label for task in tasks}
@@ -248,6 +265,8 @@ class _Run:
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
                 self._look(pending, number)
+            elif number:
+                self._keep_to_budget(pending, number)
             open_ = [task for task in pending if self._lacks(task, number)]
             if not open_:
                 continue
@@ -345,12 +364,40 @@ class _Run:
             beside = (open_[partner].cell, rounds[partner]) if partner else None
             lacks[label] = lack(task.cell, rounds[label], beside)
         more = next_look(number, self.options.most_rounds) - number
-        costs = {label: more * cost(rounds[label]) for label in open_}
+        costs = {label: more * self._price(label) for label in open_}
         go_on = set() if last else affordable(lacks, costs, partners, self._seconds_left())
         for label in sorted(open_.keys() - go_on, key=lambda label: label in partners.values()):
-            self._save_measured(open_[label])
+            ended: Ended = "rounds" if last else "budget"
+            self._save_measured(open_[label], "precise" if lacks[label] <= 1 else ended)
         for label in go_on:
             self.watcher.goes_on(open_[label], more)
+
+    def _keep_to_budget(self, pending: Sequence[Task], number: int) -> None:
+        """End the cells that the budget does not bring to their first look, the dearest first."""
+        left = self._seconds_left()
+        if isinf(left) or number >= next_look(0, self.options.most_rounds):
+            return
+        open_ = {
+            task.cell.label: task
+            for task in pending
+            if task.cell.label not in self.records
+            and task.cell.precision is not None
+            and len(self.rounds[task.cell.label]) == number
+        }
+        partners = _partners(open_.values(), self.options.reference)
+        more = next_look(number, self.options.most_rounds) - number
+        costs = {label: more * self._price(label) for label in open_}
+        if number > 1:
+            left += _TOLERATED * (self.options.budget or 0.0)
+        if sum(costs.values()) <= left:
+            return
+        for label in sorted(open_.keys() - cheapest(costs, partners, left)):
+            self._save_measured(open_[label], "budget")
+
+    def _price(self, label: str) -> float:
+        """Return the expected seconds of another round of a cell."""
+        took = self.took.get(label)
+        return median(took) if took else cost(list(self.rounds[label].values()))
 
     def _seconds_left(self) -> float:
         if self.options.budget is None:
@@ -361,8 +408,9 @@ class _Run:
         step = self._step(task, number)
         started = _now()
         checked = self.checks[task.cell.label]
-        with _Process(self.watcher, task, step):
+        with _Process(self.watcher, task, step) as process:
             found = self._quietest(task, Checked.of(checked))
+        self.took.setdefault(task.cell.label, []).append(monotonic() - process.since)
         if isinstance(found, Outcome):
             more: dict[str, Any] = {"cause": f"in {step}: {found.cause}"}
             if found.status == "not_comparable":  # the map is valid, and so are its figures
@@ -398,15 +446,16 @@ class _Run:
 
     def _save_if_complete(self, task: Task) -> None:
         if task.cell.repeats and len(self.rounds[task.cell.label]) >= task.cell.repeats:
-            self._save_measured(task)
+            self._save_measured(task, None)
 
-    def _save_measured(self, task: Task) -> None:
+    def _save_measured(self, task: Task, ended: Ended | None) -> None:
         checked = self.checks[task.cell.label]
         rounds = tuple(
             self.rounds[task.cell.label][k] for k in sorted(self.rounds[task.cell.label])
         )
         notes = (*checked.notes, *_notes(checked, rounds))
-        self._save(task, checked.model_copy(update={"rounds": rounds, "notes": notes}))
+        told = {"rounds": rounds, "notes": notes, "ended": ended}
+        self._save(task, checked.model_copy(update=told))
 
     def _save(self, task: Task, outcome: Outcome) -> None:
         started = outcome.rounds[0].started_at if outcome.rounds else _now()
@@ -448,10 +497,11 @@ class _Process:
     watcher: Watcher
     task: Task
     step: Step
-    since: float = field(default_factory=monotonic)
+    since: float = field(default_factory=lambda: monotonic())
 
-    def __enter__(self) -> None:
+    def __enter__(self) -> Self:
         self.watcher.starts(self.task, self.step)
+        return self
 
     def __exit__(self, *_: object) -> None:
         self.watcher.ends(self.task, self.step, monotonic() - self.since)

@@ -1,4 +1,8 @@
-"""Choose the cells that need more rounds: those with wide intervals, the widest first."""
+"""Choose the cells that need more rounds, within the time that is left.
+
+Before the first look, when no cell has an interval, the cheapest come first: most cells get one.
+After it those with the widest intervals do.
+"""
 
 from __future__ import annotations
 
@@ -62,10 +66,33 @@ def affordable(
         Remaining seconds; infinite without a limit.
 
     """
+    lacking = [label for label in lacks if lacks[label] > 1]
+    widest = sorted(lacking, key=lambda label: (-lacks[label], label))
+    return _within(widest, costs, partners, seconds)
+
+
+def cheapest(costs: Mapping[str, float], partners: Mapping[str, str], seconds: float) -> set[str]:
+    """Return the cells that reach their first look in the remaining seconds, the cheapest first.
+
+    Parameters are those of :func:`affordable`; a cell's partner is measured with it.
+    """
+
+    def price(label: str) -> float:
+        return sum(costs[one] for one in {label, partners.get(label, label)})
+
+    ordered = sorted(costs, key=lambda label: (price(label), label))
+    return _within(ordered, costs, partners, seconds)
+
+
+def _within(
+    ordered: Sequence[str],
+    costs: Mapping[str, float],
+    partners: Mapping[str, str],
+    seconds: float,
+) -> set[str]:
+    """Return the cells that can be paid for, in this order, each with its partner."""
     chosen: set[str] = set()
-    for label in sorted(lacks, key=lambda label: (-lacks[label], label)):
-        if lacks[label] <= 1:
-            continue
+    for label in ordered:
         more = {label, partners.get(label, label)} - chosen
         price = sum(costs[one] for one in more)
         if price <= seconds:

@@ -25,9 +25,13 @@ from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, Pair, PairedComparison
-from cembench.validation.scaling import Growth
+from cembench.validation.scaling import Growth, GrowthComparison
 from cembench.validation.verdict import STAGES, Validation, sentence
 
+_CLOCKS = {
+    "cpu": "Seconds are of the processor, except those of a phase, which are wall clock.",
+    "wall": "Seconds are wall clock.",
+}
 _TITLES = {
     "contract": "Does it keep its contract?",
     "correctness": "Are its maps right?",
@@ -81,9 +85,9 @@ def _items(
         yield _summary_table(validation.against)
         for against in validation.against:
             yield _pairs_table(against, validation.title, records)
-    if stage == "scaling" and validation.growths:
-        yield _growths_table(validation.growths)
-        yield write_plot(_growths_plot(validation.growths), folder)
+    if stage == "scaling" and validation.growth:
+        yield _growth_table(validation.growth)
+        yield write_plot(_growth_plot(validation.growth), folder)
 
 
 def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
@@ -95,7 +99,7 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
         rows=tuple(
             (
                 words(finding.name),
-                words("ok" if finding.ok else "fault"),
+                words(_found(finding)),
                 words(finding.measured),
                 words(finding.allowed),
             )
@@ -103,6 +107,12 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
         ),
         notes=tuple(f"{f.name}: {f.remedy}" for f in findings if not f.ok),
     )
+
+
+def _found(finding: ValidationFinding) -> str:
+    if finding.undecided:
+        return "cannot be told"
+    return "ok" if finding.ok else "fault"
 
 
 def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
@@ -222,7 +232,8 @@ def quotient(ours: float | None, theirs: float | None) -> float | None:
     return None if ours is None or theirs is None or theirs <= 0 else ours / theirs
 
 
-def _growths_table(growths: Sequence[Growth]) -> Table:
+def _growth_table(found: GrowthComparison) -> Table:
+    growths = (found.ours, *found.others)
     sizes = dict.fromkeys(faces for growth in growths for faces in growth.faces)
     rows = []
     for growth in growths:
@@ -231,12 +242,11 @@ def _growths_table(growths: Sequence[Growth]) -> Table:
             Value(f"{at[f]:.4f}", at[f], "surface") if f in at else missing("not timed")
             for f in sizes
         ]
-        exponents = (growth.exponent, growth.low, growth.high)
         rows.append(
             (
                 words(growth.what),
                 *cells,
-                *(Value(f"{value:.2f}", value, "derived") for value in exponents),
+                *(_exponent(value) for value in (growth.exponent, growth.low, growth.high)),
             )
         )
     return Table(
@@ -246,15 +256,21 @@ def _growths_table(growths: Sequence[Growth]) -> Table:
             Column("what", numeric=False),
             *(Column(f"{faces:,}", "faces") for faces in sizes),
             Column("exponent"),
-            Column("smallest", "of the rounds"),
-            Column("largest", "of the rounds"),
+            Column("low", "95 % interval"),
+            Column("high", "95 % interval"),
         ),
         rows=tuple(rows),
-        caption="Exponent: slope of log(seconds) against log(faces), by least squares.",
+        caption="Exponent: of the seconds between the two largest sizes, the median over the "
+        f"rounds. {_CLOCKS[found.clock]}",
     )
 
 
-def _growths_plot(growths: Sequence[Growth]) -> Plot:
+def _exponent(value: float | None) -> Value:
+    return missing("too few rounds") if value is None else Value(f"{value:.2f}", value, "derived")
+
+
+def _growth_plot(found: GrowthComparison) -> Plot:
+    growths: Sequence[Growth] = (found.ours, *found.others)
     styles = looks([growth.what for growth in growths])
     series = tuple(
         PlotSeries(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])

@@ -29,14 +29,22 @@ from cembench.validation.quality import (
     without_map,
 )
 from cembench.validation.requirement import Requirement
-from cembench.validation.scaling import growths, scales, sizes
+from cembench.validation.scaling import (
+    FIRST_ROUNDS,
+    growth_of,
+    largest_two,
+    more_rounds,
+    scales,
+    seconds_a_round,
+    sizes,
+)
 from cembench.validation.solver import Solver
 from cembench.validation.verdict import Validation, unmet
 
-#: Rounds of the scaling stage; an exponent is fitted to each.
-SCALING_ROUNDS = 2
 #: Default baseline for each target.
 _USUAL_BASELINE = {"disk": "cem", "free boundary": "lscm", "circular holes": "koebe-cem"}
+#: Reference for growth, whatever the baselines are: its seconds grow linearly at most.
+_GROWTH_REFERENCE = {"disk": "cem", "free boundary": "lscm", "circular holes": "direct-cem-holes"}
 
 
 @dataclass(frozen=True)
@@ -200,12 +208,22 @@ def _quality(work: _Work) -> _Found:
 
 def _scaling(work: _Work) -> _Found:
     meshes = surfaces.growing(work.registry, work.kind, sizes(work.asked.up_to))
-    beside = work.baselines[:1]
-    records = work.measured("scaling", meshes, beside, SCALING_ROUNDS)
-    found = growths(records, work.name, beside[0] if beside else None)
-    ours = next((growth for growth in found if growth.what == work.name), None)
-    others = [growth for growth in found if growth is not ours]
-    return [scales(ours, others)], {"growths": tuple(found)}
+    reference = _GROWTH_REFERENCE[work.solver.algorithm.target]
+    known = reference in work.registry.algorithms and reference != work.name
+    beside = (reference,) if known else ()
+    started = monotonic()
+    sittings = [work.measured("scaling", meshes, beside, FIRST_ROUNDS)]
+    while True:
+        found = growth_of(sittings, work.name, beside[0] if beside else None)
+        if found is None:
+            return [scales(None)], {}
+        kept = set(largest_two(sittings[0], work.name))
+        again = [record for record in sittings[-1] if record.cell.mesh in kept]
+        more = more_rounds(found, monotonic() - started, seconds_a_round(again))
+        if not more:
+            return [scales(found)], {"growth": found}
+        largest = [mesh for mesh in meshes if mesh.name in kept]
+        sittings.append(work.measured("scaling", largest, beside, more))
 
 
 _STAGES: dict[Stage, Callable[[_Work], _Found]] = {

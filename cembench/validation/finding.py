@@ -20,6 +20,8 @@ class ValidationFinding(BaseModel):
     stage: Stage
     name: str
     ok: bool
+    #: Whether the figures do not show if it is a fault; `ok` is true then.
+    undecided: bool = False
     measured: str
     allowed: str
     remedy: str

@@ -12,7 +12,7 @@ from rich.text import Text
 from cembench.report.render.grid import GridColumn, figures, grid, names, words
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, Pair
-from cembench.validation.scaling import Growth
+from cembench.validation.scaling import GrowthComparison
 from cembench.validation.verdict import STAGES, Validation, sentence
 
 
@@ -30,14 +30,16 @@ def validation_text(validation: Validation) -> RenderableType:
         if stage == "quality":
             for against in validation.against:
                 parts += [Text(), _pairs_table(against, validation.title), Text()]
-        if stage == "scaling" and validation.growths:
-            parts += [Text(), growths_table(validation.growths)]
+        if stage == "scaling" and validation.growth:
+            parts += [Text(), growth_table(validation.growth)]
     style = "bold green" if validation.passed else "bold red"
     return Group(*parts, Text(), Text(f"{validation.title}: {sentence(validation)}.", style=style))
 
 
 def _finding_lines(finding: ValidationFinding) -> Iterator[RenderableType]:
     mark = Text("  ok  ", style="green") if finding.ok else Text("  BAD ", style="bold red")
+    if finding.undecided:
+        mark = Text("  ??  ", style="yellow")
     told = Text.assemble((finding.name, "bold"), f": {finding.measured}")
     yield grid([GridColumn(), GridColumn(wraps=True)], [[mark, told]], gap=0)
     if not finding.ok:
@@ -84,22 +86,24 @@ def ratio_text(ours: float | None, theirs: float | None) -> str:
     return f"{ours / theirs:.3f}"
 
 
-def growths_table(growths: tuple[Growth, ...]) -> Table:
-    """Return a table of seconds by size with the fitted exponents."""
-    sizes = [f"{faces:,} faces" for faces in growths[0].faces]
+def growth_table(found: GrowthComparison) -> Table:
+    """Return a table of seconds by size with the exponents and their intervals."""
+    growths = (found.ours, *found.others)
+    sizes = [f"{faces:,} faces" for faces in found.ours.faces]
     rows = [
         [
             growth.what,
             *(f"{seconds:.4f}" for seconds in growth.seconds),
             f"{growth.exponent:.2f}",
-            f"{growth.low:.2f}-{growth.high:.2f}",
+            "-" if growth.low is None else f"{growth.low:.2f}-{growth.high:.2f}",
         ]
         for growth in growths
     ]
     columns = [
-        GridColumn(head, figures=True, wraps=True) for head in (*sizes, "exponent", "rounds")
+        GridColumn(head, figures=True, wraps=True) for head in (*sizes, "exponent", "interval")
     ]
-    return grid([*words("seconds"), *columns], rows)
+    seconds = "CPU seconds" if found.clock == "cpu" else "seconds"
+    return grid([*words(seconds), *columns], rows)
 
 
 def _number(value: float | None, form: str) -> str:

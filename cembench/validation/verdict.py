@@ -14,7 +14,7 @@ from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
 from cembench.validation.requirement import Requirement
-from cembench.validation.scaling import Growth
+from cembench.validation.scaling import GrowthAnswer, GrowthComparison
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
@@ -43,7 +43,8 @@ class Validation(BaseModel):
     #: Surfaces without a map, and the cause.
     no_map_on: dict[str, str] = {}
     against: tuple[BaselineComparison, ...] = ()
-    growths: tuple[Growth, ...] = ()
+    #: None if the stage was not reached, or the algorithm was not timed on two sizes.
+    growth: GrowthComparison | None = None
     #: Requirements that were asked for and are not met.
     unmet: tuple[Requirement, ...] = ()
     seconds: float = 0.0
@@ -82,6 +83,8 @@ def sentence(validation: Validation) -> str:
             if against.solve_time:
                 told += f", in the solve time of the external program ({against.solve_time})"
             parts.append(told)
+    if validation.growth is not None and validation.growth.answer is GrowthAnswer.cannot_tell:
+        parts.append("whether its seconds grow too steeply cannot be told")
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
     if validation.no_map_on:

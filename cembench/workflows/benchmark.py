@@ -212,7 +212,8 @@ def benchmark(
     rounds : int, optional
         Fixed number of rounds, instead of a precision; fewer than six give no interval.
     budget : float, optional
-        Seconds after which only the first seven rounds of each cell are completed; None: no limit.
+        Seconds that the run may take: the cheapest cells get their first seven rounds first, and
+        one round of each is always made. None: no limit.
     reference : str
         The algorithm with which the others are compared.
     out : path, optional

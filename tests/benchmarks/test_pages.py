@@ -1,7 +1,9 @@
 """Tables in pages come from records: what stands there is what the kept report says."""
 
+import re
 import shutil
 
+import numpy as np
 import pytest
 
 from benchmarks import readme_speedups
@@ -19,6 +21,36 @@ def test_another_report_gives_another_table(tmp_path):
     averages = tmp_path / "averages.csv"
     averages.write_text(averages.read_text().replace("15.944080083282037", "7.25"))
     assert "| QIEM | 8.5 | 6.8 | 7.2 |" in readme_speedups.table(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("report", "policy"), [("standard", "reuse"), ("paper", "reuse"), ("paper", "backslash")]
+)
+def test_the_rounds_of_the_records_give_the_averages_of_the_tables(report, policy):
+    folder = ROOT / "reports" / report
+    there = readme_speedups.averages(folder / "tables" / readme_speedups.POLICIES[policy])
+    for name in ("QIEM", "FDM", "LDM"):
+        found = readme_speedups.ratios(folder / "records.csv", name.lower(), policy)
+        figures = np.exp([np.median(np.log(one)) for one in found])
+        for reading, average in readme_speedups.AVERAGES.items():
+            assert average(figures) == pytest.approx(float(there[reading][f"{name} here"]))
+
+
+def test_averages_have_intervals_where_cells_have_six_rounds():
+    text = readme_speedups.table(ROOT / "reports/standard/tables")
+    lines = text.splitlines()
+    assert "backslash" not in lines[0]
+    for line in lines[2:]:
+        for cell in line.split("|")[4:6]:
+            figure, low, high = map(float, re.findall(r"[\d.]+", cell))
+            assert low <= figure <= high
+            assert low < high
+    assert "(" not in readme_speedups.table(ROOT / "reports/paper/tables")
+
+
+def test_a_report_without_averages_is_refused(tmp_path):
+    with pytest.raises(SystemExit, match=r"holds no averages\.csv"):
+        readme_speedups.table(tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -86,3 +86,12 @@ def test_variants_tried_on_fewer_surfaces_are_left_out_of_a_profile(tmp_path):
     more = replace(evidence, records=(*evidence.records, one.model_copy(update={"cell": cell})))
     assert len(more.disk_series) == len(evidence.disk_series) + 1
     assert {s.label for s in shown_series(more, "reuse")} == {s.label for s in evidence.disk_series}
+
+
+def test_the_head_says_how_many_times_are_unstable(evidence):
+    timed = sum(bool(record.outcome.rounds) for record in evidence.records)
+    assert f" of {timed} times " in findings(evidence, {}, []).sentence
+    assert (
+        " unstable (95 % interval wider than 10% of the figure)"
+        in findings(evidence, {}, []).sentence
+    )

@@ -13,6 +13,7 @@ from cembench.report.content.table_3 import table_3
 from cembench.report.content.table_4 import table_4
 from cembench.report.document import marked
 from cembench.results import paper
+from cembench.results.records import LinearAlgebraWork
 from tests.report.small_run import ok, record, write_run
 
 
@@ -140,6 +141,29 @@ def test_aggregates_run_over_what_was_measured_and_say_their_n(evidence):
     footer = by_name(table_2(evidence))["table-2"].rows[-1]
     assert footer[0].text == "n, surfaces counted"
     assert [v.number for v in footer[2:]] == [2, 1, 2, 2, 2, 2]
+
+
+def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
+    counts = {"cem": 2, "qiem": 16, "ldm": 4}
+
+    def counted(record):
+        if record.cell.algorithm not in counts:
+            return record
+        work = LinearAlgebraWork(
+            symbolic=1, numeric=counts[record.cell.algorithm], right_hand_sides=3
+        )
+        outcome = record.outcome.model_copy(update={"work": work})
+        return record.model_copy(update={"outcome": outcome})
+
+    plain = averages_table(evidence, "reuse")
+    assert not any("factorisations" in row[0].text for row in plain.rows)
+    known = Evidence(evidence.store, tuple(map(counted, evidence.records)), evidence.exhibits)
+    table = averages_table(known, "reuse")
+    (row,) = (row for row in table.rows if "factorisations" in row[0].text)
+    told = dict(zip([(c.group, c.title) for c in table.columns], row, strict=True))
+    assert told["QIEM", "here"].number == pytest.approx(8)
+    assert told["LDM", "here"].number == pytest.approx(2)
+    assert told["FDM", "here"].number is None
 
 
 def test_the_misprint_is_marked(evidence):

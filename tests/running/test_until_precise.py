@@ -8,13 +8,13 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.registry import load_registry
-from cembench.results.comparison import is_unstable, paired_ratios
+from cembench.results.comparison import compare, is_unstable, paired_ratios
 from cembench.results.records import Neighbours, Outcome, Round
 from cembench.results.store import Store
 from cembench.running import local
 from cembench.running.local import Options, Watcher, run_tasks
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.until_precise import affordable, cost, lack
+from cembench.running.until_precise import affordable, cheapest, cost, lack
 
 
 @pytest.fixture(autouse=True)
@@ -77,15 +77,101 @@ def test_what_is_precise_drops_out_and_the_reference_stays_beside_the_rest(tmp_p
     by_name = {record.cell.algorithm: record for record in records}
     assert len(paired_ratios(by_name["fdm"], by_name["cem"])) == 40
     assert not is_unstable(by_name["lscm"])
+    ended = {name: record.outcome.ended for name, record in by_name.items()}
+    assert ended == {"cem": "precise", "lscm": "precise", "fdm": "rounds"}
     assert noting.expected == len(noting.steps) == 3 + 87
     kernels = [r.kernel_seconds for r in by_name["cem"].outcome.rounds]
     assert kernels == [k / 1000 for k in range(1, 41)]
     assert [r.kernel_seconds for r in by_name["lscm"].outcome.rounds] == kernels[:7]
 
 
-def test_without_time_there_are_the_rounds_of_the_first_look(tmp_path):
+def test_without_time_each_cell_has_one_round(tmp_path):
     records = run_tasks(cells(), Store(tmp_path), Options(budget=0), None, Invented)
-    assert set(rounds_of(records).values()) == {7}
+    assert set(rounds_of(records).values()) == {1}
+    assert {record.outcome.ended for record in records} == {"budget"}
+
+
+class Clock:
+    """A simulated clock: only checks and timed processes take time."""
+
+    def __init__(self):
+        self.now = 1000.0
+
+    def __call__(self):
+        return self.now
+
+
+#: Seconds of a process: those of the quick profile's algorithms on small and on large surfaces.
+SECONDS = {"cem": 0.01, "fdm": 0.05, "ldm": 0.03, "qiem": 0.3}
+
+
+def timed_by(clock, scatter=0.02, size=lambda task: task.mesh.m / 100):
+    class Simulated(Invented):
+        def check(self, task):
+            clock.now += 1.0 + SECONDS[task.cell.algorithm] * size(task)
+            return super().check(task)
+
+        def time(self, task, checked):
+            call = SECONDS[task.cell.algorithm] * size(task)
+            clock.now += 0.3 + 2.2 * call * float(self.rng.lognormal(0, 0.2))
+            seconds = call * float(self.rng.lognormal(0, scatter))
+            return Round(calls=(seconds,), uv_hash="h")
+
+    return Simulated
+
+
+def many_cells(sizes=(100, 200, 300, 400, 500, 700, 900, 1200)):
+    chosen = [load_registry().algorithm(name) for name in ("cem", "fdm", "ldm", "qiem")]
+    settings = MeasurementSettings.until_precise(0.05)
+    meshes = [flat_disk(faces).renamed(f"disk-{faces}") for faces in sizes]
+    return plan_cells(chosen, meshes, {}, settings)
+
+
+@pytest.mark.parametrize(
+    ("budget", "scatter", "looked_at"),
+    [(60, 0.02, 0), (150, 0.02, 18), (250, 0.02, 28), (450, 0.02, 32), (600, 0.06, 32)],
+)
+def test_a_run_ends_near_its_budget(tmp_path, monkeypatch, budget, scatter, looked_at):
+    clock = Clock()
+    monkeypatch.setattr(local, "monotonic", clock)
+    began = clock.now
+    tasks = many_cells()
+    launcher = timed_by(clock, scatter)
+    records = run_tasks(tasks, Store(tmp_path), Options(budget=budget), None, launcher)
+    spent = clock.now - began
+    print(spent, [len(r.outcome.rounds) for r in records])
+    # The checks and one round of each cell take about 95 s, and seven rounds of all 375.
+    assert spent <= 1.25 * max(budget, 95)
+    early = [r for r in records if r.outcome.ended == "budget"]
+    if early:
+        assert spent >= 0.75 * budget
+    # The dearest have fewer rounds than the first look, and so no interval.
+    few = {r.cell.label for r in records if len(r.outcome.rounds) < 7}
+    assert all(compare(r, r).interval is None for r in records if r.cell.label in few)
+    price = {t.cell.label: SECONDS[t.cell.algorithm] * t.mesh.m for t in tasks}
+    cheap = [price[r.cell.label] for r in records if r.cell.label not in few]
+    assert len(cheap) >= looked_at
+    if few and cheap:
+        assert max(cheap) <= 2 * min(price[label] for label in few)
+    # Whoever has rounds has them side by side with the reference.
+    rounds = {r.cell.label: len(r.outcome.rounds) for r in records}
+    reference = {r.cell.mesh: rounds[r.cell.label] for r in records if r.cell.algorithm == "cem"}
+    assert all(rounds[r.cell.label] <= reference[r.cell.mesh] for r in records)
+
+
+def test_a_fixed_number_of_rounds_is_not_cut_by_the_budget(tmp_path):
+    chosen = [load_registry().algorithm("cem")]
+    tasks = plan_cells(chosen, [flat_disk(100)], {}, MeasurementSettings(repeats=6))
+    (record,) = run_tasks(tasks, Store(tmp_path), Options(budget=0), None, Invented)
+    assert (len(record.outcome.rounds), record.outcome.ended) == (6, None)
+
+
+def test_a_run_without_time_that_is_ended_goes_on_to_the_same(tmp_path):
+    with pytest.raises(KeyboardInterrupt):
+        run_tasks(cells(), Store(tmp_path), Options(budget=1e9), Noting(14), Invented)
+    records = run_tasks(cells(), Store(tmp_path), Options(budget=0), None, Invented)
+    assert sum(rounds_of(records).values()) in (11, 12)
+    assert {record.outcome.ended for record in records} == {"budget"}
 
 
 @pytest.mark.parametrize("end_at", [2, 12, 24, 26, 33])
@@ -137,6 +223,19 @@ def test_the_widest_go_on_first_and_pay_for_their_reference():
     assert cost(rounds(2.0)) > 4
 
 
+def test_before_the_first_look_the_cheapest_go_on_with_their_reference():
+    costs = {"dear": 20.0, "cheap": 2.0, "middle": 5.0, "cem": 4.0, "alone": 3.0}
+    partners = dict.fromkeys(("dear", "cheap", "middle"), "cem")
+    chosen = [cheapest(costs, partners, seconds) for seconds in (2, 6.5, 9.5, 15, 34)]
+    assert chosen == [
+        set(),
+        {"alone"},
+        {"alone", "cem", "cheap"},
+        {"alone", "cem", "cheap", "middle"},
+        set(costs),
+    ]
+
+
 @pytest.mark.parametrize(("again", "processes"), [(0, 7), (1, 14)])
 def test_a_process_beside_which_the_machine_was_busy_is_run_again(
     tmp_path, monkeypatch, again, processes
@@ -145,7 +244,7 @@ def test_a_process_beside_which_the_machine_was_busy_is_run_again(
     beside = iter([Neighbours(other_cores=1.0), Neighbours(other_cores=0.0)] * 20)
     monkeypatch.setattr(local, "neighbours", lambda *_: next(beside))
     monkeypatch.setattr(Invented, "time", _noting(Invented.time, timed))
-    options = Options(budget=0, repeat_busy=again)
+    options = Options(most_rounds=7, repeat_busy=again)
     (record,) = run_tasks(cells(["cem"]), Store(tmp_path), options, None, Invented)
     assert len(timed) == processes
     busy = [r.neighbours.busy for r in record.outcome.rounds]

@@ -41,4 +41,6 @@ class LauncherHere:
         measured = time_cell(task.algorithm, task.mesh, task.cell, checked)
         seconds = 1e-6 * task.mesh.m ** self.exponents.get(task.algorithm.name, 1.0)
         half = {"factorisation": seconds / 2, "other": seconds / 2}
-        return measured.model_copy(update={"calls": (seconds,), "phases": half})
+        return measured.model_copy(
+            update={"calls": (seconds,), "cpu_seconds": seconds, "phases": half}
+        )

@@ -42,6 +42,7 @@ def test_the_guide_shows_what_validate_prints(printed):
     for text in (printed, documented()):
         assert re.search(r"surface +faces +E_C ratio +mean ° ratio +seconds ratio\n", text)
         assert re.search(r"\ncem's factorisation +\d", text)
-        assert "ok growth of the seconds: seconds grow like faces^N" in shape(text)
+        assert "growth of the seconds: seconds grow like faces^N" in shape(text)
         assert "CEM by angles: valid; E_C " in shape(text)
+    assert "ok growth of the seconds: " in shape(printed)
     assert max(map(len, documented().splitlines())) <= 80

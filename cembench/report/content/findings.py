@@ -15,6 +15,7 @@ from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim, Figure, Finding, Findings
 from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
 from cembench.results.records import Record
+from cembench.results.stability import stability_words
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,7 @@ def findings(
         )
     )
     figures.append(_holding(claims) if claims else _ended(evidence))
+    sentence = f"{sentence} {stability_words(evidence.records)}"
     return Findings(sentence, tuple(figures), _picture(evidence, inspections, best.series.label))
 
 

@@ -167,13 +167,14 @@ class _ClusterRun:
         groups = grouped(pending)
         known = self.store.finished()
         software = software_of(self.environment) if self.same_environment else {}
+        costs = [sum(estimate(t.cell, t.facts.faces, known).seconds for t in g) for g in groups]
         share = self.options.budget
-        if share is not None:
-            share *= max(1, len(self.workers)) / len(groups)
-        options = Options(**{**vars(self.options), "budget": share})
+        if share is not None:  # of each second that is expected, so that no unit is cut more
+            share *= max(1, len(self.workers)) / sum(costs)
         found = []
-        for group in groups:
-            seconds = sum(estimate(t.cell, t.facts.faces, known).seconds for t in group)
+        for group, seconds in zip(groups, costs, strict=True):
+            budget = None if share is None else share * seconds
+            options = Options(**{**vars(self.options), "budget": budget})
             found.append(parcel(group, token, options, self.faces, software, seconds))
         return sorted(found, key=lambda one: -one.seconds)
 

@@ -8,6 +8,7 @@ from math import inf
 from cembench.report.content.evidence import ANGLE, Evidence, figure
 from cembench.report.content.many.success import records_of
 from cembench.report.document import Finding, Findings
+from cembench.results.stability import stability_words
 
 
 def many_findings(evidence: Evidence, policy: str) -> Findings | None:
@@ -40,6 +41,7 @@ def many_findings(evidence: Evidence, policy: str) -> Findings | None:
         figures.append(
             Finding(f"{error:.1f}°", f"the worst mean angle error of a valid map: {label}, {where}")
         )
+    sentence = f"{sentence} {stability_words(evidence.records)}".rstrip()
     return Findings(sentence, tuple(figures))
 
 

@@ -1,0 +1,63 @@
+"""How many times of a run are unstable, and why, in a sentence."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from cembench.results.comparison import UNSTABLE_WIDTH, is_unstable, seconds_interval
+from cembench.results.records import Ended, Record
+
+_ENDED: dict[Ended | None, str] = {
+    "budget": "the time was used up",
+    "rounds": "the maximum number of rounds was reached",
+    "precise": "a precision that allows it was asked for",
+    None: "their number of rounds was fixed",
+}
+#: A cell was measured beside other work if the machine was busy in this share of its rounds.
+_BUSY_SHARE = 0.25
+
+
+def stability_words(records: Sequence[Record]) -> str:
+    """Return how many times are unstable or have no interval, with what ended their cells.
+
+    Empty if nothing was timed. A time is unstable if its 95 % interval is wider than
+    :data:`~cembench.results.comparison.UNSTABLE_WIDTH` times the figure.
+    """
+    timed = [r for r in records if r.outcome.rounds]
+    if not timed:
+        return ""
+    unstable = [r for r in timed if is_unstable(r)]
+    without = [r for r in timed if seconds_interval(r) is None]
+    told = (
+        f"{len(unstable) or 'None'} of {len(timed)} {'time' if len(timed) == 1 else 'times'} "
+        f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "
+        f"{UNSTABLE_WIDTH:.0%} of the figure)"
+    )
+    if unstable:
+        told += f": {_why(unstable)}"
+        busy = sum(_is_beside_work(r) for r in unstable)
+        told += f"; {busy} of them measured beside other work" if busy else ""
+    if without:
+        has = "has" if len(without) == 1 else "have"
+        told += f". {len(without)} {has} too few rounds for an interval: {_why(without)}"
+    return f"{told}."
+
+
+def _why(records: Sequence[Record]) -> str:
+    counts = Counter(_reason(r) for r in records)
+    if len(counts) == 1:
+        return next(iter(counts))
+    return ", ".join(f"{count} as {reason}" for reason, count in counts.most_common())
+
+
+def _reason(record: Record) -> str:
+    if record.outcome.ended is None and record.cell.precision is not None:
+        return "the record is older and does not say why it ended"
+    return _ENDED[record.outcome.ended]
+
+
+def _is_beside_work(record: Record) -> bool:
+    rounds = record.outcome.rounds
+    busy = sum(bool(r.neighbours and r.neighbours.busy) for r in rounds)
+    return busy >= _BUSY_SHARE * len(rounds)
