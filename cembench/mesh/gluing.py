@@ -66,8 +66,8 @@ def partners(i: Indices, j: Indices) -> Indices:
 def _pair_opposite(i: Indices, j: Indices, found: Indices) -> None:
     """Enter in `found` most pairs of edges ij and ji, faster than by sorting.
 
-    An edge's place in a table is given by its lower vertex and the last bits of the other one; where
-    two have the same place, one is lost.
+    An edge's place in a table is given by its lower vertex and the last bits of the other one;
+    where two have the same place, one is lost.
     """
     up, down = np.flatnonzero(i < j), np.flatnonzero(i > j)
     if not len(up):
