@@ -20,12 +20,17 @@ from cembench.conformal.beltrami import (
 from cembench.conformal.doubling import DoubledSurface, doubled
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
-from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.harmonic import (
+    HarmonicExtension,
+    arc_length_circle,
+    harmonic_extension,
+)
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
 from cembench.conformal.planar import polygon_area, signed_areas
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
+from cembench.linear_algebra.cholesky import keeps_factors
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
@@ -70,25 +75,29 @@ def fdm(
     put in order, and patches around the folds are laid out again (`fold_repairs` counts the
     rounds). On meshes of a few hundred triangles, of which the held vertices are a large share, the
     iteration can diverge: the returned map is the iterate of the least mean abs(mu), and
-    `iterations_dropped` counts those after it, 0 elsewhere. `delaunay` takes the weights of the
-    intrinsic Delaunay triangulation in every solve whose matrix is the surface's own Laplacian: in
-    all but that of the reflected map.
+    `iterations_dropped` counts those after it, 0 elsewhere. The last solve of each iteration has
+    the matrix of the start: where factors are reused so is this one, which spares five of the
+    program's 13 factorisations; where they are not, its weights are computed from the map each
+    time. `delaunay` takes the weights of the intrinsic Delaunay triangulation in every solve whose
+    matrix is the surface's own Laplacian: in all but that of the reflected map.
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so there is nothing to correct")
     L = laplacian(mesh, delaunay=delaunay)
     own = L if delaunay else None
+    inside = HarmonicExtension(L, mesh.boundary)
+    shared = inside if delaunay or keeps_factors() else None
     double = doubled(mesh)
 
     def energy(z: Complex) -> float:
         return 0.5 * float(np.vdot(z, L @ z).real) - polygon_area(z[mesh.boundary])
 
-    z = _corrected_in_half_plane(mesh, _start(mesh, L), own, public_program)
+    z = _corrected_in_half_plane(mesh, _start(mesh, inside), own, public_program)
     mu = _coefficients(mesh, z)
     distortion, history = _mean_modulus(mu), [energy(z)]
     best, least, dropped = z, distortion, 0
     for _ in range(max_iterations):
-        z = _corrected_by_reflection(mesh, double, z, mu, own)
+        z = _corrected_by_reflection(mesh, double, z, mu, shared)
         mu = _coefficients(mesh, z)
         before, distortion = distortion, _mean_modulus(mu)
         history.append(energy(z))
@@ -113,11 +122,11 @@ def _mean_modulus(mu: Complex) -> float:
     return float(np.nan_to_num(np.abs(unfolded(mu)), nan=1.0).mean())
 
 
-def _start(mesh: DiskMesh, L: scipy.sparse.csc_array) -> Complex:
+def _start(mesh: DiskMesh, inside: HarmonicExtension) -> Complex:
     """Return the harmonic map that keeps arc length; with uniform weights if that one fails."""
     circle = arc_length_circle(mesh) * np.exp(2j * np.pi / 100)
     try:
-        z = harmonic_extension(L, mesh.boundary, circle)
+        z = inside(circle)
         if (signed_areas(z, mesh.F) > 0).all():
             return z
     except NotPositiveDefinite:
@@ -178,9 +187,12 @@ def _corrected_by_reflection(
     double: DoubledSurface,
     z: Complex,
     mu: Complex,
-    L: scipy.sparse.csc_array | None,
+    inside: HarmonicExtension | None,
 ) -> Complex:
-    """Solve on the map and its mirror image at once, then put the boundary on the circle."""
+    """Solve on the map and its mirror image at once, then put the boundary on the circle.
+
+    The second matrix is the surface's own Laplacian, whatever the map: `inside` solves with that.
+    """
     b = mesh.boundary
     both = np.empty(double.size, dtype=np.complex128)
     both[double.mirror] = _reflected(z)
@@ -200,8 +212,8 @@ def _corrected_by_reflection(
     modulus = np.abs(z[b])
     if not modulus.min() > 0:
         raise AlgorithmFailed("a boundary vertex is mapped to the centre")
-    if L is not None:
-        return harmonic_extension(L, b, z[b] / modulus)
+    if inside is not None:
+        return inside(z[b] / modulus)
     with phase("assembly"):
         weights = weights_of_map(z, mesh.F, _coefficients(mesh, z), mesh.V)
     return linear_beltrami_solver(mesh.F, weights, b, z[b] / modulus)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
-from cembench.conformal.boundary_energy import EnergyModel, in_gauge, minimise
+from cembench.conformal.boundary_energy import EnergyModel, Minimum, in_gauge, minimise
+from cembench.conformal.boundary_modes import estimated_energy
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.filled_start import arcs_of_measure
@@ -17,13 +20,22 @@ from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.interior_laplacian import InteriorLaplacian, solves_pay
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.quasi_newton import quasi_newton_minimum
 from cembench.core.clock import phase
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+#: The start and its name, the minimum, and the map for given boundary values.
+_Minimised = tuple[CircleDomain, str, Minimum, Callable[[Complex], Complex]]
+
+#: Arc length is no better a start than harmonic measure if its estimated energy is so many times
+#: the other one's, which is known.
+SURELY_MORE = 2
 
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
@@ -41,7 +53,10 @@ def direct_cem(
     E_C of the harmonic map (Eqs. 5, 7, 8) is a function of the boundary's angles alone,
     z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first and
     boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block.
-    Newton steps (trust region, preconditioned by S^-1) involve only the boundary.
+    Newton steps (trust region, preconditioned by S^-1) involve only the boundary. Where that block
+    would be dearer than a few solves, on boundaries of more than 2,000 vertices, the interior alone
+    is factored and the steps are quasi-Newton ones, a solve each (`hessian_products` is then 0);
+    the choice is an estimate of operations (`interior_laplacian.py`).
 
     Decided here: the weights are those of the intrinsic Delaunay triangulation, none of which is
     negative; with `delaunay` off they are the cotangents of the mesh's own edges, as in CEM. The
@@ -58,22 +73,21 @@ def direct_cem(
     `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`).
     """
     L = laplacian(mesh, delaunay=delaunay)
-    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
-    S = bordered.dirichlet_to_neumann()
     with phase("start"):
         middle = gauge_measure(mesh, "triangle", mesh.boundary)
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
-    seen, weights = bordered.swept_to_boundary(np.stack([middle, centred], axis=1)).T
-    start, begun = _start(mesh, S, seen, weights)
-    held = weights if gauge == "triangle" else start.outer_measure
-    found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
+        measures = np.stack([middle, centred], axis=1)
+    until = {"tolerance": tolerance, "max_iterations": max_iterations}
+    own_gauge = gauge == "triangle"
+    solved = _by_solves(mesh, L, measures, own_gauge, **until)
+    start, begun, found, extended = solved or _by_factor(mesh, L, measures, own_gauge, **until)
     energies = found.energies
     share = _share(back, energies) if begun == "harmonic measure" else 0.0
     here = found.model
     if share:
-        here = here.at(in_gauge(here.domain.towards(start, share), held))
+        here = here.at(in_gauge(here.domain.towards(start, share), here.weights))
         energies += (here.energy,)
-    uv = bordered.harmonic_extension(here.domain.points)
+    uv = extended(here.domain.points)
     uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
     extras = {
         "stopped": found.reason,
@@ -84,6 +98,41 @@ def direct_cem(
         **repair,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
+
+
+def _by_factor(
+    mesh: DiskMesh, L: scipy.sparse.csc_array, measures: Real, own_gauge: bool, **until: Any
+) -> _Minimised:
+    """Minimise with S in hand: the end of a factor that has the boundary last."""
+    bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
+    S = bordered.dirichlet_to_neumann()
+    seen, weights = bordered.swept_to_boundary(measures).T
+    start, begun = _start(mesh, S, seen, weights)
+    held = weights if own_gauge else start.outer_measure
+    found = minimise(S, start, held, **until)
+    return start, begun, found, bordered.harmonic_extension
+
+
+def _by_solves(
+    mesh: DiskMesh, L: scipy.sparse.csc_array, measures: Real, own_gauge: bool, **until: Any
+) -> _Minimised | None:
+    """Minimise with the interior factored alone; None where that is dearer or does not do."""
+    if not solves_pay(len(mesh.interior), len(mesh.boundary)):
+        return None
+    interior = InteriorLaplacian(mesh, L, mesh.boundary)
+    seen, weights = interior.swept_to_boundary(measures).T
+    lengths = edge_lengths(mesh, mesh.boundary)
+    start = in_gauge(CircleDomain.of_arcs(arcs_of_measure(seen, lengths)), weights)
+    held = weights if own_gauge else start.outer_measure
+    S = interior.dirichlet_to_neumann(start.arcs)
+    here = EnergyModel(S, in_gauge(start, held), held)
+    otherwise = in_gauge(CircleDomain.of_arcs(lengths), weights)
+    if estimated_energy(otherwise.points, start.arcs) < SURELY_MORE * here.energy:
+        return None  # arc length may be the better start
+    found = quasi_newton_minimum(here, **until)
+    if found is None:
+        return None
+    return start, "harmonic measure", found, interior.harmonic_extension
 
 
 def _share(cost: float, energies: tuple[float, ...]) -> float:

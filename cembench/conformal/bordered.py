@@ -135,7 +135,8 @@ class BorderedLaplacian:
         return np.append(found, 0.0)[-len(self.boundary) :]
 
     def solve_interior(self, rhs_i: NDArray[Any]) -> NDArray[Any]:
-        """Return f_i with L_ii f_i = rhs_i."""
+        """Return f_i with L_ii f_i = rhs_i; not in the ring's order."""
+        self._needs_all_inside("solve_interior")
         return self._whole.solve_leading(rhs_i)
 
     def dirichlet(self, f_b: Complex) -> Complex:
@@ -143,13 +144,26 @@ class BorderedLaplacian:
 
         By half a solve where the factor shows its trailing block.
         """
-        # Constants are harmonic: so the last vertex can be taken to 0 and back.
         if self._ringed:
             with phase("solves"):
                 return by_real_columns(self._ring_values, (f_b - f_b[-1])[:-1]) + f_b[-1]
         if self._whole.halves:
-            return self._whole.extended((f_b - f_b[-1])[:-1]) + f_b[-1]
+            return self._extended(f_b)
         return self.solve_interior(-(self._L_ib @ f_b))
+
+    def _extended(self, f: Complex) -> Complex:
+        """Return the harmonic values before f, which holds those of the last vertices in order."""
+        # Constants are harmonic: so the last vertex can be taken to 0 and back.
+        inside: Complex = self._whole.extended((f - f[-1])[:-1]) + f[-1]
+        return inside
+
+    def _needs_all_inside(self, what: str) -> None:
+        """Refuse what would take the other interior for all of it."""
+        if self._ringed:
+            raise ValueError(
+                f"{what} needs the whole interior before the boundary, but here the boundary's "
+                "neighbours come in between; construct BorderedLaplacian with iterations=0"
+            )
 
     @cached_property
     def _ring_triangles(self) -> tuple[Real, Real]:
@@ -165,8 +179,7 @@ class BorderedLaplacian:
     def completed(self, f_i: Complex, f_b: Complex) -> Complex:
         """The map (n,) of boundary values and what :meth:`dirichlet` gave for them."""
         if self._ringed:
-            near = np.concatenate([f_i, f_b[:-1]]) - f_b[-1]
-            f_i = np.concatenate([self._whole.extended(near) + f_b[-1], f_i])
+            f_i = np.concatenate([self._extended(np.concatenate([f_i, f_b])), f_i])
         return self.in_order(f_i, f_b)
 
     def conformal_energy(self, f_i: Complex, f_b: Complex) -> float:
@@ -179,14 +192,22 @@ class BorderedLaplacian:
             return dirichlet - polygon_area(f_b)
 
     def dirichlet_to_neumann(self) -> DirichletToNeumann:
-        """Return S = L_bb - L_bi L_ii^-1 L_ib, as its triangular factor or, if large, by solves."""
+        """Return S = L_bb - L_bi L_ii^-1 L_ib, as its triangular factor or, if large, by solves.
+
+        Not in the ring's order.
+        """
+        self._needs_all_inside("dirichlet_to_neumann")
         if len(self.boundary) > LARGEST_DENSE:
             return DirichletToNeumann(self._whole.schur_times, self._whole.schur_solved)
         return DirichletToNeumann.of_factor(self._whole.schur_factor())
 
     @cached_property
     def S(self) -> Real:
-        """S as a dense matrix (B, B): positive semi-definite, rows sum to zero."""
+        """S as a dense matrix (B, B): positive semi-definite, rows sum to zero.
+
+        Not in the ring's order.
+        """
+        self._needs_all_inside("S")
         C = self._whole.schur_factor()
         with phase("condensation"):
             pinned = C @ C.T
@@ -201,13 +222,16 @@ class BorderedLaplacian:
         """Return boundary weights that give every harmonic function the same mean as `measure`.
 
         `measure` is (n, k) with columns that sum to 1. The result (B, k) is its harmonic measure,
-        whose columns also sum to 1.
+        whose columns also sum to 1. Not in the ring's order.
         """
+        self._needs_all_inside("swept_to_boundary")
         weights = self._whole.condensed(measure[self._order][:-1])
         return np.concatenate([weights, 1 - weights.sum(axis=0, keepdims=True)])
 
     def harmonic_extension(self, f_b: Complex) -> Complex:
-        """Return the harmonic map (n,) with these boundary values, by half a solve."""
-        # Constants are harmonic, so the last vertex can be shifted to 0 and back.
-        f_i: Any = self._whole.extended((f_b - f_b[-1])[:-1]) + f_b[-1]
-        return self.in_order(f_i, f_b)
+        """Return the harmonic map (n,) with these boundary values, by half a solve.
+
+        Not in the ring's order, where :meth:`completed` gives it.
+        """
+        self._needs_all_inside("harmonic_extension")
+        return self.in_order(self._extended(f_b), f_b)

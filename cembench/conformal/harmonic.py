@@ -84,15 +84,35 @@ def harmonic_extension(
     True
 
     """
-    n = L.shape[0]
-    f = np.zeros(n, dtype=values.dtype)
-    f[fixed] = values
-    free = np.ones(n, dtype=bool)
-    free[fixed] = False
-    i = np.flatnonzero(free)
-    if len(i):
-        with phase("assembly"):
-            rows = by_rows(L)[i]
-            L_ii, right = rows[:, i], -(rows[:, fixed] @ f[fixed])
-        f[i] = Cholesky(L_ii).solve(right)
-    return f
+    return HarmonicExtension(L, fixed)(values)
+
+
+class HarmonicExtension:
+    """Harmonic maps for L whose values at the same vertices are given, time and again (Eq. 10).
+
+    Under "reuse" the first one factors the rest's block of L, and the factor is kept. Arguments and
+    errors as for :func:`harmonic_extension`.
+    """
+
+    def __init__(self, L: scipy.sparse.csc_array, fixed: NDArray[np.int64]) -> None:
+        self._L, self._fixed = L, fixed
+        free = np.ones(L.shape[0], dtype=bool)
+        free[fixed] = False
+        self._free = np.flatnonzero(free)
+        self._factor: Cholesky | None = None
+
+    def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return the harmonic map with these values at the fixed vertices."""
+        i, fixed = self._free, self._fixed
+        f = np.zeros(self._L.shape[0], dtype=values.dtype)
+        f[fixed] = values
+        if len(i):
+            with phase("assembly"):
+                rows = by_rows(self._L)[i]
+                right = -(rows[:, fixed] @ f[fixed])
+                block = rows[:, i] if self._factor is None else None
+            if block is not None:
+                self._factor = Cholesky(block)
+            assert self._factor is not None
+            f[i] = self._factor.solve(right)
+        return f

@@ -21,6 +21,8 @@ Indices = NDArray[np.int64]
 
 #: An edge is not Delaunay if its cotangents sum to less than minus this share of their size.
 ROUNDING = 1e-10
+#: The corner after each one of a triangle, and round again.
+NEXT = np.array([1, 2, 0, 1])
 #: Maximal rounds of flips; a real surface takes about ten.
 MOST_ROUNDS = 1000
 
@@ -70,18 +72,19 @@ class _Corners:
         self.vertex: Indices = F.flatten()
         self.length: Real = lengths.flatten()
         self.weight: Real = weights.flatten()
-        self.twin = partners(F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel())
+        self.twin = partners(*(F.take(c, axis=1).ravel() for c in ((1, 2, 0), (2, 0, 1))))
         self._apart = Independence(len(F))
         self._moved_to = np.empty(F.size, dtype=np.int64)
 
     def not_delaunay(self, corners: Indices) -> Indices:
         """Return the corners whose edge is not Delaunay, the lower one of each edge's two."""
-        twins = self.twin[corners]
+        twins = self.twin.take(corners)
         inside = twins >= 0
         corners, twins = corners[inside], twins[inside]
-        one, other = self.weight[corners], self.weight[twins]
+        one, other = self.weight.take(corners), self.weight.take(twins)
         wrong = one + other < -ROUNDING * (np.abs(one) + np.abs(other))
-        wrong &= corners // 3 != twins // 3  # such an edge cannot be flipped
+        corners, twins = corners[wrong], twins[wrong]
+        wrong = corners // 3 != twins // 3  # such an edge cannot be flipped
         lower = np.sort(np.minimum(corners, twins)[wrong], kind="stable")
         return lower[np.diff(lower, prepend=-1) > 0]
 
@@ -94,39 +97,46 @@ class _Corners:
 
         Edge ij becomes kh: the triangles become (k, i, h) and (h, j, k).
         """
-        k, h = corners, self.twin[corners]
-        (i, j), (j2, i2) = _following(k), _following(h)
-        s, t = 3 * (k // 3), 3 * (h // 3)
-        diagonal = distance_across(*(self.length[x] for x in (k, j, i, j2, i2)))
-        triangles = self.vertex[np.stack([[k, i, h], [h, j, k]])]
-        # Outer edges ih, ki, jk and hj: where they are, and where they go.
-        old, new = np.concatenate([j2, j, i, i2]), np.concatenate([s, s + 2, t, t + 2])
-        lengths, partners = self.length[old], self.twin[old]
+        k, h = corners, self.twin.take(corners)
+        (s, i, j), (t, j2, i2) = _following(k), _following(h)
+        # Outer edges ih, jk, ki and hj: where they are, and where they go.
+        old, new = np.concatenate([j2, i, j, i2]), np.concatenate([s, t, s + 2, t + 2])
+        lengths, partners = self.length.take(old), self.twin.take(old)
+        ih, jk, ki, hj = lengths.reshape(4, -1)
+        diagonal = distance_across(self.length.take(k), ki, jk, ih, hj)
+        at_k, at_h, at_i, at_j = (self.vertex.take(x) for x in (k, h, i, j))
         self._moved_to[partners] = partners
         self._moved_to[old] = new
-        partners = np.where(partners >= 0, self._moved_to[partners], -1)
-        self.length[new], self.twin[new] = lengths, partners
-        self.twin[partners[partners >= 0]] = new[partners >= 0]
-        self.length[s + 1] = self.length[t + 1] = diagonal
+        partners = np.where(partners >= 0, self._moved_to.take(partners), -1)
+        inside = partners >= 0
+        self.twin[new] = partners
+        self.twin[partners[inside]] = new[inside]
         self.twin[s + 1], self.twin[t + 1] = t + 1, s + 1
-        changed = np.concatenate([s, t])[:, None] + np.arange(3)
-        self.vertex[changed] = np.concatenate(triangles, axis=1).T
-        self.weight[changed] = half_cotangents_of_sides(self.length[changed])
+        first = new[: 2 * len(k)]
+        sides = lengths[: 2 * len(k)], np.tile(diagonal, 2), lengths[2 * len(k) :]
+        vertices = (at_k, at_h), (at_i, at_j), (at_h, at_k)
+        for c, weight in enumerate(_half_cotangents(*sides)):
+            self.vertex[first + c] = np.concatenate(vertices[c])
+            self.length[first + c], self.weight[first + c] = sides[c], weight
         return new
 
 
 def half_cotangents_of_sides(lengths: Real) -> Real:
     """Return half the cotangent (m, 3) of the angle opposite to each edge length (m, 3)."""
-    area = area_of_sides(*lengths.T)
-    found = np.empty_like(lengths)
-    for c in range(3):
-        x, y, z = lengths[:, c], lengths[:, c - 2], lengths[:, c - 1]
-        found[:, c] = y * y + (z - x) * (z + x)
+    return np.stack(_half_cotangents(*lengths.T), axis=1)
+
+
+def _half_cotangents(a: Real, b: Real, c: Real) -> list[Real]:
+    """Return half the cotangents opposite to the sides a, b, c (m,) each."""
+    eightfold = 8 * area_of_sides(a, b, c)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return found / (8 * area[:, None])
+        return [
+            (y * y + (z - x) * (z + x)) / eightfold for x, y, z in ((a, b, c), (b, c, a), (c, a, b))
+        ]
 
 
-def _following(corner: Indices) -> tuple[Indices, Indices]:
-    """Return the next two corners of the same triangle."""
-    first = corner - corner % 3
-    return first + (corner + 1) % 3, first + (corner + 2) % 3
+def _following(corner: Indices) -> tuple[Indices, Indices, Indices]:
+    """Return the first corner of the same triangle, and the two that follow this one."""
+    place = corner % 3
+    first = corner - place
+    return first, first + NEXT.take(place), first + NEXT.take(place + 1)

@@ -68,7 +68,7 @@ def laplacian_of_weights(
     The weights of the two triangles of an edge are added.
     """
     F = F.astype(np.int32 if n < 2**31 else np.int64)  # as SciPy will have them
-    i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
+    i, j = (F.take(c, axis=1).ravel() for c in ((1, 2, 0), (2, 0, 1)))  # faster than F[:, c]
     one_way = scipy.sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
     # Symmetric to the last bit, so its rows are its columns.

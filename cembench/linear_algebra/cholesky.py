@@ -113,6 +113,11 @@ def _names(kind: Any) -> str:
     return ", ".join(repr(name) for name in get_args(kind))
 
 
+def keeps_factors() -> bool:
+    """Whether a factor serves all solves here, so that a further solve is cheap."""
+    return _current.get().solves == "reuse"
+
+
 def shows_trailing_block() -> bool:
     """Whether factors show their trailing block here, so that solves can be halved."""
     how = _current.get()

@@ -8,10 +8,16 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.beltrami import beltrami_coefficients
 from cembench.conformal.doubling import doubled
-from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
+from cembench.conformal.harmonic import (
+    HarmonicExtension,
+    arc_length_circle,
+    harmonic_extension,
+)
 from cembench.conformal.laplacian import laplacian, non_delaunay_share
 from cembench.conformal.metrics import all_metrics
 from cembench.conformal.planar import signed_areas
+from cembench.linear_algebra.cholesky import linear_algebra
+from cembench.linear_algebra.work import counting
 from cembench.mesh.files import read_mesh
 from tests import gallery
 from tests.real_meshes import real_mesh
@@ -64,7 +70,8 @@ def test_a_start_that_folds_gives_way_to_uniform_weights():
     L = laplacian(mesh)
     folded = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))
     assert (signed_areas(folded, mesh.F) < 0).any()
-    assert (signed_areas(module._start(mesh, L), mesh.F) > 0).all()
+    inside = HarmonicExtension(L, mesh.boundary)
+    assert (signed_areas(module._start(mesh, inside), mesh.F) > 0).all()
 
 
 def test_folds_are_repaired():
@@ -120,3 +127,16 @@ def test_delaunay_weights_are_nearer_to_the_surface_where_its_edges_are_not_dela
     ]
     assert errors[0] < 1.05 * errors[1]
     assert errors[0] != errors[1]
+
+
+def test_the_five_last_solves_share_the_factor_of_the_start_where_factors_are_reused():
+    mesh = hemi_ellipsoid(3000)
+    found, work = {}, {}
+    for solves in ("reuse", "backslash"):
+        with linear_algebra(solves), counting() as work[solves]:
+            found[solves] = fdm(mesh, tolerance=0)
+    assert found["reuse"].iterations == 5
+    # The start, two in the half plane, and two in each iteration; the paper's program has 13.
+    assert [work[solves].numeric for solves in ("reuse", "backslash")] == [8, 13]
+    assert work["reuse"].right_hand_sides == work["backslash"].right_hand_sides
+    assert abs(found["reuse"].uv - found["backslash"].uv).max() < 1e-11

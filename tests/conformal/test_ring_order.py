@@ -102,3 +102,25 @@ def test_backslash_factors_for_every_solve_as_before():
         assert cem(mesh, tolerance=0, max_iterations=k).iterations == k
     assert work.numeric == 1 + (k + 1) + k
     assert work.right_hand_sides == 2 * work.numeric
+
+
+def bordered_laplacian(mesh, iterations):
+    return BorderedLaplacian(mesh, laplacian(mesh), (mesh.boundary,), iterations=iterations)
+
+
+@pytest.mark.parametrize("ring", [True], indirect=True)
+@pytest.mark.parametrize(
+    ("name", "use"),
+    [
+        ("solve_interior", lambda it, mesh: it.solve_interior(np.ones(len(mesh.interior)))),
+        ("dirichlet_to_neumann", lambda it, mesh: it.dirichlet_to_neumann()),
+        ("S", lambda it, mesh: it.S),
+        ("swept_to_boundary", lambda it, mesh: it.swept_to_boundary(np.ones((mesh.n, 1)))),
+        ("harmonic_extension", lambda it, mesh: it.harmonic_extension(mesh.boundary * 1j)),
+    ],
+)
+def test_what_needs_the_whole_interior_first_is_refused_in_the_ring_order(ring, name, use):
+    mesh = hemi_ellipsoid(600)
+    with pytest.raises(ValueError, match=f"{name} needs the whole interior.*iterations=0"):
+        use(bordered_laplacian(mesh, 5), mesh)
+    use(bordered_laplacian(mesh, 0), mesh)

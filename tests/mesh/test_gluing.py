@@ -1,7 +1,8 @@
 import numpy as np
+import pytest
 
-from cembench.mesh import topology
-from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
+from cembench.mesh import gluing, topology
+from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges, partners
 from tests import gallery
 
 
@@ -35,3 +36,26 @@ def test_a_vertex_of_two_fans_becomes_two():
     split, origin = glue(F, paired_half_edges(edge, faces), len(V))
     assert origin.tolist() == [0, 1, 2, 3, 4, 0]
     assert topology.components(split, 6)[0] == 2
+
+
+@pytest.mark.parametrize("slots", [1, 8])
+@pytest.mark.parametrize("some_turned", [False, True])
+def test_partners_have_the_same_ends_however_full_the_table_is(monkeypatch, slots, some_turned):
+    monkeypatch.setattr(gluing, "SLOTS", slots)
+    edges = np.random.default_rng(0).permutation(topology.half_edges(gallery.three_holes(300).F))
+    if some_turned:
+        edges[::3] = edges[::3, ::-1]
+    found = partners(*edges.T)
+    ends = [frozenset(edge) for edge in edges.tolist()]
+    others = {}
+    for k, edge in enumerate(ends):
+        others.setdefault(edge, []).append(k)
+    expected = [
+        sum(others[edge]) - k if len(others[edge]) == 2 else -1 for k, edge in enumerate(ends)
+    ]
+    np.testing.assert_array_equal(found, expected)
+
+
+def test_no_edges_have_no_partners():
+    none = np.empty(0, dtype=np.int64)
+    assert len(partners(none, none)) == 0

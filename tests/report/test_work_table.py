@@ -53,3 +53,40 @@ def test_counts_stand_by_surface_and_ratios_to_cem_below(counted):
 
 def test_there_is_no_table_where_nothing_was_counted(evidence):
     assert work_tables(evidence) == []
+
+
+def only_reuse(counted):
+    kept = tuple(r for r in counted.records if r.cell.solves == "reuse")
+    return Evidence(counted.store, kept, ())
+
+
+def with_cem_under_backslash(counted):
+    """The counted run, and CEM's cells once more under backslash: twice the work and the time."""
+
+    def anew(record):
+        work = record.outcome.work.model_copy(update={"numeric": 5, "right_hand_sides": 40.0})
+        slower = tuple(
+            r.model_copy(update={"calls": tuple(2 * s for s in r.calls)})
+            for r in record.outcome.rounds
+        )
+        outcome = record.outcome.model_copy(update={"work": work, "rounds": slower})
+        cell = record.cell.model_copy(update={"solves": "backslash"})
+        return record.model_copy(update={"cell": cell, "outcome": outcome})
+
+    records = only_reuse(counted).records
+    more = [anew(r) for r in records if r.cell.algorithm == "cem" and r.outcome.work]
+    return Evidence(counted.store, (*records, *more), ())
+
+
+def test_one_sentence_tells_how_much_of_the_lead_is_cems_own_order_of_work(counted):
+    (note, _) = work_tables(with_cem_under_backslash(counted))[0].notes
+    assert "leaves it 25 % of the right-hand sides" in note
+    assert "reuse 20 % of the factorisations" in note
+    assert "take 50 % of the seconds" in note
+    assert "n = 2" in note
+
+
+def test_a_run_with_one_policy_says_that_it_cannot_tell(counted):
+    note, qiem = work_tables(only_reuse(counted))[0].notes
+    assert "only a run with both policies tells: --solves reuse,backslash" in note
+    assert "this suite decides" in qiem

@@ -1,0 +1,159 @@
+"""A Laplacian whose interior alone is factored: what the boundary needs of it takes solves.
+
+With the boundary last in the order, as in :mod:`cembench.conformal.bordered`, a factor ends in a
+dense triangle, and before it the boundary's rows fill. On long boundaries that costs more than the
+interior's own factor and the few solves that replace it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from cembench.conformal.boundary_modes import InverseByModes
+from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.conformal.laplacian import by_rows
+from cembench.conformal.ring_order import ENTRIES, OPERATIONS_AN_ENTRY
+from cembench.core.clock import phase
+from cembench.linear_algebra.cholesky import Cholesky, keeps_factors
+from cembench.linear_algebra.lower_triangle import permuted_lower
+from cembench.mesh.triangle_mesh import TriangleMesh
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Shorter boundaries are always kept last: their dense triangle is small, and serves any step.
+LEAST_BOUNDARY = 2_000
+#: The boundary's rows of a factor take so many operations, times B^2 sqrt(n): the separators that
+#: they meet have about sqrt(n) vertices.
+ROWS = 4.7
+#: Triangles of the factor passed with two columns, more than with the boundary last: 1 for harmonic
+#: measure, 2 for the start, 6 for three steps, where the boundary's order needs 2 in all.
+PASSES = 7
+#: What is spared must be worth so many times what is added: an estimate can fail.
+MARGIN = 1.5
+#: Boundaries that are multiples of each other, up to this relative deviation, have one solve.
+ALIKE = 1e-11
+#: How many harmonic maps are kept.
+KEPT = 8
+
+
+def solves_pay(interior: int, boundary: int) -> bool:
+    """Return whether solves with L_ii are cheaper than a factor with the boundary last.
+
+    That factor takes about B^3 / 3 + 4.7 B^2 sqrt(n) operations more for n interior and B boundary
+    vertices. The solves pass :data:`PASSES` triangles more, of 4.5 n log2(n) entries each, and an
+    entry is worth :data:`OPERATIONS_AN_ENTRY` operations.
+
+    Parameters
+    ----------
+    interior, boundary : int
+        Numbers of vertices.
+
+    Examples
+    --------
+    >>> solves_pay(550_053, 2_976)
+    True
+    >>> solves_pay(1_100_000, 1_960)
+    False
+
+    """
+    if boundary <= LEAST_BOUNDARY or interior < 2 or not keeps_factors():
+        return False
+    spared = boundary**3 / 3 + ROWS * boundary**2 * math.sqrt(interior)
+    added = PASSES * ENTRIES * interior * math.log2(interior) * OPERATIONS_AN_ENTRY
+    return spared > MARGIN * added
+
+
+class InteriorLaplacian:
+    """L_ii, factored in its own fill-reducing order, beside the boundary's rows of L.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface, with an interior vertex.
+    L : sparse (n, n)
+        Its Laplacian.
+    boundary : int64 (B,)
+        Its boundary, in the order wanted.
+
+    Raises
+    ------
+    NotPositiveDefinite
+        L_ii is not positive definite.
+
+    """
+
+    def __init__(
+        self, mesh: TriangleMesh, L: scipy.sparse.csc_array, boundary: NDArray[np.int64]
+    ) -> None:
+        self.interior, self.boundary = mesh.interior, boundary
+        with phase("assembly"):
+            rows = by_rows(L)
+            own = permuted_lower(rows, self.interior)
+            of_boundary = rows[boundary]
+            self.L_bb = scipy.sparse.csc_array(of_boundary[:, boundary])
+            self._L_bi = of_boundary[:, self.interior]
+            self._L_ib = scipy.sparse.csr_array(self._L_bi.T)
+        self._factor = Cholesky(own, lower=True)
+        self._maps: list[tuple[Complex, Complex]] = []
+
+    def swept_to_boundary(self, measure: Real) -> Real:
+        """Return the harmonic measure (B, k) of `measure` (n, k), by a solve for its inside."""
+        found, inside = measure[self.boundary], measure[self.interior]
+        some = inside.any(axis=0)
+        if some.any():
+            found[:, some] -= self._L_bi @ self._factor.solve(inside[:, some])
+        return found
+
+    def harmonic(self, f_b: Complex) -> Complex:
+        """Return the interior values with L_ii f_i = -L_ib f_b (Eq. 22).
+
+        A boundary that is a complex multiple of an earlier one takes no solve.
+        """
+        for known, inside in self._maps:
+            turn = np.vdot(known, f_b) / np.vdot(known, known)
+            if np.abs(f_b - turn * known).max() <= ALIKE * np.abs(f_b).max():
+                return np.asarray(turn * inside)
+        with phase("assembly"):
+            right = -(self._L_ib @ f_b)
+        found: Complex = self._factor.solve(right)
+        self._maps = [(f_b, found), *self._maps[: KEPT - 1]]
+        return found
+
+    def harmonic_extension(self, f_b: Complex) -> Complex:
+        """Return the harmonic map (n,) with these boundary values."""
+        f = np.empty(len(self.interior) + len(self.boundary), dtype=np.complex128)
+        f[self.boundary], f[self.interior] = f_b, self.harmonic(f_b)
+        return f
+
+    def dirichlet_to_neumann(self, arcs: Real) -> DirichletToNeumann:
+        """Return S, whose products take a solve each, with an approximate inverse without any.
+
+        `arcs` (B,) are the boundary's harmonic measure, in radians.
+        """
+        return _BySolves(self, InverseByModes(arcs, self.L_bb))
+
+    def product(self, f: Complex) -> Complex:
+        """Return S f for f (B,)."""
+        return np.asarray(self.L_bb @ f + self._L_bi @ self.harmonic(f))
+
+
+class _BySolves(DirichletToNeumann):
+    """S by solves with L_ii, and an inverse good enough to precondition."""
+
+    def __init__(self, laplacian: InteriorLaplacian, inverse: InverseByModes) -> None:
+        self._laplacian, self._near = laplacian, inverse
+
+    def __call__(self, f: NDArray[Any]) -> NDArray[Any]:
+        return self._laplacian.product(f)
+
+    def inverse(self, g: Real) -> Real:
+        columns = g.reshape(len(g), -1)
+        total = columns.sum(axis=0)
+        x = self._near(columns - total / len(g))
+        return (x - x.mean(axis=0) + total).reshape(g.shape)
