@@ -231,9 +231,9 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
             "Dirichlet energy": f"{row['dirichlet_energy']:.4f}",
             "dilatation": "not finite: a triangle has almost no area"
             if row["dilatation_max"] is None
-            else f"{row['dilatation_mean']:.2f} in the mean, {row['dilatation_max']:.1f} at most",
+            else f"mean {row['dilatation_mean']:.2f}, maximum {row['dilatation_max']:.1f}",
             "folded triangles": f"{row['flipped_triangles']}",
-            "distance": f"{row['distance_mean_edges']:.3f} mean edges in the mean, "
+            "distance": f"{row['distance_mean_edges']:.3f} mean edges on average, "
             f"{row['hausdorff_edges']:.2f} at most",
         }
         for name, words in lines.items():

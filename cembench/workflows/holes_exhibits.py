@@ -132,9 +132,9 @@ def _lay_down_pictures(
         "flipped_triangles": metrics["flipped_triangles"],
     }
     caption = (
-        f"E_C {metrics['conformal_energy']:.4f}   angles off by "
-        f"{metrics['angle_error_mean_deg']:.2f} degrees in the mean   "
-        f"holes off circles by {metrics['boundary_circularity']:.1g}   "
+        f"E_C {metrics['conformal_energy']:.4f}   "
+        f"mean angle error {metrics['angle_error_mean_deg']:.2f} degrees   "
+        f"circularity error {metrics['boundary_circularity']:.1g}   "
         f"{metrics['flipped_triangles']} folds"
     )
     name = f"koebe-map-{mesh.name}"
@@ -221,8 +221,8 @@ _TABLE = (
     ("algorithm", "algorithm"),
     ("sweeps", "sweeps"),
     ("E_C", "conformal_energy"),
-    ("mean", "angle_error_mean_deg"),
-    ("SD", "angle_error_sd_deg"),
+    ("angle°", "angle_error_mean_deg"),
+    ("SD°", "angle_error_sd_deg"),
     ("circularity", "boundary_circularity"),
     ("before rounding", "circularity_before_rounding"),
     ("folds", "flipped_triangles"),
@@ -239,8 +239,9 @@ def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -
         columns=tuple(title for title, _ in _TABLE),
         rows=tuple(tuple(row.get(key) for _, key in _TABLE) for row in rows),
         notes=(
-            "Mean and SD are of the angles' errors in degrees; circularity is the largest "
-            "distance of a boundary from its fitted circle, in radii; seconds are of one call.",
+            "angle° and SD° are the mean and the standard deviation of the angle errors in "
+            "degrees; circularity is the largest distance of a boundary's image from its fitted "
+            "circle, relative to the radius; seconds are those of one call.",
         ),
     )
     standing = {row["mesh"] for row in rows} <= {STAND_IN}

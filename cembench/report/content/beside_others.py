@@ -39,7 +39,7 @@ def beside_others(evidence: Evidence) -> Table | None:
             Column("algorithm", numeric=False),
             Column("status", numeric=False),
             Column("E_C / A"),
-            Column("mean°"),
+            Column("angle°"),
             Column("folds"),
             Column("islands"),
             Column("call", "seconds"),

@@ -117,7 +117,7 @@ def _about(series: AlgorithmSeries, record: Record) -> str:
     metrics = record.outcome.metrics
     error, folds = metrics.get("angle_error_mean_deg"), metrics.get("flipped_triangles")
     target = "" if series.target == DISK else f" (not a map to the disk: {series.target})"
-    off = "" if error is None else f"; angles off by {error:.2f} degrees in the mean"
+    off = "" if error is None else f"; mean angle error {error:.2f} degrees"
     return f"{series.label}{target}{off}; {folds} folded triangles."
 
 

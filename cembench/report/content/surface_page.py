@@ -116,12 +116,13 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
         f"{surface.title}: all figures",
         tuple(columns),
         tuple(rows),
-        "Seconds are the median of the rounds, ±% is half the width of its 95 % interval; "
-        "dilatation is the ratio of the largest to the smallest stretch of a triangle, its mean "
-        "and its maximum; |mu| is the modulus of the Beltrami coefficient, with its mean by the "
-        "surface's area. E_C of a disk changes under Moebius maps: 'E_C, gauge' is that of the "
-        "image whose mean by area is 0, and can be compared between methods, like area SD, the "
-        "standard deviation of log area ratios (for disks, in that gauge). Memory is the increase "
+        "Seconds are the median of the rounds, and ±% is half the width of its 95 % interval. "
+        "angle° and SD° are the mean and the standard deviation of the angle errors in degrees. K "
+        "is the dilatation: the ratio of a triangle's largest to its smallest stretch. |mu| is the "
+        "modulus of the Beltrami coefficient, averaged over the surface's area. E_C of a disk map "
+        "changes under Moebius maps of the disk. 'E_C, gauge' is E_C in the common gauge, with the "
+        "area-weighted mean at 0; compare that one between methods. area SD is the standard "
+        "deviation of log area ratios, for disk maps in the same gauge. Memory is the increase "
         "during the call.",
         tuple(dict.fromkeys(causes)),
     )

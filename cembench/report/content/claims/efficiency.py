@@ -128,7 +128,7 @@ def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
         lambda algorithm, rates: saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm],
         lambda rates: (
             f"{percent(saving_of_mean(rates))} of the mean rate, "
-            f"{percent(mean_saving(rates))} in the mean"
+            f"{percent(mean_saving(rates))} on average"
         ),
     )
     return Claim(
