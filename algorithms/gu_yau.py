@@ -71,8 +71,8 @@ def gu_yau(
     diagonal = L_double.diagonal()
     if not diagonal.min() > 0:
         raise AlgorithmFailed(
-            f"{int((diagonal <= 0).sum())} vertices have no positive diagonal in the Laplacian, so "
-            "explicit steps are not stable; delaunay=true gives one"
+            f"{int((diagonal <= 0).sum())} vertices have a nonpositive diagonal entry in the "
+            "Laplacian, so explicit steps are unstable; delaunay=true makes it positive"
         )
     dt = SHARE / diagonal[:, None]
     with phase("diffusion"):

@@ -111,7 +111,7 @@ def _flow(
             if len(energies) > 1:
                 return S, energies
             raise AlgorithmFailed(
-                "the heat flow cannot leave its start: every time step down to "
+                "the heat flow cannot start: every time step down to "
                 f"{LEAST:g} raises the energy, {energies[0]:.6g}"
             )
         S, LS, dt = trial, L_trial, GROWTH * dt
@@ -177,5 +177,5 @@ def boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
         z = np.conj(z)
     modulus = np.abs(z)
     if not (np.isfinite(modulus).all() and modulus.min() > 0):
-        raise AlgorithmFailed("the boundary's image on the sphere is not a curve with an inside")
+        raise AlgorithmFailed("the boundary's image on the sphere is not a simple closed curve")
     return z / modulus

@@ -87,8 +87,8 @@ def _circular(
         u = yamabe.scale(_turns(domain.arcs))
         if not np.ptp(u) <= np.log(CROWDED):
             raise AlgorithmFailed(
-                f"the boundary is too crowded: in sweep {sweep} its scale differs by a factor of "
-                f"exp({np.ptp(u):.3g}) between its vertices, beyond what numbers can hold. "
+                f"the boundary is too crowded: in sweep {sweep} the scale varies by a factor of "
+                f"exp({np.ptp(u):.3g}) between its vertices, beyond the range of doubles. "
                 "Use direct-cem, which keeps vertices apart"
             )
         before, domain = domain, in_gauge(CircleDomain.of_arcs(yamabe.scaled(u)), weights)

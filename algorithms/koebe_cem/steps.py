@@ -253,8 +253,8 @@ def _outside_in(uv: Complex, loop: Loop) -> Complex:
     away = uv - uv[loop].mean()
     if not np.abs(away).min() > 0:
         raise AlgorithmFailed(
-            f"the boundary of vertex {int(loop.min())} has a vertex at its own centroid, "
-            "at which the image is inverted"
+            f"the boundary of vertex {int(loop.min())} has a vertex at its own centroid, the "
+            "centre of the inversion"
         )
     return 1 / away
 
@@ -286,7 +286,7 @@ def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> sparse.csc_array:
         L = cotangent_laplacian(points, F)
     if not np.isfinite(L.data).all():
         raise AlgorithmFailed(
-            "a triangle has collapsed in the image, so the plane gives it no weights; take those "
+            "a triangle has collapsed in the image, so it has no weights in the plane; use those "
             "of the surface (weights=surface)"
         )
     return L

@@ -76,7 +76,7 @@ def measure(
     from cembench.running.cluster.connect import connected
 
     with resumable(), progress_on(err, len(tasks), on_cluster=True) as progress:
-        progress.tells("starting workers" if where.kind != "address" else "connecting")
+        progress.shows("starting workers" if where.kind != "address" else "connecting")
         with connected(where) as client:
             return run_on_cluster(
                 tasks,

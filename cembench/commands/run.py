@@ -269,8 +269,8 @@ def merge(
         _show_conflicts(found.conflicts, output)
     if len(used) > 1:
         warn(
-            f"measured in {len(used)} environments, on {len(machines)} machines; only ratios of "
-            "one sitting compare"
+            f"measured in {len(used)} environments, on {len(machines)} machines; only ratios "
+            "measured in one sitting can be compared"
         )
 
 

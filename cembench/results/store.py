@@ -190,7 +190,9 @@ class Store:
             raise damaged(path, "a surface", "a coordinate or a corner is out of range")
         mesh = TriangleMesh.trusted(V, F.astype(np.int64), str(data["name"]))
         if mesh.hash != cell.mesh_hash:
-            raise RecordError(f"{path} does not hold the surface that its name says; delete it.")
+            raise RecordError(
+                f"{path} does not hold the surface named in its file name; delete it."
+            )
         return mesh
 
     def samples(self, cell: Cell, environment: str) -> Samples:

@@ -127,10 +127,10 @@ class Watcher:
     def begins(self, processes: int) -> None:
         """So many processes are to be run."""
 
-    def timing_begins(self) -> None:
+    def timing_starts(self) -> None:
         """All checks have ended; what is run from now on is timed."""
 
-    def goes_on(self, task: Task, rounds: int) -> None:
+    def adds_rounds(self, task: Task, rounds: int) -> None:
         """A cell is not precise yet: so many more rounds of it follow."""
 
     def starts(self, task: Task, step: Step) -> None:
@@ -145,7 +145,7 @@ class Watcher:
     def machines(self, names: Sequence[str]) -> None:
         """These machines of a cluster take part now, one name for each worker."""
 
-    def tells(self, words: str) -> None:
+    def shows(self, words: str) -> None:
         """Something happened to a machine of the cluster, or to what it measured."""
 
 
@@ -191,8 +191,8 @@ def map_once(
             outcome, uv = Launcher(Path(folder), options or Options()).check(task)
     except OSError as error:
         raise RecordError(
-            f"the temporary folder cannot be used: {error.strerror or error}. Make room in it, or "
-            "set TMPDIR to another."
+            f"the temporary folder cannot be used: {error.strerror or error}. Free some space "
+            "there, or set TMPDIR to another folder."
         ) from error
     return record_of(task, outcome, describe_environment()["id"], started), uv
 
@@ -242,7 +242,7 @@ class _Run:
             self._load(task)
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         self._check_all(pending)
-        self.watcher.timing_begins()
+        self.watcher.timing_starts()
         most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
@@ -281,7 +281,7 @@ class _Run:
         new = [task for task in pending if task.cell.label not in self.checks]
         for task in pending:
             if task.cell.label in self.checks:
-                self._go_on_from_check(task)
+                self._resume_after_check(task)
         if self.options.jobs < 2 or len(new) < 2:
             for task in new:
                 with self._checking(task):
@@ -299,9 +299,9 @@ class _Run:
     def _keep_check(self, task: Task, outcome: Outcome, uv: NDArray[np.complex128] | None) -> None:
         self._samples(task).save_check(outcome, uv)
         self.checks[task.cell.label] = outcome
-        self._go_on_from_check(task)
+        self._resume_after_check(task)
 
-    def _go_on_from_check(self, task: Task) -> None:
+    def _resume_after_check(self, task: Task) -> None:
         outcome = self.checks[task.cell.label]
         if outcome.status != "ok":
             self._save(task, outcome.model_copy(update={"rounds": ()}))
@@ -346,7 +346,7 @@ class _Run:
         for label in sorted(open_.keys() - go_on, key=lambda label: label in partners.values()):
             self._save_measured(open_[label])
         for label in go_on:
-            self.watcher.goes_on(open_[label], more)
+            self.watcher.adds_rounds(open_[label], more)
 
     def _seconds_left(self) -> float:
         if self.options.budget is None:
@@ -358,7 +358,7 @@ class _Run:
         started = _now()
         checked = self.checks[task.cell.label]
         with _Process(self.watcher, task, step):
-            found = self._quietest(task, Checked.of(checked))
+            found = self._timed_when_quiet(task, Checked.of(checked))
         if isinstance(found, Outcome):
             more: dict[str, Any] = {"cause": f"in {step}: {found.cause}"}
             if found.status == "not_comparable":  # the map is valid, and so are its figures
@@ -372,7 +372,7 @@ class _Run:
         self.rounds[task.cell.label][number] = measured
         self._save_if_complete(task)
 
-    def _quietest(self, task: Task, checked: Checked) -> Round | Outcome:
+    def _timed_when_quiet(self, task: Task, checked: Checked) -> Round | Outcome:
         """Time one process; again where the machine was busy, as often as that is asked for.
 
         Which one counts is decided by what others did, and never by the seconds.
@@ -464,7 +464,7 @@ def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
     ]
     if differing:
         named = ", ".join(map(str, differing))
-        text = f"not deterministic: other maps of the same surface came out in rounds {named}"
+        text = f"not deterministic: the same surface got different maps in rounds {named}"
         told.append(Notice(NoticeKind.NOT_DETERMINISTIC, text))
     cold = is_cold(rounds)
     if cold is not None:
@@ -596,7 +596,7 @@ class Launcher:
         if found is None or used is None:
             return answer.outcome or _unreadable("it holds no round")
         if not set(answer.motions) <= set(motions) or len(answer.names) != len(answer.motions):
-            return _unreadable("it tells of other calls than were asked for")
+            return _unreadable("it reports other calls than those requested")
         used.wall, used.cold = sum(found.calls), found.cold_seconds or 0.0
         wrong = impossible(used, found, began, ended)
         wrong = wrong or incomparable(used, answer.running, task.cell.threads)
@@ -696,7 +696,7 @@ class Launcher:
         )
         limits = Limits(seconds, self.options.memory_bytes)
         forked = {"time": self._forked, "again": self._forked}
-        ending = (self._by_judges if judges else forked.get(what, _never))(job, limits, log)
+        ending = (self._by_judges if judges else forked.get(what, _no_fork))(job, limits, log)
         ending = ending or self._started(job, limits, log)
         with suppress(OSError):  # there may be no folder any more
             _remove(self.scratch / PROGRAMS)  # of a program that was ended
@@ -708,7 +708,8 @@ class Launcher:
         outcome = _outcome_of(ending, seconds, self.options.memory_bytes)
         if not self.scratch.is_dir():
             gone = _fault(
-                FaultKind.PROCESS_ENDED, f"the folder for its answer is gone: {self.scratch}"
+                FaultKind.PROCESS_ENDED,
+                f"the folder for its answer no longer exists: {self.scratch}",
             )
             outcome = _with_fault(outcome, gone)
         return Answer(outcome=outcome)
@@ -776,7 +777,7 @@ class Launcher:
         return files
 
 
-def _never(job: Job, limits: Limits, log: Path) -> None:
+def _no_fork(job: Job, limits: Limits, log: Path) -> None:
     """Fork nothing: a check has an interpreter of its own."""
 
 

@@ -18,7 +18,7 @@ from cembench.report.document import (
     missing,
     words,
 )
-from cembench.report.palette import looks
+from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.record_rows import row
 from cembench.results.records import Record
@@ -255,7 +255,7 @@ def _growths_table(growths: Sequence[Growth]) -> Table:
 
 
 def _growths_plot(growths: Sequence[Growth]) -> Plot:
-    styles = looks([growth.what for growth in growths])
+    styles = series_styles([growth.what for growth in growths])
     series = tuple(
         PlotSeries(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])
         for growth in growths

@@ -67,7 +67,7 @@ def examine_holes(
             rows.append(row)
             if uv is not None and count == 1:
                 tell(f"{algorithm.title} on {mesh.name}: drawing")
-                _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
+                _write_figure_exhibits(mesh, steps, uv, record, outer, run, command)
     return rows
 
 
@@ -113,7 +113,7 @@ def _measured(
     return row, record, uv
 
 
-def _lay_down_pictures(
+def _write_figure_exhibits(
     mesh: HoledMesh,
     steps: list[MapStep],
     uv: Any,

@@ -56,7 +56,7 @@ def surface_page(
         )
     if not seen.kept:
         command = "repeat the command of the run: it adds the surfaces and measures nothing twice"
-        items.append(Gap("Pictures", f"{seen.why_not}.", command))
+        items.append(Gap("Pictures", f"{seen.missing_reason}.", command))
     items.append(figures_table(evidence, surface, name))
     section = Section(f"surface-{name}", surface.title, tuple(items), page=True)
     return section, _plot(evidence, surface, seen, name)
@@ -101,7 +101,7 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
             star = "" if series.target == DISK else " *"
             rows.append(_line(evidence, surface, record, series.label + star))
             if record.outcome.cause:
-                causes.append(f"{series.label} ({policy}): {evidence.why_not(record)}")
+                causes.append(f"{series.label} ({policy}): {evidence.missing_reason(record)}")
             told = seconds_words(record)
             causes += [f"{series.label}: {told}"] if told else []
             causes += [f"{series.label} ({policy}): {note}" for note in record.outcome.notes]
@@ -132,7 +132,7 @@ def _line(
     evidence: Evidence, surface: MeasuredSurface, record: Record, label: str
 ) -> tuple[Value, ...]:
     outcome, row, key = record.outcome, evidence.row(record), record.cell.key
-    why = evidence.why_not(record)
+    why = evidence.missing_reason(record)
 
     def value(number: float | None, text: str, lacking: str = "not measured") -> Value:
         if number is None:
@@ -174,7 +174,7 @@ def _plot(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, name: 
     """Return the plot of histograms, energies by iteration and phases, as available."""
     panels: list[PlotPanel] = []
     curves = [
-        histogram(s.label, seen.angles[s.label], evidence.looks[s.label], SHOWN, "line")
+        histogram(s.label, seen.angles[s.label], evidence.styles[s.label], SHOWN, "line")
         for s in evidence.series
         if s.label in seen.angles
     ]

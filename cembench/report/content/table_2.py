@@ -13,7 +13,7 @@ from cembench.report.content.averages import (
     printed_rates,
 )
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
-from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import (
     POLICIES,
     Number,
@@ -36,7 +36,7 @@ def table_2(evidence: Evidence) -> list[Table]:
     """Return the rates of speedup and their averages in both readings, for each policy."""
     tables: list[Table] = []
     for policy in evidence.policies:
-        tables += three_kinds(
+        tables += tables_of_kind(
             evidence,
             2,
             "rate of speedup of CEM",
@@ -138,7 +138,7 @@ def measured_rates(
     """Return the rates of speedup of CEM over an algorithm by model, and the models."""
     rates, models = [], []
     series = evidence.series_of(algorithm)
-    for surface in evidence.one_each if series else ():
+    for surface in evidence.one_per_model if series else ():
         assert series is not None
         record = evidence.find(surface, series, policy)
         rate = None

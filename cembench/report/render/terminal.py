@@ -48,10 +48,10 @@ def results_table(
 ) -> RenderableType:
     """Return the results, one row per cell, grouped by surface, with a table per policy.
 
-    `environments` are the store's: seconds are marked if they are of several machines. angle°
-    and SD° are mean and standard deviation of the angle errors. Seconds are the median of the rounds, followed by half the
-    width of its 95 % interval in percent, with a ! if that is wide. The causes of cells that did
-    not end ok are listed below.
+    `environments` are the store's: seconds are marked if they come from several machines. angle°
+    and SD° are the mean and the standard deviation of the angle errors in degrees. Seconds are the
+    median of the rounds, followed by half the width of its 95 % interval in percent, with a ! if
+    that is wide. The causes of cells that did not end ok are listed below.
     """
     ordered = list(records)
     marked = marks(ordered, environments)

@@ -249,7 +249,7 @@ class _ClusterRun:
             self.since = self.looked
         elif self.looked - self.since > _PATIENCE and not self.told_alone:
             self.told_alone = True
-            self.watcher.tells("no worker is there yet; waiting for one")
+            self.watcher.shows("no worker is there yet; waiting for one")
         self._save_state()
 
     def _gone(self) -> ClusterError:
@@ -274,8 +274,8 @@ class _ClusterRun:
             flight.doing = "waits for another worker of its machine"
         elif task is None:
             return
-        elif about["what"] == "goes_on":
-            self.watcher.goes_on(task, about["rounds"])
+        elif about["what"] == "adds_rounds":
+            self.watcher.adds_rounds(task, about["rounds"])
         else:
             step = Step(**about["step"])
             flight.doing = f"{step} of {task.cell.algorithm}"
@@ -291,7 +291,7 @@ class _ClusterRun:
         """Say once of a machine that its software is not ours."""
         told = differences(self.environment, environment)
         if told and machine not in self.environments:
-            self.watcher.tells(f"{machine} has other software: {'; '.join(told)}")
+            self.watcher.shows(f"{machine} has other software: {'; '.join(told)}")
         self.environments[machine] = environment
 
     def _taken(self, flight: _Flight, worker: str, machine: str) -> None:
@@ -310,7 +310,7 @@ class _ClusterRun:
 
     def _tell_again(self, flight: _Flight, machine: str) -> None:
         unit = flight.parcel.unit
-        self.watcher.tells(
+        self.watcher.shows(
             f"{unit.mesh} ({unit.cells[0].solves}) is measured again on {machine}: the worker on "
             f"{flight.machine} was lost{f' in {flight.doing}' if flight.doing else ''}"
         )
@@ -331,7 +331,7 @@ class _ClusterRun:
                 if flight.ended >= MOST_LOST:
                     self._give_up(flight)
                 else:
-                    self.watcher.tells(f"{flight.parcel.unit.mesh} is measured again: {error}")
+                    self.watcher.shows(f"{flight.parcel.unit.mesh} is measured again: {error}")
                     flight.takers.clear()
                     self._send_again(flight)
             else:
@@ -406,7 +406,7 @@ class _ClusterRun:
     def _refuse(self, flight: _Flight, answer: Answer) -> None:
         self.refused.add(answer.address)
         told = f"{answer.machine} measures nothing: its software differs: {answer.refused}"
-        self.watcher.tells(told)
+        self.watcher.shows(told)
         flight.takers.clear()
         self._send_again(flight)
         if not self._usable():

@@ -47,13 +47,13 @@ class Teller(Watcher):
         self.tell = tell
         self.turn = turn
 
-    def timing_begins(self) -> None:
+    def timing_starts(self) -> None:
         """Wait until no other worker of the machine is at work."""
         self.turn.alone(lambda: self.tell({"what": "queues"}))
 
-    def goes_on(self, task: Task, rounds: int) -> None:
+    def adds_rounds(self, task: Task, rounds: int) -> None:
         """Tell."""
-        self.tell({"what": "goes_on", "cell": task.cell.label, "rounds": rounds})
+        self.tell({"what": "adds_rounds", "cell": task.cell.label, "rounds": rounds})
 
     def starts(self, task: Task, step: Step) -> None:
         """Tell."""

@@ -22,7 +22,7 @@ from cembench.workflows.morphing.pages import registration_page, strip_page
 IN_THE_FIGURES = ("Liu's Wry Face", "Liu's Neutral Face", "Liu's Smile Face")
 
 
-def lay_down(
+def write_morph_exhibits(
     run: Path,
     morph: Morph,
     figures: dict[str, Any],

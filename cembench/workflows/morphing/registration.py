@@ -124,10 +124,10 @@ def register(
             break
     raise AlgorithmFailed(
         f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a "
-        f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and going on "
-        "would fold triangles. Use fewer landmarks, look for one that is misplaced, name the "
-        "surface first on which they spread wider in the disk (a face before a whole head), or "
-        "take a smaller --lambda so that they need not meet."
+        f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and a further "
+        "step would fold triangles. Use fewer landmarks, check for a misplaced one, put the "
+        "surface first on which they are more spread out in the disk (a face before a whole "
+        "head), or take a smaller --lambda so that they need not coincide."
     )
 
 

@@ -43,7 +43,7 @@ def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
     if not any(clouds.values()):
         return None
     drawn = [
-        through(s.label, clouds[s.label], "points", evidence.looks[s.label])
+        through(s.label, clouds[s.label], "points", evidence.styles[s.label])
         for s in evidence.disk_series
         if clouds[s.label]
     ]

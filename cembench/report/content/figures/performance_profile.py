@@ -106,7 +106,7 @@ def _panel(evidence: Evidence, found: dict[str, list[float]], n: int, policy: st
         ordered = sorted(r for r in found[series.label] if r < inf)
         x = [1.0, *ordered, last]
         y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
-        lines.append(Line(series.label, x, y, "steps", evidence.looks[series.label]))
+        lines.append(Line(series.label, x, y, "steps", evidence.styles[series.label]))
     return PlotPanel(
         Axis("tau, times the fastest", log=True, low=1.0, high=last),
         Axis("surfaces (%)", low=0, high=104),

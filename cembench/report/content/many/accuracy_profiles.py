@@ -74,7 +74,7 @@ def _panel(evidence: Evidence, policy: str, wanted: _Panel) -> PlotPanel | None:
         ordered = sorted(r for r in ratios[one.label] if r <= last)
         x = [1.0, *ordered, last]
         y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
-        lines.append(PlotSeries(one.label, x, y, "steps", evidence.looks[one.label]))
+        lines.append(PlotSeries(one.label, x, y, "steps", evidence.styles[one.label]))
     return PlotPanel(
         Axis("tau, times the best", log=True, low=1.0, high=max(last, 1.01)),
         Axis("surfaces (%)", low=0, high=104),
