@@ -186,7 +186,8 @@ def _packed(packing: _Packing, tolerance: float, most: int) -> tuple[Complex, li
         x = _extrapolated(points, steps)
     raise AlgorithmFailed(
         f"the packing has not converged after {most} steps: the angle sums at vertices are still "
-        f"off by {history[-1]:.2g} rad in total, tolerance {tolerance:g}. Allow more with max_iterations"
+        f"off by {history[-1]:.2g} rad in total, tolerance {tolerance:g}. Allow more with "
+        "max_iterations"
     )
 
 
