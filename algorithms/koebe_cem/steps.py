@@ -1,10 +1,10 @@
 """Koebe's method for surfaces with holes (the paper's Algorithm 2; Zeng et al. 2009).
 
 One step opens one boundary, fills all others, and maps that disk by CEM, so that the open boundary
-becomes a circle. A sweep does so for every boundary, the outer one last. Here the surface's own
-triangles have the cotangent weights of the surface in every step, since its conformal structure
-does not change; only the patches come from the plane. So the map is not a composition of maps with
-an error each, and errors of earlier steps are forgotten.
+becomes a circle. A sweep repeats this for every boundary, the outer one last. The surface's own
+triangles keep the cotangent weights of the surface in every step, because its conformal structure
+does not change; only the patches get weights from the plane. So the map is not a composition of
+inexact maps, and the errors of earlier steps do not accumulate.
 """
 
 from __future__ import annotations

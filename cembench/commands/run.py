@@ -282,8 +282,8 @@ def _show_conflicts(conflicts: Sequence[Conflict], output: Path) -> None:
     if not conflicts:
         return
     out.print(
-        f"{len(conflicts)} cells were measured on several machines; the first named stands in the "
-        f"run, the others in {output / 'others'}:",
+        f"{len(conflicts)} cells were measured on several machines; the first one named is kept in "
+        f"the run, the others in {output / 'others'}:",
         soft_wrap=True,
     )
     for conflict in conflicts[:NAMED]:

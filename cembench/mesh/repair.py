@@ -345,7 +345,7 @@ def _split(V: Points, F: Indices, steps: dict[Step, int]) -> tuple[Indices, Indi
 
 
 def _smoothest_pairs(V: Points, F: Indices, edge: Indices, faces: Indices) -> Indices:
-    """Return the pairs of half-edges (k, 2) that stay connected at edges with over two triangles.
+    """Return the pairs of half-edges (k, 2) that stay connected where an edge has three or more.
 
     The smoothest pairs first: the angle between the two triangles is closest to straight. If the
     input's orientations agree elsewhere, they must agree here too.

@@ -79,7 +79,7 @@ def publish(
     folder : Path
         A new or empty folder, or an earlier site.
     progress : function
-        What is told how far it is.
+        Called with the progress.
 
     Returns
     -------

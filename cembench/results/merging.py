@@ -36,7 +36,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Conflict:
-    """A cell that several machines measured: the one that stands in the run comes first."""
+    """A cell that several machines measured: the one kept in the run comes first."""
 
     cell: str
     machines: tuple[str, ...]

@@ -205,7 +205,7 @@ def in_random_order(tasks: Sequence[Task], seed: int, number: int) -> list[Task]
 def kept_record(
     task: Task, store: Store, options: Options, asked: AbstractSet[str]
 ) -> Record | None:
-    """Return the record that stands, if any; samples of what is measured anew are forgotten.
+    """Return the valid record, if any; delete the samples of a cell that is measured again.
 
     A record follows its mesh to another name, unless the old one is `asked` for too.
     """
@@ -373,9 +373,9 @@ class _Run:
         self._save_if_complete(task)
 
     def _timed_when_quiet(self, task: Task, checked: Checked) -> Round | Outcome:
-        """Time one process; again where the machine was busy, as often as that is asked for.
+        """Time one process; repeat it if the machine was busy, up to the requested number of times.
 
-        Which one counts is decided by what others did, and never by the seconds.
+        The run with the least activity of other programs counts; the seconds never decide.
         """
         best: Round | None = None
         for _ in range(1 + self.options.repeat_busy):

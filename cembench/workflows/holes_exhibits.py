@@ -43,7 +43,7 @@ def examine_holes(
     """Map a surface by every algorithm; return a row for each and write two exhibits.
 
     `outer` is a vertex of the outer boundary, `sweeps` the maximum number of sweeps, `command` the
-    command that makes the exhibits again. `complain` is called if Koebe's method fails, `tell`
+    command that recreates the exhibits. `complain` is called if Koebe's method fails, `tell`
     before each step.
     """
     rows = []
