@@ -54,7 +54,7 @@ def gu_yau(
 
     Decided here: m is half of the diagonal of L, so that all frequencies are equally close to their
     limit, and dt is 0.9 of the stable limit 1. The iteration ends when a step lowers the energy by
-    less than the share `tolerance` (`stopped`: "energy") or after `max_iterations` ("iterations"),
+    less than a relative `tolerance` (`stopped`: "energy") or after `max_iterations` ("iterations"),
     with the map reached so far: on fine meshes that is the start, slightly smoothed. The circle
     between the copies is put on the unit circle and the interior is solved for once more, as in
     QIEM. Remaining folds are repaired as in CEM (`fold_repairs`).

@@ -58,7 +58,7 @@ def qiem(
     step. If the energy would rise or the matrix is not positive definite, dt is halved and the step
     repeated. dt stays below 0.9 n / sum(D), above which the matrix is never positive definite. The
     flow has converged when, after dt has met such a limit, a step lowers the energy by less than
-    the share `tolerance`. After each step the points are projected to the sphere and their mean is
+    a relative `tolerance`. After each step the points are projected to the sphere and their mean is
     moved to the centre by a Moebius map; subtracting the mean and dividing by the norm does so to
     first order, but raises the energy of uneven maps. The circle between the copies is turned to a
     parallel, its half is projected from the far pole and scaled to the unit disk, the boundary is

@@ -53,7 +53,7 @@ def bff(
     Decided here: after each sweep the vertices are put on the circle with arcs in proportion to l~,
     which have exactly those exterior angles, and a Moebius map moves them into the `gauge` of
     direct-cem, since sweeps alone drift through Moebius images and never end. The sweeps end when
-    no arc changes by more than the share `tolerance` (`sweeps`, `change`), and fail after
+    no arc changes by more than a relative `tolerance` (`sweeps`, `change`), and fail after
     `max_sweeps`; each removes about half of the error. The interior is the harmonic extension of
     both coordinates. `gauss_bonnet` is the distance of the sum of the natural k~ (u = 0) from 2 pi.
     Folds are repaired as in CEM (`fold_repairs`).

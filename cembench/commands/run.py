@@ -138,7 +138,7 @@ def show(
     run: Annotated[Path, typer.Option("--run", help="The run's folder.")] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """Show everything that is recorded of a cell."""
+    """Show everything that is recorded about a cell."""
     from cembench.results.record_rows import row
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records, verify_map

@@ -89,7 +89,7 @@ def minimise(
 ) -> Minimum:
     """Minimise the conformal energy over boundaries on circles, in the gauge `weights` (B,).
 
-    Ends when E_C can decrease by at most the share `tolerance`. The result is never above the
+    Ends when E_C can decrease by at most a relative `tolerance`. The result is never above the
     energy of the start, which is moved into the gauge first.
 
     Raises

@@ -81,7 +81,7 @@ def read_uv(path: Path) -> UVFile:
 
 
 def read_flat(path: Path) -> UVFile:
-    """Read a flattened surface from a mesh file; its UVs are x and y of the vertices.
+    """Read a flattened surface from a mesh file, with x and y as its UVs.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """Registration: a map to the disk with small Dirichlet energy that meets landmarks (34).
 
-E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, the boundary held on the circle. The
-minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
+E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, with the boundary fixed on the
+circle. The minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
 
 A single point has no capacity in the plane: a vertex pulled alone leaves its surroundings as a
 spike, and triangles fold. So a landmark here is a small disk around its vertex that moves with it:
