@@ -125,7 +125,7 @@ class PlainProgress(Watcher):
 
 
 class PlainOnCluster(PlainProgress):
-    """As its base, without lines for rounds: several machines are at several rounds."""
+    """Like its base, without lines for rounds, because machines are at different rounds."""
 
     def starts(self, task: Task, step: Step) -> None:
         """Print nothing."""

@@ -131,7 +131,7 @@ class Store:
             )
 
     def finished(self) -> list[Record]:
-        """As :meth:`records`, but empty if no cell is finished yet."""
+        """Like :meth:`records`, but empty if no cell is finished yet."""
         return [read_record(path) for path in self.record_files()]
 
     def record_files(self) -> list[Path]:

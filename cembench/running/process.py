@@ -63,7 +63,7 @@ class ProcessEnd:
 
     @property
     def how(self) -> str:
-        """How it ended, in words: the signal, or the exit code with the last line of output."""
+        """A description of the end: the signal, or the exit code with the last line of output."""
         if self.code < 0:
             return f"was ended by signal {_signal_name(-self.code)}"
         last = f": {self.said.splitlines()[-1]}" if self.said else ""
