@@ -37,7 +37,7 @@ ESTIMATED_FOR = (1, 10, 100)
 
 
 def place_of(given: str | None, *, same_environment: bool) -> ClusterPlace | None:
-    """Read ``--cluster``, before anything else is done; None without.
+    """Parse ``--cluster`` before anything else; return None without it.
 
     Raises
     ------

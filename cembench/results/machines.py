@@ -1,4 +1,4 @@
-"""The machines of a run: their seconds cannot be compared with each other, ratios within one can."""
+"""The machines of a run: seconds of two machines cannot be compared, ratios within one can."""
 
 from __future__ import annotations
 

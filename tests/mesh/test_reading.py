@@ -253,7 +253,7 @@ DAMAGED = {
     "cut-polygon.off": ("OFF\n4 2 0\n" + OFF + "4 0 1 2 3\n", "2 faces .* but 1 were found"),
     "cut-line.off": ("OFF\n4 2 0\n" + OFF + "3 0 1 2\n3 0 2\n", "line 8, .* 3 numbers .* 2 were"),
     "few-vertices.off": ("OFF\n4 1 0\n0 0 0\n", "4 vertices are declared, but 1 were found"),
-    "more.off": ("OFF\n4 1 0\n" + OFF + TWO, "4 vertices and 1 faces .* goes on at line 8"),
+    "more.off": ("OFF\n4 1 0\n" + OFF + TWO, "4 vertices and 1 faces .* continues at line 8"),
     "negative.off": ("OFF\n4 -1 0\n" + OFF, "-1 faces are declared"),
     "no-counts.off": ("OFF\n", "no line with the numbers"),
     "binary.off": (b"OFF BINARY\n\0\0\0\4", "'OFF BINARY' are not supported"),
