@@ -222,7 +222,7 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
     cut = sum(one.cut for one in found.surfaces)
     text = (
         f"{', '.join(sets)}: {count} surfaces were given, {len(found.surfaces)} of them can be "
-        f"mapped{f', {cut} after they were cut open' if cut else ''}. Shares of success are of "
+        f"mapped{f', {cut} after they were cut open' if cut else ''}. Success rates refer to "
         "those that can be mapped."
     )
     tables = [

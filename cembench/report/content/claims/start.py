@@ -108,7 +108,7 @@ def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
         "Theorem 1",
         "The last, the first and the middle vertex, one of the pole's and one of the boundary give "
         f"the same map up to a constant, within {SAME:g} of its size.",
-        f"so on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
+        f"true on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
         if off
         else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(held, len(off)),
