@@ -409,12 +409,13 @@ METRICS: tuple[Metric, ...] = (
     ),
     Metric(
         "area_distortion_mean", "mean area distortion", "area", "", ".3f", ".4f",
-        "area-weighted mean of |log(area ratio)| at the best scale; disk maps in the common gauge",
+        "area-weighted mean of the absolute log area ratio at the best scale (disk maps: common "
+        "gauge)",
         lambda f: f.area_distortion[0],
     ),
     Metric(
         "area_distortion_sd", "SD of area distortion", "area SD", "", ".3f", ".4f",
-        "area-weighted standard deviation of log(area ratio), likewise",
+        "area-weighted standard deviation of the same log area ratios",
         lambda f: f.area_distortion[1], shown="page",
     ),
     Metric(

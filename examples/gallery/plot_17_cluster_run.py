@@ -20,18 +20,23 @@ import cembench
 
 if __name__ == "__main__":
     scratch = tempfile.TemporaryDirectory()
-    surfaces = [cembench.surface(name, 600) for name in ("hemi-ellipsoid", "cone", "spherical-cap")]
+    names = ("hemi-ellipsoid", "cone", "spherical-cap")
     run = cembench.benchmark(
-        surfaces, ["cem", "lscm"], rounds=1, out=Path(scratch.name) / "run", cluster="local:2"
+        [cembench.surface(name, 600) for name in names],
+        ["cem", "lscm"],
+        rounds=1,
+        out=Path(scratch.name) / "run",
+        cluster="local:2",
     )
     table = run.table()
-    print(table[["mesh", "algorithm", "status", "angle_error_mean_deg"]].to_string(index=False))
+    shown = ["mesh", "algorithm", "status", "angle_error_mean_deg"]
+    print(table[shown].to_string(index=False))
 
 # %%
 # The records are on this machine, like those of any other run.
 
 if __name__ == "__main__":
     print(len(run.records()), "records in", run.folder.name)
-    errors = table.pivot(index="mesh", columns="algorithm", values="angle_error_mean_deg")
+    errors = table.pivot(index="mesh", columns="algorithm", values=shown[-1])
     errors.plot.bar(rot=0, ylabel="mean angle error in degrees", figsize=(6, 3.2))
     plt.show()
