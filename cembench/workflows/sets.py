@@ -204,7 +204,7 @@ def gathered(
             refused.append(one)
         elif not isinstance(one.mesh, kinds):
             kind = type(one.mesh).__name__
-            why = f"it is a {kind}, which none of the chosen algorithms takes"
+            why = f"it is a {kind}, which none of the chosen algorithms accepts"
             refused.append(replace(one, mesh=None, error=why))
         elif one.mesh.hash not in seen:
             seen.add(one.mesh.hash)

@@ -64,7 +64,7 @@ def test_a_checkerboard_is_found_from_obj_and_from_ply(result, tmp_path):
         result.save(tmp_path / "a.ply", checker=True)
     result.save(tmp_path / "b.ply", checker=True)
     assert b"TextureFile b_texture.png" in (tmp_path / "b.ply").read_bytes()
-    with pytest.raises(cembench.ParameterError, match=r"names no texture; .* go with \.glb"):
+    with pytest.raises(cembench.ParameterError, match=r"cannot refer to a texture; .* with \.glb"):
         result.save(tmp_path / "a.vtp", checker=True)
 
 
@@ -165,7 +165,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("-o", "a.fbx"), "allowed here: .obj, .ply, .glb, .vtp, .npz"),
         (("-o", "a.obj", "--bake", "nothing.png"), "nothing.png cannot be read: No such file"),
         (("-o", "a.obj", "--bake", "flat.obj"), "it is not a picture"),
-        (("-o", "a.obj", "--bake", "paint.png", "--checker"), "two textures; choose one"),
+        (("-o", "a.obj", "--bake", "paint.png", "--checker"), "each give a texture; choose one"),
         (("-o", "a.vtp", "--checker"), "names no texture"),
         (("--checker",), "need a file that uses the texture"),
         (("--geometry-image", "a.tif"), "allowed: .npy, .exr, .png"),
