@@ -48,8 +48,8 @@ def sizes(up_to: int) -> tuple[int, ...]:
     """
     if up_to < LEAST_UP_TO:
         raise ParameterError(
-            f"--up-to {up_to} is too small to fit an exponent; allowed are {LEAST_UP_TO:,} "
-            "triangles or more, or 0 to skip that stage."
+            f"--up-to {up_to} is too few to fit an exponent; allowed are {LEAST_UP_TO:,} triangles "
+            "and more, or 0 to leave that stage out."
         )
     return up_to // 9, up_to // 3, up_to
 
@@ -64,7 +64,7 @@ def growth(what: str, faces: Sequence[int], rounds: Sequence[Sequence[float]]) -
 
     """
     if len(faces) < 2 or not rounds:
-        raise ValueError("an exponent needs at least two sizes and one round")
+        raise ValueError("an exponent needs two sizes and a round")
     middle = [sorted(size)[(len(size) - 1) // 2] for size in zip(*rounds, strict=True)]
     exponents = [_exponent(faces, seconds) for seconds in rounds]
     return Growth(

@@ -166,7 +166,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("-o", "a.obj", "--bake", "nothing.png"), "nothing.png cannot be read: No such file"),
         (("-o", "a.obj", "--bake", "flat.obj"), "it is not a picture"),
         (("-o", "a.obj", "--bake", "paint.png", "--checker"), "each give a texture; choose one"),
-        (("-o", "a.vtp", "--checker"), "names no texture"),
+        (("-o", "a.vtp", "--checker"), "cannot refer to a texture"),
         (("--checker",), "need a file that uses the texture"),
         (("--geometry-image", "a.tif"), "allowed: .npy, .exr, .png"),
         (("--geometry-image", "no/a.npy"), "there is no folder no"),
