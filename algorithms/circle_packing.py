@@ -63,7 +63,9 @@ def circle_packing(
     image into the `gauge` of direct-cem. Folds are repaired as in CEM (`fold_repairs`).
     """
     if not len(mesh.interior):
-        raise AlgorithmFailed("the mesh has no interior vertex, so its circles have no freedom")
+        raise AlgorithmFailed(
+            "the mesh has no interior vertex, so the circle packing has no unknowns"
+        )
     packing = _Packing(mesh)
     z, history = _packed(packing, tolerance, max_iterations)
     uv = _touching(mesh, z, packing.radii)
@@ -131,8 +133,8 @@ class _Packing:
             total = angle_sums(F, at, n)
             if not (share.min() > 0 and total.min() > 0):
                 raise AlgorithmFailed(
-                    f"{int((share <= 0).sum())} circles have vanished: the boundary is too crowded "
-                    "for a packing in doubles"
+                    f"{int((share <= 0).sum())} circles have vanished: the boundary is too "
+                    "crowded for a packing in double precision"
                 )
             return np.asarray(np.log(share / total) / 2)
 
@@ -183,8 +185,9 @@ def _packed(packing: _Packing, tolerance: float, most: int) -> tuple[Complex, li
         points, steps = [*points[-MEMORY:], there], [*steps[-MEMORY:], there - x]
         x = _extrapolated(points, steps)
     raise AlgorithmFailed(
-        f"the packing has not converged after {most} steps: angles round a vertex are still off by "
-        f"{history[-1]:.2g} rad in sum, tolerance {tolerance:g}. Allow more with max_iterations"
+        f"the packing has not converged after {most} steps: the angle sums at vertices are still "
+        f"off by {history[-1]:.2g} rad in total, tolerance {tolerance:g}. Allow more with "
+        "max_iterations"
     )
 
 

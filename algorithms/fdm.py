@@ -144,7 +144,7 @@ def _corrected_in_half_plane(
     """
     b = mesh.boundary
     p, q = _ends_of_best_edge(mesh, z)
-    z = z / (_public_turn(p, q) if public_program else _middle(p, q))
+    z = z / (_divisor_of_public_program(p, q) if public_program else _middle(p, q))
     w = 1j * (1 + z) / (1 - z)
     w[b] = w[b].real
     if L is None:
@@ -177,7 +177,7 @@ def _middle(p: complex, q: complex) -> complex:
     return complex(p / abs(p) * np.exp(0.5j * np.angle(q / p)))
 
 
-def _public_turn(p: complex, q: complex) -> complex:
+def _divisor_of_public_program(p: complex, q: complex) -> complex:
     """Return the public program's divisor: for angles a and b it takes a + b/2."""
     return complex(np.exp(1j * (np.angle(p) + np.angle(q) / 2)))
 

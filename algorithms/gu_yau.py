@@ -54,7 +54,7 @@ def gu_yau(
 
     Decided here: m is half of the diagonal of L, so that all frequencies are equally close to their
     limit, and dt is 0.9 of the stable limit 1. The iteration ends when a step lowers the energy by
-    less than the share `tolerance` (`stopped`: "energy") or after `max_iterations` ("iterations"),
+    less than a relative `tolerance` (`stopped`: "energy") or after `max_iterations` ("iterations"),
     with the map reached so far: on fine meshes that is the start, slightly smoothed. The circle
     between the copies is put on the unit circle and the interior is solved for once more, as in
     QIEM. Remaining folds are repaired as in CEM (`fold_repairs`).
@@ -71,8 +71,8 @@ def gu_yau(
     diagonal = L_double.diagonal()
     if not diagonal.min() > 0:
         raise AlgorithmFailed(
-            f"{int((diagonal <= 0).sum())} vertices have no positive diagonal in the Laplacian, so "
-            "explicit steps are not stable; delaunay=true gives one"
+            f"{int((diagonal <= 0).sum())} vertices have a nonpositive diagonal entry in the "
+            "Laplacian, so explicit steps are unstable; delaunay=true makes it positive"
         )
     dt = SHARE / diagonal[:, None]
     with phase("diffusion"):

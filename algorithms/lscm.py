@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cembench.conformal.free_boundary import far_apart, pinned_map, with_area_pi
+from cembench.conformal.free_boundary import pinned_map, two_distant_vertices, with_area_pi
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -26,7 +26,7 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     weights fold the interior, patches around the folds are laid out again (`fold_repairs`); if that
     does not help, as with a boundary that crosses itself, folds remain.
     """
-    pins = far_apart(mesh)
+    pins = two_distant_vertices(mesh)
     uv = pinned_map(laplacian(mesh, delaunay=delaunay), mesh.boundary, pins)
     uv, repair = with_area_pi(mesh, uv)
     return Parameterization(uv, extras={"pins": pins.tolist(), **repair})

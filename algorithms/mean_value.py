@@ -41,7 +41,7 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
     (`fold_repairs`).
     """
     if not len(mesh.interior):
-        raise AlgorithmFailed("the mesh has no interior vertex, so the map has no freedom")
+        raise AlgorithmFailed("the mesh has no interior vertex, so the map has no unknowns")
     i, b = mesh.interior, mesh.boundary
     with phase("laplacian"):
         W = _weights(mesh)
@@ -70,8 +70,8 @@ def _factored(A: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU:
         )
     except RuntimeError as error:  # the only error of SuperLU
         raise AlgorithmFailed(
-            "the mean value weights make a matrix that cannot be factored; the mesh has triangles "
-            "too thin for them"
+            "the matrix of mean value weights cannot be factored: the mesh has triangles that "
+            "are too thin"
         ) from error
 
 

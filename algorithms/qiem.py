@@ -58,7 +58,7 @@ def qiem(
     step. If the energy would rise or the matrix is not positive definite, dt is halved and the step
     repeated. dt stays below 0.9 n / sum(D), above which the matrix is never positive definite. The
     flow has converged when, after dt has met such a limit, a step lowers the energy by less than
-    the share `tolerance`. After each step the points are projected to the sphere and their mean is
+    a relative `tolerance`. After each step the points are projected to the sphere and their mean is
     moved to the centre by a Moebius map; subtracting the mean and dividing by the norm does so to
     first order, but raises the energy of uneven maps. The circle between the copies is turned to a
     parallel, its half is projected from the far pole and scaled to the unit disk, the boundary is
@@ -111,7 +111,7 @@ def _flow(
             if len(energies) > 1:
                 return S, energies
             raise AlgorithmFailed(
-                "the heat flow cannot leave its start: every time step down to "
+                "the heat flow cannot start: every time step down to "
                 f"{LEAST:g} raises the energy, {energies[0]:.6g}"
             )
         S, LS, dt = trial, L_trial, GROWTH * dt
@@ -177,5 +177,5 @@ def boundary_on_circle(mesh: DiskMesh, S: Real) -> Complex:
         z = np.conj(z)
     modulus = np.abs(z)
     if not (np.isfinite(modulus).all() and modulus.min() > 0):
-        raise AlgorithmFailed("the boundary's image on the sphere is not a curve with an inside")
+        raise AlgorithmFailed("the boundary's image on the sphere is not a simple closed curve")
     return z / modulus

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
-from cembench.core.errors import ParameterError, RegistryError, said_by
+from cembench.core.errors import ParameterError, RegistryError, describe_error
 from cembench.core.parameterization import MapStep
 from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
 from cembench.mesh.datasets import Dataset
@@ -737,7 +737,7 @@ def _load_entry(entry: Any) -> Any:
     except Exception as error:
         raise RegistryError(
             f"entry point {entry.name} = {entry.value!r} cannot be loaded: "
-            f"{said_by(error)}. Repair or uninstall the package that declares it."
+            f"{describe_error(error)}. Repair or uninstall the package that declares it."
         ) from error
 
 
@@ -810,19 +810,19 @@ def _importing(plugin: str) -> Iterator[None]:
     first (:mod:`cembench.running.plugins`).
     """
     try:
-        with _standard_output_apart():
+        with _stdout_to_stderr():
             yield
     except KeyboardInterrupt:
         raise
     except BaseException as error:
         raise RegistryError(
-            f"plug-in {plugin!r} cannot be imported: {said_by(error)}. Repair it: importing "
+            f"plug-in {plugin!r} cannot be imported: {describe_error(error)}. Repair it: importing "
             "a plug-in must only declare functions."
         ) from error
 
 
 @contextmanager
-def _standard_output_apart() -> Iterator[None]:
+def _stdout_to_stderr() -> Iterator[None]:
     """Redirect standard output to standard error, including output from C code."""
     with ExitStack() as back:
         with suppress(AttributeError, OSError, ValueError):  # it may be missing or closed

@@ -1,5 +1,6 @@
 """Sphinx reads this: the site is made of the pages here, the docstrings and the commands."""
 
+import logging
 import os
 import re
 import sys
@@ -74,6 +75,7 @@ sphinx_gallery_conf = {
     "plot_gallery": "True",
 }
 
+logging.getLogger("distributed").propagate = False  # it reports each connection
 warnings.filterwarnings(
     "ignore", category=UserWarning, message="FigureCanvasAgg is non-interactive"
 )

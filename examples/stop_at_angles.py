@@ -25,10 +25,10 @@ def stop_at_angles(
     least_gain: Annotated[float, Field(gt=0)] = 1e-3,
     max_iterations: Annotated[int, Field(ge=1)] = 200,
 ) -> Parameterization:
-    """Does CEM end better where the angles say so?
+    """Stop CEM when the angle errors no longer fall.
 
-    Iteration (30), (24), (25), (22) ends after the first one that lowers the mean angle error by
-    less than the share `least_gain` of it.
+    The iteration (30), (24), (25), (22) ends after the first step that lowers the mean angle error
+    by less than a relative `least_gain`.
     """
     i, b = mesh.interior, mesh.boundary
     if not len(i):
@@ -65,5 +65,5 @@ def on_circle(f: np.ndarray) -> np.ndarray:
     """Centralise and normalise (Eqs. 24, 25)."""
     f = f - f.mean()
     if not np.abs(f).min() > 0:
-        raise AlgorithmFailed("a boundary vertex came to lie at the centre")
+        raise AlgorithmFailed("a boundary vertex lies at the centre")
     return f / np.abs(f)

@@ -1,4 +1,5 @@
-"""Docstrings open with a phrase, not a question; public names have complete numpydoc sections."""
+"""Every public name has a docstring that opens with a phrase, not a question; exported names have
+complete numpydoc sections."""
 
 import ast
 import importlib
@@ -133,3 +134,29 @@ def test_public_names_have_numpydoc_sections(name):
     excused = EXCUSED.get(name, {})
     assert {code: text for code, text in wrong.items() if code not in excused} == {}
     assert excused.keys() <= wrong.keys(), "an excuse that nothing needs any more"
+
+
+def uncovered(paths):
+    """What has no docstring, by interrogate with the settings of pyproject.toml."""
+    config = pytest.importorskip("interrogate.config")
+    coverage = pytest.importorskip("interrogate.coverage")
+    settings = config.InterrogateConfig(**config.parse_pyproject_toml(ROOT / "pyproject.toml"))
+    found = coverage.InterrogateCoverage([str(path) for path in paths], settings).get_coverage()
+    assert found.total > 0
+    return [
+        f"{one.filename}:{node.lineno} {node.path}"
+        for one in found.file_results
+        for node in one.nodes
+        if not node.covered
+    ]
+
+
+def test_every_public_name_has_a_docstring():
+    assert uncovered([ROOT / "cembench", ROOT / "algorithms", ROOT / "meshes_gen"]) == []
+
+
+def test_a_missing_docstring_is_found(tmp_path):
+    module = tmp_path / "one.py"
+    module.write_text('"""Module."""\n\n\ndef f():\n    pass\n\n\ndef _g():\n    pass\n')
+    (missing,) = uncovered([module])
+    assert missing.endswith("f")

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cembench.conformal.free_boundary import far_apart, pinned_map, with_area_pi
+from cembench.conformal.free_boundary import pinned_map, two_distant_vertices, with_area_pi
 from cembench.conformal.laplacian import laplacian_of_weights
 from cembench.conformal.metrics import corner_angles
 from cembench.core.clock import phase
@@ -30,7 +30,9 @@ class Angles:
 
     def __init__(self, mesh: DiskMesh) -> None:
         if not len(mesh.interior):
-            raise AlgorithmFailed("the mesh has no interior vertex, so its angles are free")
+            raise AlgorithmFailed(
+                "the mesh has no interior vertex, so its angles have no constraints"
+            )
         self.mesh = mesh
         self.number = np.full(mesh.n, -1)
         self.number[mesh.interior] = np.arange(len(mesh.interior))
@@ -126,7 +128,8 @@ class Angles:
         except NotPositiveDefinite as error:
             thin = np.rad2deg(float(np.minimum(angles, np.pi - angles).min()))
             raise AlgorithmFailed(
-                f"the angles' constraints are dependent in doubles ({error}): the sharpest "
+                f"the angle constraints are linearly dependent in double precision ({error}): "
+                "the sharpest "
                 f"angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
             ) from None
         y = self._cholesky.solve(b)
@@ -192,6 +195,6 @@ def placed(
         # A triangle's angles must sum to pi, even if a step was cut.
         weights = 0.5 / np.tan(angles * (np.pi / angles.sum(axis=1, keepdims=True)))
         L = laplacian_of_weights(mesh.F, weights, mesh.n)
-    uv = pinned_map(L, mesh.boundary, far_apart(mesh))
+    uv = pinned_map(L, mesh.boundary, two_distant_vertices(mesh))
     uv, repair = with_area_pi(mesh, uv)
     return Parameterization(uv, iterations, extras={**told, **repair})

@@ -65,5 +65,5 @@ def abf_plus_plus(
     raise AlgorithmFailed(
         f"the angles have not converged after {max_iterations} Newton steps: the constraints are "
         f"still off by up to {max(told.values()):.2g}, tolerance {tolerance:g}, and the last step "
-        f"changed an angle by {moved:.2g} of itself. Allow more with max_iterations"
+        f"changed an angle by a relative {moved:.2g}. Allow more with max_iterations"
     )

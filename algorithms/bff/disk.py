@@ -53,7 +53,7 @@ def bff(
     Decided here: after each sweep the vertices are put on the circle with arcs in proportion to l~,
     which have exactly those exterior angles, and a Moebius map moves them into the `gauge` of
     direct-cem, since sweeps alone drift through Moebius images and never end. The sweeps end when
-    no arc changes by more than the share `tolerance` (`sweeps`, `change`), and fail after
+    no arc changes by more than a relative `tolerance` (`sweeps`, `change`), and fail after
     `max_sweeps`; each removes about half of the error. The interior is the harmonic extension of
     both coordinates. `gauss_bonnet` is the distance of the sum of the natural k~ (u = 0) from 2 pi.
     Folds are repaired as in CEM (`fold_repairs`).
@@ -87,8 +87,8 @@ def _circular(
         u = yamabe.scale(_turns(domain.arcs))
         if not np.ptp(u) <= np.log(CROWDED):
             raise AlgorithmFailed(
-                f"the boundary is too crowded: in sweep {sweep} its scale differs by a factor of "
-                f"exp({np.ptp(u):.3g}) between its vertices, beyond what numbers can hold. "
+                f"the boundary is too crowded: in sweep {sweep} the scale varies by a factor of "
+                f"exp({np.ptp(u):.3g}) between its vertices, beyond the range of doubles. "
                 "Use direct-cem, which keeps vertices apart"
             )
         before, domain = domain, in_gauge(CircleDomain.of_arcs(yamabe.scaled(u)), weights)

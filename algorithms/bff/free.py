@@ -19,7 +19,7 @@ from .yamabe import YamabeBoundary
 Real = NDArray[np.float64]
 
 
-def _no_digon(corners: int) -> int:
+def _check_number_of_corners(corners: int) -> int:
     """Refuse polygons with one or two corners."""
     if corners in (1, 2):
         raise ValueError("a polygon has at least 3 corners; 0 leaves the boundary free")
@@ -36,7 +36,7 @@ def _no_digon(corners: int) -> int:
 def bff_free(
     mesh: DiskMesh,
     *,
-    corners: Annotated[int, Field(ge=0, le=1_000), AfterValidator(_no_digon)] = 0,
+    corners: Annotated[int, Field(ge=0, le=1_000), AfterValidator(_check_number_of_corners)] = 0,
     delaunay: bool = False,
 ) -> Parameterization:
     """Flatten with the boundary at its own scale, or to a polygon.

@@ -100,7 +100,9 @@ def _with_infinity_at(
     touching = np.any(np.int64(v) == mesh.F, axis=1)
     F = mesh.F[~touching]
     if not len(F):
-        raise AlgorithmFailed(f"every triangle touches the boundary vertex {v}: too few triangles")
+        raise AlgorithmFailed(
+            f"every triangle touches boundary vertex {v}: the mesh has too few triangles"
+        )
     u, link = _infinity(mesh, v, mesh.F[touching])
     flat = np.full(mesh.n, 2 * np.pi)
     flat[mesh.boundary] = np.pi
@@ -139,8 +141,8 @@ def _checked_ear(mesh: DiskMesh) -> int | None:
         return int(tips[0])
     raise AlgorithmFailed(
         f"{len(chords)} edges inside join boundary vertices, for example {chords[0].tolist()}: "
-        "with the boundary straight they would lie on it, and what they cut off would have no "
-        "area. Use cetm-flips, or divide these edges"
+        "with a straight boundary they would lie on it, and the triangles that they cut off "
+        "would have no area. Use cetm-flips, or split these edges"
     )
 
 
@@ -152,7 +154,7 @@ def _infinity(mesh: DiskMesh, v: int, star: Indices) -> tuple[Real, Indices]:
     away = np.linalg.norm(mesh.V - mesh.V[v], axis=1)
     away[v] = 1.0
     if not away.min() > 0:
-        raise AlgorithmFailed(f"another vertex coincides with the boundary vertex {v}")
+        raise AlgorithmFailed(f"another vertex coincides with boundary vertex {v}")
     u = -2 * np.log(away)
     return u - u.mean(), np.setdiff1d(star, [v])
 
@@ -161,7 +163,7 @@ def _half_plane(mesh: DiskMesh, v: int, F: Indices, found: FlatMetric) -> Comple
     """Lay out the flat surface above the real axis, with the old boundary on the axis."""
     loops = boundary_loops(F, mesh.n)
     if len(loops) != 1:
-        raise AlgorithmFailed(f"without the boundary vertex {v} the surface falls apart")
+        raise AlgorithmFailed(f"without boundary vertex {v} the surface is not connected")
     after = np.roll(mesh.boundary, -1)[mesh.boundary == v]
     loop = np.roll(loops[0], -int(np.flatnonzero(loops[0] == after)[0]))
     on_line = np.isin(loop, mesh.boundary)
@@ -193,7 +195,7 @@ def _on_disk(mesh: DiskMesh, z: Complex, v: int) -> Complex:
     corners = middle_triangle(mesh.V, mesh.F)
     p = complex(z[corners[corners != v]].mean())
     if not p.imag > 0:
-        raise AlgorithmFailed("the middle of the surface is mapped to its boundary")
+        raise AlgorithmFailed("the centre of the surface is mapped to the boundary")
     w = np.empty_like(z)
     others = np.arange(mesh.n) != v
     w[others] = (z[others] - p) / (z[others] - p.conjugate())

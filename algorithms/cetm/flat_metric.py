@@ -101,7 +101,7 @@ def flat_metric(
     kept = np.ones(n, dtype=bool)
     kept[held] = False
     if not kept.any():
-        raise AlgorithmFailed("the scale of every vertex is held: the mesh has no interior vertex")
+        raise AlgorithmFailed("the scale of every vertex is fixed: the mesh has no interior vertex")
     with phase("assembly"):
         pattern = BlockPattern(F, kept)
     cholesky: Cholesky | None = None
@@ -141,9 +141,9 @@ def flat_metric(
     told = f"the angle sums are still off by up to {history[-1]:.2g} rad, tolerance {tolerance:g}"
     if broken.any():
         raise AlgorithmFailed(
-            f"{int(broken.sum())} of {len(F)} triangles cannot keep the triangle inequality: this "
-            "triangulation has no flat metric that is discretely conformally equivalent to its "
-            "own. cetm-flips changes the triangulation where it must"
+            f"{int(broken.sum())} of {len(F)} triangles cannot keep the triangle inequality: "
+            "this triangulation has no flat metric that is discretely conformally equivalent to "
+            "its own. Use cetm-flips, which changes the triangulation where needed"
         )
     if history[-1] > tolerance:
         raise AlgorithmFailed(

@@ -209,8 +209,8 @@ def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, 
     off, k, here, there = min(found, key=lambda one: one[0])
     if not off < 1e-3:
         raise AlgorithmFailed(
-            f"the laid out flat surface is not an equilateral triangle (off by {off:.2g}): its "
-            "positions differ by more than doubles can resolve"
+            f"the flat layout is not an equilateral triangle (off by {off:.2g}): double "
+            "precision cannot resolve its positions"
         )
     third = here + (there - here) * np.exp(1j * np.pi / 3)
     centre = (here + there + third) / 3

@@ -65,7 +65,7 @@ def direct_cem(
     moved into the `gauge`, that is, a mean is moved to 0: of the boundary by length, of that
     triangle, or of the surface by area; from there on Moebius maps are fixed by the start's arcs.
     The iteration ends when the gradient, whose squared norm is about twice what E_C can still
-    decrease, shows that this is at most the share `tolerance` of E_C (`stopped`: "gradient"), when
+    decrease, shows that this is at most `tolerance` times E_C (`stopped`: "gradient"), when
     only rounding is left ("rounding"), after `max_iterations` ("iterations"), or when too many arcs
     would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those held).
     Near its minimum E_C is flat but the angles are not, and harmonic measure has better ones. So

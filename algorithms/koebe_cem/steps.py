@@ -1,10 +1,10 @@
 """Koebe's method for surfaces with holes (the paper's Algorithm 2; Zeng et al. 2009).
 
 One step opens one boundary, fills all others, and maps that disk by CEM, so that the open boundary
-becomes a circle. A sweep does so for every boundary, the outer one last. Here the surface's own
-triangles have the cotangent weights of the surface in every step, since its conformal structure
-does not change; only the patches come from the plane. So the map is not a composition of maps with
-an error each, and errors of earlier steps are forgotten.
+becomes a circle. A sweep repeats this for every boundary, the outer one last. The surface's own
+triangles keep the cotangent weights of the surface in every step, because its conformal structure
+does not change; only the patches get weights from the plane. So the map is not a composition of
+inexact maps, and the errors of earlier steps do not accumulate.
 """
 
 from __future__ import annotations
@@ -253,8 +253,8 @@ def _outside_in(uv: Complex, loop: Loop) -> Complex:
     away = uv - uv[loop].mean()
     if not np.abs(away).min() > 0:
         raise AlgorithmFailed(
-            f"the boundary of vertex {int(loop.min())} has a vertex at its own centroid, "
-            "at which the image is inverted"
+            f"the boundary of vertex {int(loop.min())} has a vertex at its own centroid, the "
+            "centre of the inversion"
         )
     return 1 / away
 
@@ -286,7 +286,7 @@ def _planar_laplacian(points: Real, F: NDArray[np.int64]) -> scipy.sparse.csc_ar
         L = cotangent_laplacian(points, F)
     if not np.isfinite(L.data).all():
         raise AlgorithmFailed(
-            "a triangle has collapsed in the image, so the plane gives it no weights; take those "
+            "a triangle has collapsed in the image, so it has no weights in the plane; use those "
             "of the surface (weights=surface)"
         )
     return L

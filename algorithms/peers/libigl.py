@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.conformal.free_boundary import far_apart
+from cembench.conformal.free_boundary import two_distant_vertices
 from cembench.conformal.harmonic import arc_length_circle
 from cembench.conformal.planar import folded_triangles, polygon_area
 from cembench.core.errors import AlgorithmFailed
@@ -40,7 +40,7 @@ def igl_lscm(mesh: DiskMesh) -> Parameterization:
     """
     import igl
 
-    pins = far_apart(mesh)
+    pins = two_distant_vertices(mesh)
     uv, _ = igl.lscm(mesh.V.copy(), mesh.F.copy(), pins, np.array([[-1.0, 0.0], [1.0, 0.0]]))
     return Parameterization(_of_area_pi(mesh, _complex(uv)), extras={"pins": pins.tolist()})
 

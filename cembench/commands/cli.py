@@ -340,7 +340,7 @@ def run(
         _present_plan(tasks, Store(output), options, as_json=as_json, on_cluster=on_cluster)
         return
     if many is not None:
-        set_verbs.lay_into(output, many, sets)
+        set_verbs.write_set_exhibit(output, many, sets)
     elif not as_json:
         print_notices(found)
     if machines is None:
@@ -469,7 +469,7 @@ def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None
 def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
     from cembench.report.content.many import MANY
     from cembench.report.render.terminal import results_table, speedups_table
-    from cembench.report.render.terminal_many import machines_told, many_table
+    from cembench.report.render.terminal_many import machine_lines, many_table
     from cembench.results.record_rows import REFERENCE, rows
     from cembench.results.store import Store
 
@@ -479,7 +479,7 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
         print_json(rows(records, reference))
     elif len({record.cell.mesh_hash for record in records}) > MANY:
         out.print(many_table(records))
-        for words in machines_told(records, environments):
+        for words in machine_lines(records, environments):
             out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
         out.print(f"Pictures and profiles: cembench report {where}", soft_wrap=True)

@@ -37,7 +37,7 @@ ESTIMATED_FOR = (1, 10, 100)
 
 
 def place_of(given: str | None, *, same_environment: bool) -> ClusterPlace | None:
-    """Read ``--cluster``, before anything else is done; None without.
+    """Parse ``--cluster`` before anything else; return None without it.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def measure(
     from cembench.running.cluster.connect import connected
 
     with resumable(), progress_on(err, len(tasks), on_cluster=True) as progress:
-        progress.tells("starting workers" if where.kind != "address" else "connecting")
+        progress.shows("starting workers" if where.kind != "address" else "connecting")
         with connected(where) as client:
             return run_on_cluster(
                 tasks,

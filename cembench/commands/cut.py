@@ -48,7 +48,8 @@ def cut(
     check_writable_format(output, with_uv=False)
     if output.suffix.lower() == ".stl":
         raise MeshError(
-            f"{output}: STL holds no connectivity, so the cut would close again; allowed here: "
+            f"{output}: STL stores no connectivity, so the cut would be closed again; allowed "
+            "here: "
             ".obj, .off, .ply."
         )
     seam = output.with_name(f"{output.stem}_seam.csv")

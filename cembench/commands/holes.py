@@ -108,7 +108,7 @@ def _show(rows: list[dict[str, Any]], run: Path) -> None:
                 row["status"],
             ]
         )
-    heads = figures("sweeps", "E_C", "mean", "SD", "circ.", "folds", "sec")
+    heads = figures("sweeps", "E_C", "angle°", "SD°", "circ.", "folds", "sec")
     columns = [names("surface", 14), names("algorithm"), *heads, names("status")]
     out.print(grid(columns, lines))
     out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)

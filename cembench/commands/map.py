@@ -181,20 +181,20 @@ def map_(
     if cut:
         check_takes_disks(candidates)
     outputs = output_files(meshes, output)
-    wishes = map_files.Wishes(place, checker, bake)
+    file_options = map_files.FileOptions(place, checker, bake)
     extras = Extras(samples, remeshed, side, place, page)
-    check_extras(meshes, outputs, wishes, extras)
+    check_extras(meshes, outputs, file_options, extras)
     is_atlas = any(a.target == "atlas" for a in candidates)
     if is_atlas and (extras.files or bake or len(meshes) > 1):
         raise ParameterError(
-            f"{candidates[0].name} makes an atlas: map one surface, without --geometry-image, "
-            "--remesh, --html and --bake, which need one image for each vertex."
+            f"{candidates[0].name} makes an atlas: map one surface at a time, without "
+            "--geometry-image, --remesh, --html and --bake, which need one UV per vertex."
         )
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched_files = {path: fetched(registry.dataset(str(path))) for path in known}
     sources = [fetched_files.get(path, path) for path in meshes]
     targets = list(dict.fromkeys(target for target in outputs if target is not None))
-    others = [path for target in targets for path in map_files.beside(target, wishes)]
+    others = [path for target in targets for path in map_files.beside(target, file_options)]
     for target in (*targets, *others, *extras.files):
         refuse_inputs(target, [*sources, *([bake] if bake else [])], force=force)
     refuse_present(others if output in outputs else [*targets, *others], force=force)
@@ -204,7 +204,7 @@ def map_(
     for source, place_of in zip(sources, outputs, strict=True):
         with err.status(f"reading {source}", spinner="line"):
             shells = read_shells(source, candidates, mend=mend, cut=cut)
-        check_shells(len(shells.parts), source, wishes, extras)
+        check_shells(len(shells.parts), source, file_options, extras)
         jobs = jobs_of(shells, registry, candidates, assignments(parameter), how, plugin)
         files.append(FileJobs(shells, jobs, None if together else place_of))
     if preview and is_atlas:
@@ -222,7 +222,9 @@ def map_(
     count = sum(len(file.jobs) for file in files)
     found: list[Mapped] = []
     busy = partial(err.status, spinner="line")
-    for mapped in map_surfaces(files, options, wishes, extras, busy, keep_invalid=keep_invalid):
+    for mapped in map_surfaces(
+        files, options, file_options, extras, busy, keep_invalid=keep_invalid
+    ):
         found.append(mapped)
         for path, notice in mapped.told:
             note(f"{path}: {notice}")
@@ -235,7 +237,7 @@ def map_(
     missing = incomplete(files, found, keep_invalid=keep_invalid)
     if together and output is not None:
         if all(m.uv is not None and (m.ok or keep_invalid) for m in found):
-            for notice in write_together(output, found, wishes):
+            for notice in write_together(output, found, file_options):
                 note(f"{output}: {notice}")
         else:
             missing.append(output)

@@ -108,7 +108,7 @@ def morph(
     from cembench.drawing.camera import viewpoints
     from cembench.results import run_folder
     from cembench.workflows.morphing.drawing import check_views
-    from cembench.workflows.morphing.exhibit import lay_down
+    from cembench.workflows.morphing.exhibit import write_morph_exhibits
     from cembench.workflows.morphing.landmarks import common_landmarks, read_landmarks
     from cembench.workflows.morphing.morph import morph as morphed
     from cembench.workflows.morphing.surfaces_and_films import (
@@ -196,7 +196,7 @@ def morph(
             given += [] if faces is None else ["--faces", str(faces)]
             command = f"cembench morph {' '.join(given)} --run {run}"
             standing = rows_of_paper(registry, surfaces)
-            written += lay_down(run, found, figures, command, standing, status.update)
+            written += write_morph_exhibits(run, found, figures, command, standing, status.update)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -231,9 +231,9 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
             "Dirichlet energy": f"{row['dirichlet_energy']:.4f}",
             "dilatation": "not finite: a triangle has almost no area"
             if row["dilatation_max"] is None
-            else f"{row['dilatation_mean']:.2f} in the mean, {row['dilatation_max']:.1f} at most",
+            else f"mean {row['dilatation_mean']:.2f}, maximum {row['dilatation_max']:.1f}",
             "folded triangles": f"{row['flipped_triangles']}",
-            "distance": f"{row['distance_mean_edges']:.3f} mean edges in the mean, "
+            "distance": f"{row['distance_mean_edges']:.3f} mean edges on average, "
             f"{row['hausdorff_edges']:.2f} at most",
         }
         for name, words in lines.items():

@@ -87,7 +87,7 @@ class PlainProgress(Watcher):
         """Store the number of processes."""
         self.remaining.expect(processes)
 
-    def goes_on(self, task: Task, rounds: int) -> None:
+    def adds_rounds(self, task: Task, rounds: int) -> None:
         """Add the processes of further rounds."""
         self.remaining.expect_more(task.cell.label, rounds)
 
@@ -114,9 +114,9 @@ class PlainProgress(Watcher):
     def machines(self, names: Sequence[str]) -> None:
         """Print the number of workers; those of one machine take turns."""
         self.remaining.machines = max(1, len(set(names)))
-        self.tells(f"{len(names)} worker{'' if len(names) == 1 else 's'} there")
+        self.shows(f"{len(names)} worker{'' if len(names) == 1 else 's'} there")
 
-    def tells(self, words: str) -> None:
+    def shows(self, words: str) -> None:
         """Print what happened on a cluster; a live display stays below it."""
         self.console.print(words, markup=False, soft_wrap=True)
 
@@ -125,7 +125,7 @@ class PlainProgress(Watcher):
 
 
 class PlainOnCluster(PlainProgress):
-    """As its base, without lines for rounds: several machines are at several rounds."""
+    """Like its base, without lines for rounds, because machines are at different rounds."""
 
     def starts(self, task: Task, step: Step) -> None:
         """Print nothing."""

@@ -142,7 +142,7 @@ def show(
     run: Annotated[Path, typer.Option("--run", help="The run's folder.")] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """Show everything that is recorded of a cell."""
+    """Show everything that is recorded about a cell."""
     from cembench.results.record_rows import row
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records, verify_map
@@ -273,8 +273,8 @@ def merge(
         _show_conflicts(found.conflicts, output)
     if len(used) > 1:
         warn(
-            f"measured in {len(used)} environments, on {len(machines)} machines; only ratios of "
-            "one sitting compare"
+            f"measured in {len(used)} environments, on {len(machines)} machines; only ratios "
+            "measured in one sitting can be compared"
         )
 
 
@@ -286,8 +286,8 @@ def _show_conflicts(conflicts: Sequence[Conflict], output: Path) -> None:
     if not conflicts:
         return
     out.print(
-        f"{len(conflicts)} cells were measured on several machines; the first named stands in the "
-        f"run, the others in {output / 'others'}:",
+        f"{len(conflicts)} cells were measured on several machines; the first one named is kept in "
+        f"the run, the others in {output / 'others'}:",
         soft_wrap=True,
     )
     for conflict in conflicts[:NAMED]:

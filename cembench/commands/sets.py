@@ -41,7 +41,7 @@ def gather(
             given += surfaces_of_set(name, registry, limit=limit, progress=progress)
     found = gathered(given, registry, chosen)
     for one in found.refused[:NAMED]:
-        note(f"{one.name} is left out: {_in_one_line(one.error)}")
+        note(f"{one.name} is left out: {_first_problem(one.error)}")
     more = len(found.refused) - NAMED
     if more > 0:
         note(f"{more} more are left out; the report lists them")
@@ -53,13 +53,13 @@ def gather(
     return found
 
 
-def _in_one_line(error: str) -> str:
+def _first_problem(error: str) -> str:
     """Return the first of what may be several problems, one a line."""
     first, *more = error.splitlines() or [""]
     return f"{first} {more[0].strip()}{' ...' if len(more) > 1 else ''}" if more else first
 
 
-def lay_into(run: Path, found: Gathered, sets: Sequence[str]) -> None:
+def write_set_exhibit(run: Path, found: Gathered, sets: Sequence[str]) -> None:
     """Store in a run's folder which surfaces its sets gave, for the report."""
     from cembench.results.exhibits import write_exhibit
     from cembench.workflows.sets import exhibit_of

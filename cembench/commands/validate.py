@@ -140,7 +140,7 @@ def validate(
         command=shlex.join(["cembench", *sys.argv[1:]]),
     )
     with _folder(output) as folder:
-        found = examine(solver, registry, folder, asked, _telling())
+        found = examine(solver, registry, folder, asked, _printing_hooks())
         written = write_validation(found, folder) if output is not None else {}
     if as_json:
         print_json(_as_json(found, written))
@@ -185,7 +185,7 @@ def _folder(output: Path | None) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _telling() -> ValidationHooks:
+def _printing_hooks() -> ValidationHooks:
     """Return hooks that print a line for each stage and the progress of timing."""
     from cembench.commands.progress import progress_on
     from cembench.validation.examine import ValidationHooks

@@ -125,22 +125,22 @@ def _atlas(figures: MapFigures) -> AtlasFigures:
 ATLAS_METRICS: tuple[Metric, ...] = (
     Metric(
         "islands", "islands", "islands", "", "d", "d",
-        "parts of the surface that hang together in the image",
+        "connected parts of the image",
         lambda f: _atlas(f).cut.islands, better=None,
     ),
     Metric(
         "mirrored_islands", "mirrored islands", "mirrored", "", "d", "d",
-        "islands whose triangles run the other way round than on the surface",
+        "islands whose orientation is opposite to that of the surface",
         lambda f: _atlas(f).cut.mirrored,
     ),
     Metric(
-        "seam_length", "seams", "seams", "in units of the surface", ".3g", ".6g",
-        "length of the surface's edges along which it is cut",
+        "seam_length", "seam length", "seams", "in units of the surface", ".3g", ".6g",
+        "total length of the surface's edges along which it is cut",
         lambda f: _atlas(f).cut.seam_length,
     ),
     Metric(
-        "folds_of_worst_island", "folds, worst island", "worst", "", "d", "d",
-        "folded triangles of the island that has most",
+        "folds_of_worst_island", "folds of the worst island", "worst", "", "d", "d",
+        "number of folded triangles in the island that has the most",
         lambda f: int(_atlas(f).folds.max()),
     ),
 )  # fmt: skip

@@ -80,7 +80,7 @@ class BorderedLaplacian:
         self.parts = tuple(slice(*between) for between in pairwise(ends))
         if not len(self.interior):
             raise AlgorithmFailed(
-                "the mesh has no interior vertex, so no harmonic map has any freedom"
+                "the mesh has no interior vertex, so a harmonic map has no unknowns"
             )
         with phase("assembly"):
             self.beside = self._ring(L, iterations)

@@ -43,7 +43,7 @@ def closed_curve(lengths: Real, turns: Real) -> tuple[Complex, float]:
     change = float(np.abs(share).max())
     if not change < 1:
         raise AlgorithmFailed(
-            f"the boundary's curve does not close: an edge would have to change by {change:.2g} of "
+            f"the boundary curve does not close: an edge would have to change by {change:.2g} of "
             "its length"
         )
     edges = lengths * (1 - share) * directions

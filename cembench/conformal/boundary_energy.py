@@ -89,7 +89,7 @@ def minimise(
 ) -> Minimum:
     """Minimise the conformal energy over boundaries on circles, in the gauge `weights` (B,).
 
-    Ends when E_C can decrease by at most the share `tolerance`. The result is never above the
+    Ends when E_C can decrease by at most a relative `tolerance`. The result is never above the
     energy of the start, which is moved into the gauge first.
 
     Raises
@@ -132,8 +132,8 @@ def minimise(
     return Minimum(here, tuple(energies), gradient, reason, products, len(here.held))
 
 
-def moebius_descent(here: EnergyModel, leash: float) -> complex:
-    """Return the a, ``|a| <= leash``, whose Moebius map of the disk lowers the energy most.
+def moebius_descent(here: EnergyModel, max_modulus: float) -> complex:
+    """Return the a, ``|a| <= max_modulus``, whose Moebius map of the disk lowers the energy most.
 
     The map is z -> (z - a) / (1 - conj(a) z). By the second-order model of E_C in a: z moves by
     ``-a + conj(a) z^2 - |a|^2 z + conj(a)^2 z^3 + ...``.
@@ -146,9 +146,9 @@ def moebius_descent(here: EnergyModel, leash: float) -> complex:
     once, cubed = complex(np.vdot(z, G)), complex(np.vdot(squared * z, G))
     across = -2 * cubed.imag
     H += [[2 * (cubed - once).real, across], [across, -2 * (cubed + once).real]]
-    # In units of the leash: the model's minimum in the unit disk (More and Sorensen 1983).
-    curvatures, axes = np.linalg.eigh(leash**2 * (H + H.T) / 2)
-    first, second = map(float, leash * (axes.T @ g))
+    # In units of the max_modulus: the model's minimum in the unit disk (More and Sorensen 1983).
+    curvatures, axes = np.linalg.eigh(max_modulus**2 * (H + H.T) / 2)
+    first, second = map(float, max_modulus * (axes.T @ g))
     low_curvature, high_curvature = map(float, curvatures)
 
     def minimum(shift: float) -> tuple[float, float]:
@@ -163,7 +163,7 @@ def moebius_descent(here: EnergyModel, leash: float) -> complex:
             outside = math.hypot(*minimum(middle)) > 1
             low, high = (middle, high) if outside else (low, middle)
         low = high
-    return -leash * complex(*(axes @ minimum(low)))
+    return -max_modulus * complex(*(axes @ minimum(low)))
 
 
 def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:

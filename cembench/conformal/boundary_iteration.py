@@ -70,8 +70,8 @@ def on_circle(f_b: Complex) -> Complex:
     modulus = np.abs(f_b)
     if not modulus.min() > 0:
         raise AlgorithmFailed(
-            f"boundary vertex number {int(np.argmin(modulus))} of the loop is at the "
-            "centre of the boundary, so its place on the circle is undefined (Eq. 25)"
+            f"boundary vertex number {int(np.argmin(modulus))} of the loop lies at the centre of "
+            "the boundary, so its position on the circle is undefined (Eq. 25)"
         )
     return f_b / modulus
 

@@ -100,7 +100,7 @@ def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certifi
     steps = np.mod(np.diff([*places, places[0]]), len(mesh.boundary)) if places else np.zeros(1)
     if len(places) != 4 or min(places) < 0 or 0 in steps or steps.sum() != len(mesh.boundary):
         raise AlgorithmFailed(
-            f"{chosen.tolist()} are not four vertices of the boundary in its order, which a "
+            f"{chosen.tolist()} are not four boundary vertices in boundary order, as a "
             "quadrilateral needs"
         )
     sides = [

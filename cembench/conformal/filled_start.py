@@ -129,7 +129,7 @@ def _fitted(rims: BoundaryLoops, arcs: Real, outside: Real, to_holes: Real) -> C
         similarities[k] = (along + np.roll(along, 1)) @ ((image - centres[k]) * circle.conj())
     radii = np.abs(similarities) / (4 * np.pi)
     radii[rims.outer] = 1
-    radii[rims.holes] = _with_room(centres[rims.holes], radii[rims.holes])
+    radii[rims.holes] = _radii_without_overlap(centres[rims.holes], radii[rims.holes])
     return CircleDomain(rims, arcs, np.angle(similarities), centres, radii, LEAST_SHARE * arcs)
 
 
@@ -156,7 +156,7 @@ def _arcs_about(loop: Complex, otherwise: Real) -> Real:
     return _of_circle(np.angle(loop / np.roll(loop, -1)))
 
 
-def _with_room(centres: Complex, radii: Real) -> Real:
+def _radii_without_overlap(centres: Complex, radii: Real) -> Real:
     """Return radii reduced until there is room between the circles."""
     apart = np.abs(centres[:, None] - centres)
     np.fill_diagonal(apart, np.inf)

@@ -173,9 +173,9 @@ def in_order(circle: Complex) -> Complex:
     scrambled = backward_arcs(circle) > MOST_BACKWARD * len(circle)
     if turns != 1 or scrambled or backward_arcs(ordered):
         raise AlgorithmFailed(
-            f"the boundary goes round the circle {turns} time(s) counter-clockwise (once is "
-            f"right), and {backward_arcs(circle)} of its {len(circle)} arcs go backward or "
-            "nowhere: too far out of order to be repaired"
+            f"the boundary winds around the circle {turns} time(s) counter-clockwise (it must be "
+            f"once), and {backward_arcs(circle)} of its {len(circle)} arcs go backward or have "
+            "no length: the order cannot be repaired"
         )
     return ordered
 

@@ -31,7 +31,7 @@ def conformal_energy_form(
     return scipy.sparse.block_array([[L, -D], [D, L]], format="csc")
 
 
-def far_apart(mesh: DiskMesh) -> NDArray[np.int64]:
+def two_distant_vertices(mesh: DiskMesh) -> NDArray[np.int64]:
     """Return two boundary vertices (2,): the farthest from the mean vertex and from the first."""
     loop = mesh.V[mesh.boundary]
     first = int(np.argmax(np.linalg.norm(loop - mesh.V.mean(axis=0), axis=1)))

@@ -218,7 +218,7 @@ def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
         opened.flush()
         arrived = os.fstat(opened.fileno()).st_size
         if arrived != file.end:
-            raise OSError(errno.EIO, f"{arrived} of {file.end} bytes arrived")
+            raise OSError(errno.EIO, f"{arrived} of {file.end} bytes were written")
     finally:
         with suppress(OSError):  # the first error counts
             file.close()  # otherwise its deletion would close `opened` a second time

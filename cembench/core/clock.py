@@ -1,4 +1,4 @@
-"""Where does the time go? Phases of a timed call, each exclusive of the phases nested in it.
+"""The phases of a timed call, each exclusive of the phases nested in it.
 
 A kernel marks its work with ``with phase("factorisation"):``. Outside a measurement that costs one
 dictionary look-up. Inside :func:`measure` the seconds of all phases, with the remainder as

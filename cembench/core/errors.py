@@ -138,7 +138,7 @@ class RenderError(CembenchError):
 LONGEST_MESSAGE = 2_000
 
 
-def said_by(error: BaseException) -> str:
+def describe_error(error: BaseException) -> str:
     """Return the type and message of an exception, cut to a bounded length."""
     return shortened(f"{type(error).__name__}: {message_of(error)}")
 

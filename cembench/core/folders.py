@@ -115,8 +115,9 @@ def publish(draft: Path, folder: Path, kind: Kind) -> None:
     if in_the_way:
         held = ", ".join(in_the_way[:_NAMED]) + (", ..." if len(in_the_way) > _NAMED else "")
         raise RecordError(
-            f"{folder} has files that cembench did not write, or that were changed since, where "
-            f"the {kind} has its own: {held}. Nothing was changed. Move them away, or name another "
+            f"{folder} has files that cembench did not write, or that were changed since, in "
+            f"place of those of the {kind}: {held}. Nothing was changed. Move them away, or name "
+            "another "
             "folder with -o."
         )
     try:

@@ -110,7 +110,7 @@ def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
         if dtype.hasobject:
             raise ValueError(f"{name} is pickled; pickles are never read")
         if file.tell() + announced != member.file_size:
-            raise ValueError(f"{name} declares {announced:,} bytes but has another number")
+            raise ValueError(f"{name} declares {announced:,} bytes but holds a different number")
         if announced > psutil.virtual_memory().available:
             raise ValueError(f"{name} declares {announced:,} bytes, more than memory can hold")
     with archive.open(member) as file:

@@ -122,8 +122,8 @@ def checked_program(name: str, program: Program, parameters: Iterable[str]) -> P
         wrong = "its command does not say where the mesh file goes; write {input} there"
     elif not program.names_its_file and not {"output", "folder"} & set(used):
         wrong = (
-            "its command does not say where the UVs go; write {output} there, or give the "
-            "name of the file that it writes as output"
+            "its command does not say where the UVs go; write {output} there, or set "
+            "`output` to the name of the file that it writes"
         )
     elif program.input not in INPUTS:
         wrong = f"input {program.input!r} is unknown; allowed: {', '.join(INPUTS)}"

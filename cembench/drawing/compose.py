@@ -49,20 +49,20 @@ LINE = 1.32
 SAMPLES, COMPRESSION = 3, 4
 
 
-def gap_of(size: tuple[int, int]) -> int:
+def panel_gap(size: tuple[int, int]) -> int:
     """Return the white space around the panels, in pixels."""
     return round(GAP * size[0] / DESIGN_WIDTH)
 
 
-def side_of(size: tuple[int, int]) -> int:
+def panel_side(size: tuple[int, int]) -> int:
     """Return the side of a panel in pixels, for a page of this width and height."""
-    gap, words = gap_of(size), round(WORDS * size[0] / DESIGN_WIDTH)
+    gap, words = panel_gap(size), round(WORDS * size[0] / DESIGN_WIDTH)
     return min((size[0] - 3 * gap) // 2, size[1] - gap - words)
 
 
 def panels_of(size: tuple[int, int]) -> tuple[tuple[int, int], tuple[int, int]]:
     """Return the column and row of the upper left pixels of the surface and image panels."""
-    gap, side = gap_of(size), side_of(size)
+    gap, side = panel_gap(size), panel_side(size)
     left = (size[0] - 2 * side - gap) // 2
     return (left, gap), (left + side + gap, gap)
 
@@ -96,7 +96,7 @@ def page(
     Parameters
     ----------
     surface, image : uint8 (side, side, 3)
-        The pictures, of the size that :func:`side_of` returns.
+        The pictures, of the size that :func:`panel_side` returns.
     overlay : Overlay
         Marks drawn over the image.
     words : tuple of str
@@ -127,7 +127,7 @@ def png(picture: Picture) -> bytes:
 def _add_overlay(whole: Image.Image, overlay: Overlay, size: tuple[int, int]) -> None:
     """Draw curves and rings over the image, in place."""
     line = max(1.6 * size[0] / DESIGN_WIDTH, 0.8)
-    side, corner = side_of(size), panels_of(size)[1]
+    side, corner = panel_side(size), panels_of(size)[1]
     wide = round(line * SAMPLES)
 
     def drawn(colour: tuple[int, ...], add: Callable[[ImageDraw.ImageDraw], None]) -> None:
@@ -162,8 +162,8 @@ def _add_words(whole: Image.Image, text: str, style: Style, size: tuple[int, int
     if not text:
         return
     scale = size[0] / DESIGN_WIDTH
-    room = size[1] - gap_of(size) - side_of(size)
-    lines, pixels = _fitted(text, style, style.pixels * scale, size[0] - 2 * gap_of(size))
+    room = size[1] - panel_gap(size) - panel_side(size)
+    lines, pixels = _fitted(text, style, style.pixels * scale, size[0] - 2 * panel_gap(size))
     middle = size[1] - style.place * min(room, WORDS * scale)
     draw, font = ImageDraw.Draw(whole), _font(pixels, bold=style.bold)
     for k, line in enumerate(lines):

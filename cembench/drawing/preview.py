@@ -88,7 +88,7 @@ def preview_png(
     _check(mesh, uv, size)
     uv = upright(mesh, uv) if turned else uv
     scene = Scene.of(mesh, uv)
-    surface, image = _draw(scene, compose.side_of(size))
+    surface, image = _draw(scene, compose.panel_side(size))
     outline = image_in_window(uv)[:, :2]
     overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
     return compose.page(
@@ -127,9 +127,10 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
             f"the map is NaN or infinite at {len(bad)} of {mesh.n} vertices, the first being "
             f"{bad[0]} (counted from 0); a picture needs finite values."
         )
-    if size[0] < LEAST[0] or size[1] < LEAST[1] or compose.side_of(size) < 64:
+    if size[0] < LEAST[0] or size[1] < LEAST[1] or compose.panel_side(size) < 64:
         raise ParameterError(
-            f"size {size[0]} x {size[1]} leaves no room for two panels and words; allowed is "
+            f"size {size[0]} x {size[1]} is too small for two panels and their captions; allowed "
+            "is "
             f"{LEAST[0]} x {LEAST[1]} and above."
         )
 

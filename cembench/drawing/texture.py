@@ -77,7 +77,7 @@ def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
     raster = rasterize(window.reshape(-1, 3), side)
     place = raster.interpolate(old.reshape(-1, 2))
     colours = np.zeros((side * side, 4))
-    colours[raster.pixel] = _looked_up(np.asarray(texture, dtype=np.float64), place)
+    colours[raster.pixel] = _bilinear(np.asarray(texture, dtype=np.float64), place)
     missing = np.ones(side * side, dtype=bool)
     missing[raster.pixel] = False
     nearest = ndimage.distance_transform_edt(
@@ -87,7 +87,7 @@ def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
     return _png(Image.fromarray(filled.round().astype(np.uint8), "RGBA"))
 
 
-def _looked_up(pixels: Real, place: Real) -> Real:
+def _bilinear(pixels: Real, place: Real) -> Real:
     """Return the colours (k, 4) at texture coordinates (k, 2), with bilinear interpolation."""
     height, width = pixels.shape[:2]
     x = place[:, 0] * width - 0.5

@@ -50,16 +50,16 @@ def upright(mesh: TriangleMesh, z: Complex) -> Complex:
     Conformal maps are free to rotate; turned alike, maps of one surface can be compared by eye.
     """
     seen = mesh.V @ view_rotation(mesh).T
-    return turned_onto(z, seen[:, 0] + 1j * seen[:, 1])
+    return rotated_to_match(z, seen[:, 0] + 1j * seen[:, 1])
 
 
-def turned_onto(z: Complex, other: Complex) -> Complex:
+def rotated_to_match(z: Complex, other: Complex) -> Complex:
     """Turn a map about the origin so that it is closest to another, averaged over vertices."""
     overlap = complex(np.vdot(z, other - other.mean()))
     return z if overlap == 0 else z * (overlap / abs(overlap))
 
 
-def most_each(surfaces: int) -> int:
+def triangles_per_surface(surfaces: int) -> int:
     """Return the number of triangles that each of several surfaces on one page may have."""
     return min(MOST, max(LEAST, TOGETHER // max(surfaces, 1)))
 
@@ -110,7 +110,7 @@ def view_scene(
     add("V", (65535 * (V - low) / extent).round().astype(np.uint16))
     add("F", chosen.F.astype(np.uint16 if len(V) <= 65536 else np.uint32))
     for k, shown in enumerate(maps):
-        turned = turned_onto(shown.z, first)
+        turned = rotated_to_match(shown.z, first)
         add(f"uv{k}", _in_box(turned, chosen.vertices, precise=len(maps) <= FEW))
         for name, values in _distortions(mesh, shown.z).items():
             add(f"{name}{k}", values[chosen.origin])

@@ -21,7 +21,7 @@ _COUNTED_FROM = (1, 0)
 def soup_of_arrays(
     found: Mapping[str, NDArray[Any]], asked: tuple[str, str] | None, counted_from: int | None
 ) -> Soup:
-    """Return the surface in arrays: those asked for, those with usual names, or the two that fit.
+    """Build a surface from the requested arrays, else from usual names, else from two that fit.
 
     Two arrays fit if one is (n, 3) or (n, 2) and the other is (m, 3) with whole numbers that
     include the first and the last vertex. Two-dimensional vertices are used only if no others fit,

@@ -212,7 +212,7 @@ def fetch(
     if is_fetched(dataset):
         return dataset.path
     try:
-        if same := _of_same_content(dataset, have):
+        if same := _file_with_content(dataset, have):
             _keep(dataset, lambda file: _copied(same, file))
             return dataset.path
         require(Extra.FETCH, f"fetching {dataset.file} from {dataset.url}")
@@ -244,7 +244,7 @@ def _copied(path: Path, file: BinaryIO) -> None:
         shutil.copyfileobj(source, file)
 
 
-def _of_same_content(dataset: Dataset, have: Sequence[Path]) -> Path | None:
+def _file_with_content(dataset: Dataset, have: Sequence[Path]) -> Path | None:
     """Return a file with this dataset's content in the cache or in a folder of `have`."""
     if not dataset.sha256:
         return None

@@ -121,7 +121,7 @@ def _remedies(problems: Sequence[Problem], path: Path | None) -> str:
             "Angles do not depend on the scale: divide all coordinates by the same number."
         )
     if Remedy.repair in needed:
-        does = "mends this" if len(problems) == 1 else "mends what can be mended"
+        does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
         advice.append(
             f"`cembench repair {given} -o {mended}` {does}, or add --repair to map or run."
         )
@@ -134,8 +134,8 @@ def _remedies(problems: Sequence[Problem], path: Path | None) -> str:
     if Remedy.cut in needed:
         cut = "OUT" if path is None else f"{shlex.quote(path.stem + '_cut')}.obj"
         advice.append(
-            f"`cembench cut {given} -o {cut}` makes it a disk, or add --cut to map: then the UVs "
-            "are written for the uncut surface."
+            f"`cembench cut {given} -o {cut}` makes it a disk, or add --cut to map, which writes "
+            "the UVs for the uncut surface."
         )
     if Remedy.other_algorithm in needed:
         advice.append("Use an algorithm for disks (see `cembench list algorithms`).")
@@ -330,8 +330,9 @@ def coincident(V: Points) -> Problem | None:
     return Problem(
         Defect.coincident,
         len(extra),
-        f"coincident vertices: {len(extra)} vertices lie exactly where another does, the first "
-        f"pair being {i} and {j} (counted from 0); seams may be open that should be closed",
+        f"coincident vertices: {len(extra)} vertices have exactly the position of another "
+        f"vertex, the first pair being {i} and {j} (counted from 0); there may be open seams "
+        "that should be closed",
     )
 
 
@@ -434,7 +435,7 @@ def _degenerate(bad: Indices, F: Indices) -> Problem | None:
         Defect.degenerate,
         len(bad),
         f"degenerate triangles (zero area): {some(bad)} (counted from 0), the first with vertices "
-        f"{F[bad[0]].tolist()}; angles are not defined there",
+        f"{F[bad[0]].tolist()}; their angles are undefined",
     )
 
 
@@ -473,7 +474,7 @@ def _one_sided(contradictions: Indices, faces: Indices) -> Problem | None:
         Defect.one_sided,
         len(contradictions),
         f"the surface is one-sided (like a Moebius strip): the triangles at edge {i}-{j} "
-        "contradict each other however they are turned; a repair cuts it there",
+        "cannot be oriented consistently; a repair cuts the surface there",
     )
 
 
@@ -483,7 +484,8 @@ def _orientation(bad: Indices, F: Indices) -> Problem | None:
     return Problem(
         Defect.orientation,
         len(bad),
-        f"inconsistent orientation: {len(bad)} triangle(s) face the other way than the rest, the "
+        f"inconsistent orientation: {len(bad)} triangle(s) have the opposite orientation to the "
+        "rest, the "
         f"first with vertices {F[bad[0]].tolist()}",
     )
 
@@ -504,5 +506,5 @@ def _vertices(F: Indices) -> Problem | None:
         Defect.vertices,
         len(bad),
         f"non-manifold vertex {some(bad)} (counted from 0): its triangles form more than one fan, "
-        "so the surface touches itself in a point",
+        "so the surface touches itself at a point",
     )

@@ -57,7 +57,9 @@ def _read(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[s
             kind, size = _two_numbers(begin, 0, order)
             begin = begin[8:]
         if kind != _ARRAY:
-            raise damaged(f"it cannot be read as MAT: an element of type {kind} where arrays are")
+            raise damaged(
+                f"it cannot be read as MAT: an element of type {kind} where an array is expected"
+            )
         name, shape, flags = _head(_elements(begin, order), order)
         if is_wanted(name, shape if _is_numeric(flags) else []) and name not in found:
             whole = element if begin is element else _inflated_whole(element, size + 8)[8:]
@@ -80,7 +82,7 @@ def _byte_order(content: bytes) -> str:
             f"MATLAB files of version {'7.3' if version else '4'} are not supported. In MATLAB, "
             "save it with save(..., '-v7')."
         )
-    raise damaged("it cannot be read as MAT: it does not begin as files of versions 5 to 7.2 do")
+    raise damaged("it cannot be read as MAT: it does not have the header of versions 5 to 7.2")
 
 
 def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
@@ -105,7 +107,7 @@ def _elements(content: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
     """Return the two 32-bit numbers at a position."""
     if at + 8 > len(content):
-        raise damaged("it cannot be read as MAT: it ends within the head of an element")
+        raise damaged("it cannot be read as MAT: it ends within the header of an element")
     first, second = np.frombuffer(content, f"{order}u4", 2, at).tolist()
     return first, second
 

@@ -91,7 +91,8 @@ def _face(words: list[str], vertices: int) -> list[int]:
     if min(face) < 1:
         if 0 in face or min(face) < -vertices:
             raise ValueError(
-                f"vertex index out of range; the file counts from 1, or back from -1 to -{vertices}"
+                f"vertex index out of range; allowed are 1 to {vertices}, or -1 to -{vertices} "
+                "counted backward"
             )
         face = [k if k > 0 else vertices + 1 + k for k in face]
     return face

@@ -39,7 +39,8 @@ def read_off(path: Path) -> Soup:
                 raise damaged(f"line {number}, {shown(' '.join(words))}: {told}") from None
         for number, words in lines:
             raise damaged(
-                f"{vertices} vertices and {faces} faces are declared, but the file goes on at line "
+                f"{vertices} vertices and {faces} faces are declared, but the file continues at "
+                "line "
                 f"{number}, {shown(' '.join(words))}"
             )
     return Soup.from_arrays(coordinates, corners, sizes)

@@ -192,7 +192,7 @@ def _header(text: bytes) -> tuple[str, list[_Element], int, int]:
     end_of_line = first[1]
     last = re.search(end_of_line + rb"end_header[ \t]*" + end_of_line, text)
     if not last:
-        raise damaged(f"the header does not end: no line 'end_header' in {len(text)} bytes")
+        raise damaged(f"the header has no end: no line 'end_header' in {len(text)} bytes")
     lines = text[: last.start()].decode("latin-1").split(end_of_line.decode())
     form, elements = "", list[_Element]()
     for number, line in enumerate(lines[1:], 2):
@@ -262,7 +262,7 @@ def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
         for word in line.split():
             if not _is_number(word):
                 raise damaged(f"line {number}, {shown(line)}: {shown(word)} is not a number")
-    raise damaged("the body holds what is not a number")
+    raise damaged("the body holds a word that is not a number")
 
 
 def _is_number(word: str) -> bool:

@@ -82,7 +82,7 @@ def read_soup(
         suffix = path.suffix.lower()
         if arrays and suffix not in _OF_ARRAYS:
             raise MeshError(
-                f"arrays are named for {', '.join(_OF_ARRAYS)} files only, not for {suffix}."
+                f"arrays can be named only for {', '.join(_OF_ARRAYS)} files, not for {suffix}."
             )
         soup = _OF_ARRAYS[suffix](path, arrays) if arrays else READERS[suffix](path)
         return (soup.subset(*polygons) if polygons else soup).named(path.stem)
@@ -111,12 +111,12 @@ def _check_file(path: Path) -> None:
             what = f"this is a symbolic link to {path.readlink()}, which does not exist"
         raise MeshError(f"{what}. Check the path; paths are relative to {Path.cwd()}.") from None
     except ValueError:
-        raise MeshError("this is not a possible name of a file. Check the path.") from None
+        raise MeshError("this cannot be a file name. Check the path.") from None
     for is_special, what in _SPECIAL_FILES:
         if is_special(found.st_mode):
             raise MeshError(
-                f"this is {what}, not a file. Name a mesh file; what a pipe or a device gives can "
-                "be saved to one."
+                f"this is {what}, not a file. Name a mesh file; save the output of a pipe or a "
+                "device to a file first."
             )
     if not is_named_like_a_mesh(path):
         raise MeshError(

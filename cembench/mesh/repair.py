@@ -184,13 +184,13 @@ def repair(
     wrong_scale = out_of_scale(points, F)
     if wrong_scale is not None:
         raise UnusableMeshError([wrong_scale])
-    F = _mend_degenerate(points, F, steps)
+    F = _repair_degenerate(points, F, steps)
     extra = duplicates(F) if len(F) else np.zeros(0, dtype=bool)
     steps[Step.duplicate] = int(extra.sum())
     F = F[~extra]
     if not len(F):
         raise MeshError(
-            "nothing is left to repair: every face is degenerate or has a missing vertex. The file "
+            "nothing can be repaired: every face is degenerate or has a missing vertex. The file "
             "is damaged; export it again."
         )
     F, origin = _split(points, F, steps)
@@ -241,7 +241,7 @@ def _weld(V: Points, F: Indices, tolerance: float, steps: dict[Step, int]) -> In
     return number[F]
 
 
-def _mend_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
+def _repair_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
     """Collapse needles, flip triangles with collinear corners, drop the rest."""
     for _ in range(_FLIP_ROUNDS):
         F, dropped = _without(F, _repeats_a_vertex(F))
@@ -345,7 +345,7 @@ def _split(V: Points, F: Indices, steps: dict[Step, int]) -> tuple[Indices, Indi
 
 
 def _smoothest_pairs(V: Points, F: Indices, edge: Indices, faces: Indices) -> Indices:
-    """Return the pairs of half-edges (k, 2) that stay connected at edges with over two triangles.
+    """Return the pairs of half-edges (k, 2) that stay connected where an edge has three or more.
 
     The smoothest pairs first: the angle between the two triangles is closest to straight. If the
     input's orientations agree elsewhere, they must agree here too.

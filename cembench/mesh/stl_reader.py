@@ -35,7 +35,7 @@ def read_stl(path: Path) -> Soup:
     if begin[:5].lower() == "solid" and "\0" not in begin:
         return _read_ascii(path)
     if len(head) < _HEADER_BYTES:
-        raise damaged(f"it cannot be read as STL: {size} bytes, less than a header has")
+        raise damaged(f"it cannot be read as STL: {size} bytes, shorter than a header")
     whole, rest = divmod(size - _HEADER_BYTES, _TRIANGLE.itemsize)
     raise damaged(
         f"{declared} triangles are declared, but the file holds {whole}"

@@ -302,8 +302,8 @@ class HoledMesh(TriangleMesh):
             shown = ", ".join(f"{loop[0]} ({len(loop)} vertices)" for loop in loops[:5])
             raise ParameterError(
                 f"outer={outer}: vertex {outer} (counted from 0) {where} of {self.name}, so it "
-                "names no outer boundary. Name any vertex of the loop; the longest loops have for "
-                f"example: {shown}."
+                f"cannot identify the outer boundary. Name any vertex of that loop; vertices of "
+                f"the longest loops are: {shown}."
             )
         return loops.pop(chosen[0]), tuple(loops)
 

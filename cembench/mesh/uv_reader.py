@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.core.errors import MeshError, RecordError, said_by
+from cembench.core.errors import MeshError, RecordError, describe_error
 from cembench.core.loading import read_arrays
 from cembench.mesh.obj_reader import statement_words
 from cembench.mesh.ply_reader import read_ply_texture
@@ -77,11 +77,11 @@ def read_uv(path: Path) -> UVFile:
     except RecordError as error:
         raise MeshError(str(error)) from error
     except (OSError, ValueError, OverflowError, IndexError, KeyError) as error:
-        raise MeshError(f"{path.name} cannot be read: {said_by(error)}") from error
+        raise MeshError(f"{path.name} cannot be read: {describe_error(error)}") from error
 
 
 def read_flat(path: Path) -> UVFile:
-    """Read a flattened surface from a mesh file; its UVs are x and y of the vertices.
+    """Read a flattened surface from a mesh file, with x and y as its UVs.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def read_flat(path: Path) -> UVFile:
     soup = read_soup(path)
     V, F = soup.V, soup.triangles
     if np.abs(V[:, 2]).max() > SAME_PLACE * np.ptp(V[:, :2], axis=0).max():
-        raise MeshError("its vertices do not lie in the plane z = 0: it is not flattened")
+        raise MeshError("its vertices do not lie in the plane z = 0: it is not a flat map")
     return UVFile(V[:, 0] + 1j * V[:, 1], F=F, index=F)
 
 
@@ -159,8 +159,8 @@ def _places(G: Indices, F: Indices) -> tuple[Indices, Indices]:
     if not (g[order_g] == f[order_f]).all():
         wrong = int((g[order_g] != f[order_f]).any(axis=1).sum())
         raise OtherSurfaceError(
-            f"it holds other triangles: {wrong} of {len(F)} are not those of the surface, or run "
-            "the other way round"
+            f"it holds other triangles: {wrong} of {len(F)} differ from those of the surface, or "
+            "have the opposite orientation"
         )
     at = np.empty(len(F), dtype=np.int64)
     at[order_f] = order_g
@@ -259,9 +259,9 @@ def _read_mat(path: Path) -> UVFile:
     try:
         found = loadmat(path, verify_compressed_data_integrity=True)
     except NotImplementedError:
-        raise damaged("files of MATLAB 7.3 are not read; save it with save(..., '-v7')") from None
+        raise damaged("MATLAB 7.3 files are not supported; save it with save(..., '-v7')") from None
     except Exception as error:  # scipy may raise anything on a damaged file
-        raise damaged(f"it cannot be read as MAT: {said_by(error)}") from None
+        raise damaged(f"it cannot be read as MAT: {describe_error(error)}") from None
     return _named_arrays({k: v for k, v in found.items() if not k.startswith("__")}, first=1)
 
 

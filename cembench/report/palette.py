@@ -59,7 +59,7 @@ PARTS = (
 REST = "#b3b9c0"
 
 
-def looks(names: Sequence[str]) -> dict[str, SeriesStyle]:
+def series_styles(names: Sequence[str]) -> dict[str, SeriesStyle]:
     """Return a style for each name: fixed for known algorithms, others in turn."""
     others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
     return _KNOWN | {name: _MORE[k % len(_MORE)] for k, name in enumerate(others)}

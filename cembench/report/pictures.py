@@ -85,7 +85,7 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
     except OSError as error:
         raise unreadable(path, error) from error
     if not exact and "A" not in picture.getbands():
-        picture = on_any_ground(picture)
+        picture = with_transparent_background(picture)
     scale = min(1.0, longest / max(picture.size), (cap / (picture.width * picture.height)) ** 0.5)
     if scale < 1:
         smaller = (max(1, round(side * scale)) for side in picture.size)
@@ -95,7 +95,7 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
     return Embedded(data_uri(file.getvalue(), "image/webp"), picture.width, picture.height)
 
 
-def on_any_ground(picture: Image.Image) -> Image.Image:
+def with_transparent_background(picture: Image.Image) -> Image.Image:
     """Make the white background of a picture transparent, for dark pages.
 
     White areas that are not connected to the border stay white.

@@ -169,7 +169,7 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
     """Return the contents of the files by format, PNG first."""
     columns = min(plot.columns, len(plot.panels))
     rows = -(-len(plot.panels) // columns)
-    tall = max((_names_room(panel) for panel in plot.panels), default=0.0)
+    tall = max((_width_of_names(panel) for panel in plot.panels), default=0.0)
     with rc_context(_STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
         single = 1.35 if columns == 1 else 1.0
@@ -198,7 +198,7 @@ def _with_few_colours(png: bytes) -> bytes:
     return buffer.getvalue()
 
 
-def _names_room(panel: PlotPanel) -> float:
+def _width_of_names(panel: PlotPanel) -> float:
     """Return the inches needed for vertical names below the axis."""
     names = [x for series in panel.series for x in series.x if isinstance(x, str)]
     return min(0.055 * max(map(len, names), default=0), 1.3) if len(set(names)) > 4 else 0.0

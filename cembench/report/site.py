@@ -26,7 +26,7 @@ from cembench.core.extras import Extra, require
 from cembench.core.names import distinct_slugs
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.report import build_report
-from cembench.report.palette import looks
+from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.results.machines import machine_of, machine_of_record, software_differences
 
@@ -79,7 +79,7 @@ def publish(
     folder : Path
         A new or empty folder, or an earlier site.
     progress : function
-        What is told how far it is.
+        Called with the progress.
 
     Returns
     -------
@@ -99,7 +99,7 @@ def publish(
     require(Extra.REPORT, "a site")
     places = [run.resolve() for run in runs]
     if not places or len(set(places)) < len(places):
-        raise ParameterError("publish takes one run or more, each once.")
+        raise ParameterError("publish takes at least one run; name each run once.")
     folders.check(folder, "report")
     names = distinct_slugs({str(place): place.name for place in places})
     found = []
@@ -220,7 +220,7 @@ def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
 
 
 def _plot(runs: Sequence[PublishedRun], told: Mapping[str, list[HeadlineRatio | None]]) -> Plot:
-    styles = looks(list(told))
+    styles = series_styles(list(told))
     series = []
     for name, row in told.items():
         points = [

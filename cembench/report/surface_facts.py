@@ -81,7 +81,7 @@ def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
     """
     if surface.kept is None:
         raise RegistryError(
-            f"surface {surface.name!r} is not kept on disk; declare it with "
+            f"surface {surface.name!r} is not stored on disk; declare it with "
             "@surface_family(..., kept=...)"
         )
     from cembench.drawing.preview import write_thumbnail  # slow to import, and seldom needed

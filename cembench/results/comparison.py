@@ -98,7 +98,7 @@ def paired_ratios(record: Record, reference: Record) -> list[float]:
 
 
 def ratios_of_rounds(ours: Sequence[Round], theirs: Sequence[Round]) -> list[float]:
-    """As :func:`paired_ratios`, for rounds that are not in a record yet."""
+    """Like :func:`paired_ratios`, for rounds that are not in a record yet."""
     times = [(a.solve_seconds, b.solve_seconds) for a, b in _pairs(ours, theirs)]
     ratios = [a / b for a, b in times if a is not None and b is not None]
     return ratios if len(ratios) == len(times) else []
@@ -123,7 +123,7 @@ def compare(record: Record, reference: Record) -> Comparison | None:
 
 
 def compare_cpu(record: Record, reference: Record) -> Comparison | None:
-    """As :func:`compare`, for CPU seconds; None if a round of either has none, or shows zero.
+    """Like :func:`compare`, for CPU seconds; None if a round of either has none, or shows zero.
 
     CPU seconds of an external program include more than solving, so they are not compared.
     """

@@ -1,4 +1,4 @@
-"""On which machines was a run measured? Seconds of several do not compare; ratios within one do."""
+"""The machines of a run: seconds of two machines cannot be compared, ratios within one can."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Environments = Mapping[str, Mapping[str, Any]]
 
 
 def machine_of(environment: Mapping[str, Any]) -> str:
-    """What is a machine called? In older records, which have no name, by its processor.
+    """Return the name of a machine; in older records, which have none, its processor.
 
     >>> machine_of({"machine": "node-1", "cpu": "x"})
     'node-1'
@@ -27,13 +27,13 @@ def machine_of(environment: Mapping[str, Any]) -> str:
 
 
 def machine_of_record(record: Record, environments: Environments) -> str:
-    """Return the machine that a record was measured on; "" where that is not known."""
+    """Return the machine that a record was measured on; "" if unknown."""
     return machine_of(environments.get(record.environment, {}))
 
 
 @dataclass(frozen=True)
 class Marks:
-    """A letter for each machine, where there are several; nothing is marked where there is one."""
+    """A letter for each machine if there are several; with one machine nothing is marked."""
 
     #: By the machines' names, most cells first.
     letters: Mapping[str, str]
@@ -42,11 +42,11 @@ class Marks:
     by_environment: Mapping[str, str]
 
     def of(self, record: Record) -> str:
-        """Return the mark of a record's seconds; "" where all are of one machine."""
+        """Return the mark of a record's seconds; "" if all are from one machine."""
         return self.by_environment.get(record.environment, "")
 
     def explained(self) -> list[str]:
-        """Say what the letters mean, and what does not compare; nothing where there are none."""
+        """Return what the letters mean and what cannot be compared; nothing without letters."""
         if not self.letters:
             return []
         named = "; ".join(
@@ -85,7 +85,7 @@ def _letter(number: int) -> str:
 
 
 def software_differences(records: Sequence[Record], environments: Environments) -> list[str]:
-    """Say of each machine in what versions or commit it differs from that with most cells."""
+    """Return how the versions or the commit of each machine differ from the main one's."""
     counts = Counter(record.environment for record in records)
     if len(counts) < 2:
         return []
@@ -105,12 +105,12 @@ SOFTWARE = ("cembench", "git", "python", "libraries")
 
 
 def software_of(environment: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what an environment says of versions and of the commit."""
+    """Return the versions and the commit of an environment."""
     return {name: environment.get(name) for name in SOFTWARE}
 
 
 def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
-    """Say which versions differ, ours first.
+    """Return which versions differ, ours first.
 
     >>> differences({"python": "3.11.2"}, {"python": "3.12.1"})
     ['python: 3.11.2 / 3.12.1']

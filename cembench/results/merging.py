@@ -1,4 +1,4 @@
-"""Runs made apart, on other machines or other days, brought together in one folder.
+"""Merge runs from different machines or days into one folder.
 
 What several machines measured of one surface under one policy is never mixed: one machine's cells
 stand in the run, and the same cells of the others beside it, each machine's as a run of its own in
@@ -30,13 +30,13 @@ class Held:
 
     @property
     def rank(self) -> tuple[bool, str]:
-        """One that ended ok counts before one that did not, and then the later."""
+        """Records that ended ok come first, then the later ones."""
         return self.record.outcome.status == "ok", self.record.started_at
 
 
 @dataclass(frozen=True)
 class Conflict:
-    """A cell that several machines measured: the one that stands in the run comes first."""
+    """A cell that several machines measured: the one kept in the run comes first."""
 
     cell: str
     machines: tuple[str, ...]
@@ -55,14 +55,14 @@ class Conflict:
 
 @dataclass(frozen=True)
 class Merged:
-    """What came of it: how many cells the run holds, and which others hold, too."""
+    """The result: how many cells the run holds, and which of them other runs hold, too."""
 
     cells: int
     conflicts: tuple[Conflict, ...]
 
 
 def merge(runs: Iterable[Store], into: Store) -> Merged:
-    """Bring the records of several runs together. All are read before anything is written.
+    """Merge the records of several runs. All are read before anything is written.
 
     Of a cell that was measured on one machine several times, one that ended ok counts before one
     that did not, and then the later one. Of several machines the one counts that has more cells of
@@ -93,7 +93,7 @@ def merge(runs: Iterable[Store], into: Store) -> Merged:
 
 
 def others_of(run: Store) -> list[Store]:
-    """Return the runs of other machines that lie beside a merged one's cells."""
+    """Return the runs of other machines that are stored beside a merged run."""
     return [Store(folder) for folder in sorted(run.folder.glob("others/*/")) if folder.is_dir()]
 
 
@@ -115,7 +115,7 @@ def _best(
 
 
 def _leaders(best: Mapping[tuple[str, str], Held]) -> dict[str, str]:
-    """Return the machine whose cells go into the run, by surface and policy."""
+    """Return the machine whose cells the run takes, by surface and policy."""
     oks: dict[str, dict[str, list[tuple[bool, str]]]] = defaultdict(lambda: defaultdict(list))
     for held in best.values():
         oks[circumstances(held.record.cell)][held.machine].append(held.rank)

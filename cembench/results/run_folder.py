@@ -113,7 +113,7 @@ def _check_names(folder: Path) -> None:
         wrong.append(plan)
     if wrong:
         raise RecordError(
-            f"{wrong[0]} is in the way: a run keeps its own under that name, and this is not of "
-            "that kind, or a symbolic link. Nothing was changed. Move it away, or name another "
+            f"{wrong[0]} is in the way: a run stores its own data under that name, and this is "
+            "something else or a symbolic link. Nothing was changed. Move it away, or name another "
             "folder with -o."
         )

@@ -85,7 +85,7 @@ def _same(record: Record) -> str:
 
 
 def machine_differences(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
-    """Return the differences of two environments that make their seconds incomparable."""
+    """Return the differences between two environments that make their seconds incomparable."""
     return [
         f"{name}: {before.get(name)} / {after.get(name)}"
         for name in (

@@ -131,7 +131,7 @@ class Store:
             )
 
     def finished(self) -> list[Record]:
-        """As :meth:`records`, but empty if no cell is finished yet."""
+        """Like :meth:`records`, but empty if no cell is finished yet."""
         return [read_record(path) for path in self.record_files()]
 
     def record_files(self) -> list[Path]:
@@ -190,7 +190,9 @@ class Store:
             raise damaged(path, "a surface", "a coordinate or a corner is out of range")
         mesh = TriangleMesh.trusted(V, F.astype(np.int64), str(data["name"]))
         if mesh.hash != cell.mesh_hash:
-            raise RecordError(f"{path} does not hold the surface that its name says; delete it.")
+            raise RecordError(
+                f"{path} does not hold the surface named in its file name; delete it."
+            )
         return mesh
 
     def samples(self, cell: Cell, environment: str) -> Samples:

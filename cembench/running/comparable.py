@@ -65,8 +65,9 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     crowded = [count for count in running if count > threads]
     if not found and len(crowded) >= MOST_CROWDED and len(crowded) > CROWDED * len(running):
         told = (
-            f"{max(crowded)} threads or processes were running at a time, in {len(crowded)} of "
-            f"{len(running)} looks, but --threads {threads} allows {threads}. Raise --threads, or "
+            f"{max(crowded)} threads or processes were running at the same time, in "
+            f"{len(crowded)} of {len(running)} samples, but --threads {threads} allows "
+            f"{threads}. Raise --threads, or "
             "make the algorithm start no threads"
         )
         found.append(Fault(kind=FaultKind.MORE_CORES, detail=told))
@@ -75,9 +76,9 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     often = used.disturbed > 1 and 2 * used.disturbed > used.looked
     if threads == 1 and (much or often):
         told = (
-            f"something kept working between the timed calls: {used.beside:.3g} s of CPU time "
+            f"work went on between the timed calls: {used.beside:.3g} s of CPU time "
             f"besides {used.wall:.3g} s of calls, before {used.disturbed} of {used.looked} calls. "
-            "All work on a map must be done in the call"
+            "All work on a map must be done within the call"
         )
         found.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=told))
     return found
@@ -91,7 +92,7 @@ def impossible(used: Used, found: Round, began: float, ended: float) -> list[Fau
     elif told > used.ended - used.began + CLOCKS_APART:
         why = f"calls of {told:.3g} s in a process of {used.ended - used.began:.3g} s"
     elif used.began < began - CLOCKS_APART or used.ended > ended + CLOCKS_APART:
-        why = "it reports times at which it was not running"
+        why = "it reports times when it was not running"
     else:
         return []
     return [Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=f"its times are impossible: {why}")]

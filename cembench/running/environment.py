@@ -32,7 +32,7 @@ def with_threads(count: int) -> dict[str, str]:
 
 
 def machine_name() -> str:
-    """What is this machine called in records? `CEMBENCH_MACHINE`, or the system's name of it."""
+    """Return the name of this machine in records: `CEMBENCH_MACHINE`, or the system's name."""
     return printable(os.environ.get(MACHINE_VARIABLE) or platform.node() or "unnamed")
 
 

@@ -165,7 +165,7 @@ def _say(number: int | None) -> None:
     os.write(1, json.dumps(number).encode() + b"\n")
 
 
-def _become(order: _ForkRequest) -> None:
+def _set_up_process(order: _ForkRequest) -> None:
     """Join a new process group, set the mark, close the input, and write to the log."""
     os.setpgid(0, 0)
     for file, way, targets in (
@@ -200,7 +200,7 @@ def _main(parent: int, backend: str) -> None:
     die_with_parent(parent)
     _load(backend)
     order = _serve()
-    _become(order)
+    _set_up_process(order)
     worker.main(Path(order.job))
     worker.end()
 

@@ -153,7 +153,9 @@ def _of_the_circle(
         found.append(_fault(FaultKind.OFF_CIRCLE, told))
     around, winding, backward = turns(z)
     if around != 1 and winding not in (0, 1):  # 0: all points may be on one half of the circle
-        told = f"the {name} goes round the circle {winding} times, not once counter-clockwise"
+        told = (
+            f"the {name} winds around the circle {winding} times instead of once counter-clockwise"
+        )
         found.append(_fault(FaultKind.WINDING, told))
     elif around != 1:
         told = f"{backward} of {len(z)} arcs of the {name} go backward"

@@ -26,7 +26,7 @@ from cembench.conformal.metrics import (
     image_area,
     lost_in_rounding,
 )
-from cembench.core.errors import said_by
+from cembench.core.errors import describe_error
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Boundary, Fault, FaultKind, Outcome, not_ok
 from cembench.running.judge import Promise, faults, remarks
@@ -113,8 +113,8 @@ def judged_calls(
         bits = hash_of(uv)
         if seen.setdefault(bits, motion) != motion and not promise.combinatorial:
             told = (
-                f"{name} returned, bit by bit, the map of the surface in another shape: the map "
-                "was kept from another call, or does not depend on the coordinates (then declare "
+                f"{name} returned the identical map for a surface of another shape: the map was "
+                "kept from another call, or does not depend on the coordinates (then declare "
                 "combinatorial=True)"
             )
             return JudgedCalls(kept=(Fault(kind=FaultKind.KEPT_RESULT, detail=told),))
@@ -122,7 +122,7 @@ def judged_calls(
             repeated = repeated is not False
             continue
         surface = moved(mesh, motion)
-        with _unruffled():
+        with _warnings_ignored():
             wrong = faults(promise, surface, uv)
             wrong = wrong or _other_energy(promise, surface, uv, checked)
         only_energy = wrong and wrong[0].kind is FaultKind.OTHER_ENERGY
@@ -135,8 +135,8 @@ def judged_calls(
             elif apart > SAME_MAP and not wrong and repeats and not promise.is_program:
                 told = (
                     f"maps of the same surface differ by {apart:.2g} between a fresh process and "
-                    "one with earlier calls, but not between fresh ones: something is kept from "
-                    "call to call"
+                    "one with earlier calls, but not between two fresh ones: results are kept "
+                    "from call to call"
                 )
                 kept.append(Fault(kind=FaultKind.KEPT_RESULT, detail=told))
         elif only_energy:
@@ -144,7 +144,7 @@ def judged_calls(
             doubtful = doubtful or (None if near and motion != UNMOVED else motion)
             wrong = [] if motion != UNMOVED else wrong
         if wrong:
-            told = f"{name} returned another map than the check"
+            told = f"{name} returned a different map from the check"
             return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong))
     return JudgedCalls(kept=tuple(kept[:1]), doubtful=doubtful, repeated=repeated)
 
@@ -178,7 +178,7 @@ def _judged(
     promise: Promise, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
     """Return the fields of an outcome for a map, and the faults."""
-    with _unruffled():
+    with _warnings_ignored():
         problems = faults(promise, mesh, uv)
         if promise.target == "atlas":
             metrics = atlas_metrics(mesh, uv.reshape(-1, 3))
@@ -198,7 +198,7 @@ def _judged(
 
 
 @contextmanager
-def _unruffled() -> Iterator[None]:
+def _warnings_ignored() -> Iterator[None]:
     """Ignore warnings, which the algorithm may have turned into errors in NumPy or Python."""
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -206,7 +206,7 @@ def _unruffled() -> Iterator[None]:
 
 
 def _no_metrics(error: Exception) -> Fault:
-    told = f"its metrics cannot be computed: {said_by(error)}"
+    told = f"its metrics cannot be computed: {describe_error(error)}"
     return Fault(kind=FaultKind.NO_METRICS, detail=told)
 
 

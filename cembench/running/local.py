@@ -88,32 +88,32 @@ LARGEST_ANSWER_BYTES = 2**24
 
 @dataclass(frozen=True)
 class Options:
-    """How a run goes about its cells."""
+    """Options of a run."""
 
-    #: A process that times has twice as long, as it makes two calls or more.
+    #: A process that times has twice as long, because it makes at least two calls.
     timeout: float = DEFAULT_TIMEOUT
     #: Resident bytes of a process and all that it starts; None: no limit.
     memory_bytes: int | None = None
-    #: Measure again what the store holds.
+    #: Measure again the cells that the store holds.
     fresh: bool = False
-    #: Measure again what the store holds and did not end ok.
+    #: Measure again the cells that the store holds and that did not end ok.
     rerun_failed: bool = False
-    #: Of the random order within each round.
+    #: Seed of the random order within each round.
     seed: int = 0
-    #: With which algorithm the others are compared: their ratios to it become precise.
+    #: The algorithm that the others are compared with: their ratios to it become precise.
     reference: str = REFERENCE
     #: Rounds of a cell that is measured until it is precise, at most.
     most_rounds: int = USUAL_MOST_ROUNDS
     #: Wall-clock seconds after which no cell goes on that has had a round; None: no limit.
     #: Cells with a fixed number of rounds have all of them.
     budget: float | None = None
-    #: How often a process is run again beside which the machine was busy; the quietest counts.
+    #: How often a process is repeated if the machine was busy; the quietest run counts.
     repeat_busy: int = 0
-    #: So many checks run side by side, each with its share of the memory. What is timed runs alone.
+    #: Number of checks that run in parallel, sharing the memory. Timed processes run alone.
     jobs: int = 1
 
     def measures_again(self, kept: Record) -> bool:
-        """Whether a cell is measured again although it has this record."""
+        """Whether a cell with this record is measured again."""
         return self.fresh or (self.rerun_failed and kept.outcome.status != "ok")
 
 
@@ -134,34 +134,34 @@ class Step:
 
 
 class Watcher:
-    """Is told how a run goes on; a subclass shows it."""
+    """Receives the progress of a run; a subclass shows it."""
 
     def waits(self) -> None:
-        """Another run measures into the folder; this one goes on when that has ended."""
+        """Another run is writing to the folder; this one continues when that one has ended."""
 
     def begins(self, processes: int) -> None:
-        """So many processes are to be run."""
+        """The run starts; `processes` processes will be started."""
 
-    def timing_begins(self) -> None:
-        """All checks have ended; what is run from now on is timed."""
+    def timing_starts(self) -> None:
+        """All checks have ended; the following processes are timed."""
 
-    def goes_on(self, task: Task, rounds: int) -> None:
-        """A cell is not precise yet: so many more rounds of it follow."""
+    def adds_rounds(self, task: Task, rounds: int) -> None:
+        """A cell is not precise yet; `rounds` more rounds follow."""
 
     def starts(self, task: Task, step: Step) -> None:
         """A process starts."""
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
-        """It has ended, after so many seconds in all."""
+        """A process has ended, after `seconds` in all."""
 
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
-        """A cell's record is there, from before if `kept`; no more processes are run for it."""
+        """A cell has its record, from an earlier run if `kept`; it needs no more processes."""
 
     def machines(self, names: Sequence[str]) -> None:
-        """These machines of a cluster take part now, one name for each worker."""
+        """These machines of a cluster take part now, one name per worker."""
 
-    def tells(self, words: str) -> None:
-        """Something happened to a machine of the cluster, or to what it measured."""
+    def shows(self, words: str) -> None:
+        """Something happened to a machine of the cluster, or to a unit that it measured."""
 
 
 def run_tasks(
@@ -171,7 +171,7 @@ def run_tasks(
     watcher: Watcher | None = None,
     launcher: Callable[[Path, Options], Launcher] | None = None,
 ) -> list[Record]:
-    """Measure what the store does not hold yet; the records, in the tasks' order.
+    """Measure the cells that the store does not hold; return records in the tasks' order.
 
     Each process's result is on disk before the next one starts. A second run into the same store
     waits for the first. `launcher` makes what starts the processes, given a folder for its files.
@@ -207,21 +207,21 @@ def map_once(
             outcome, uv = Launcher(Path(folder), options or Options(), forks=False).check(task)
     except OSError as error:
         raise RecordError(
-            f"the temporary folder cannot be used: {error.strerror or error}. Make room in it, or "
-            "set TMPDIR to another."
+            f"the temporary folder cannot be used: {error.strerror or error}. Free some space "
+            "there, or set TMPDIR to another folder."
         ) from error
     return record_of(task, outcome, describe_environment()["id"], started), uv
 
 
 def in_random_order(tasks: Sequence[Task], seed: int, number: int) -> list[Task]:
-    """The order of a round: another one each round, the same for the same seed."""
+    """Return the order of a round, which depends only on the seed and the round."""
     return random.Random(f"{seed} {number}").sample(list(tasks), len(tasks))
 
 
 def kept_record(
     task: Task, store: Store, options: Options, asked: AbstractSet[str]
 ) -> Record | None:
-    """Return the record that stands, if any; samples of what is measured anew are forgotten.
+    """Return the valid record, if any; delete the samples of a cell that is measured again.
 
     A record follows its mesh to another name, unless the old one is `asked` for too.
     """
@@ -237,7 +237,7 @@ def kept_record(
 
 @dataclass
 class _Run:
-    """One sitting: what it has to do is worked out from what the store holds."""
+    """One sitting, whose work follows from what the store holds."""
 
     store: Store
     launcher: Launcher
@@ -260,7 +260,7 @@ class _Run:
             self._load(task)
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         self._check_all(pending)
-        self.watcher.timing_begins()
+        self.watcher.timing_starts()
         most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
@@ -293,15 +293,15 @@ class _Run:
         return (task.cell.label not in self.checks) + max(0, self._last(task, done) - done)
 
     def _last(self, task: Task, done: int) -> int:
-        """Return the number of the round after which a cell ends, or is looked at next."""
+        """Return the round after which a cell ends, or after which its interval is checked."""
         return task.cell.repeats or next_look(done, self.options.most_rounds)
 
     def _check_all(self, pending: Sequence[Task]) -> None:
-        """Check what is not checked yet, one after another or side by side."""
+        """Check the cells that are not checked yet, one by one or in parallel."""
         new = [task for task in pending if task.cell.label not in self.checks]
         for task in pending:
             if task.cell.label in self.checks:
-                self._go_on_from_check(task)
+                self._resume_after_check(task)
         if self.options.jobs < 2 or len(new) < 2:
             for task in new:
                 with self._checking(task):
@@ -322,9 +322,9 @@ class _Run:
     def _keep_check(self, task: Task, outcome: Outcome, uv: NDArray[np.complex128] | None) -> None:
         self._samples(task).save_check(outcome, uv)
         self.checks[task.cell.label] = outcome
-        self._go_on_from_check(task)
+        self._resume_after_check(task)
 
-    def _go_on_from_check(self, task: Task) -> None:
+    def _resume_after_check(self, task: Task) -> None:
         outcome = self.checks[task.cell.label]
         if outcome.status != "ok":
             self._save(task, outcome.model_copy(update={"rounds": ()}))
@@ -344,7 +344,7 @@ class _Run:
         )
 
     def _look(self, pending: Sequence[Task], number: int) -> None:
-        """End the cells that are precise, or cannot be measured on; references outlast the rest.
+        """End the cells that are precise or cannot continue; references end last.
 
         A cell that has more rounds, from before a kill, went on when this was asked before.
         """
@@ -370,7 +370,7 @@ class _Run:
             ended: Ended = "rounds" if last else "budget"
             self._save_measured(open_[label], "precise" if lacks[label] <= 1 else ended)
         for label in go_on:
-            self.watcher.goes_on(open_[label], more)
+            self.watcher.adds_rounds(open_[label], more)
 
     def _keep_to_budget(self, pending: Sequence[Task], number: int) -> None:
         """End the cells that the budget does not bring to their first look, the dearest first."""
@@ -409,7 +409,7 @@ class _Run:
         started = _now()
         checked = self.checks[task.cell.label]
         with _Process(self.watcher, task, step) as process:
-            found = self._quietest(task, Checked.of(checked))
+            found = self._timed_when_quiet(task, Checked.of(checked))
         self.took.setdefault(task.cell.label, []).append(monotonic() - process.since)
         if isinstance(found, Outcome):
             more: dict[str, Any] = {"cause": f"in {step}: {found.cause}"}
@@ -424,10 +424,10 @@ class _Run:
         self.rounds[task.cell.label][number] = measured
         self._save_if_complete(task)
 
-    def _quietest(self, task: Task, checked: Checked) -> Round | Outcome:
-        """Time one process; again where the machine was busy, as often as that is asked for.
+    def _timed_when_quiet(self, task: Task, checked: Checked) -> Round | Outcome:
+        """Time one process; repeat it if the machine was busy, up to the requested number of times.
 
-        Which one counts is decided by what others did, and never by the seconds.
+        The run with the least activity of other programs counts; the seconds never decide.
         """
         best: Round | None = None
         for _ in range(1 + self.options.repeat_busy):
@@ -472,7 +472,7 @@ class _Run:
 
 
 def _partners(tasks: Iterable[Task], reference: str) -> dict[str, str]:
-    """Return with which cell of the reference each other one is compared, by their labels."""
+    """Return the cell of the reference that each other cell is compared with, by label."""
     known = {
         circumstances(task.cell): task.cell.label
         for task in tasks
@@ -492,7 +492,7 @@ def _disturbed(measured: Round) -> float:
 
 @dataclass
 class _Process:
-    """Tells the watcher of a process's start and end."""
+    """Reports the start and the end of a process to the watcher."""
 
     watcher: Watcher
     task: Task
@@ -518,7 +518,7 @@ def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
     ]
     if differing:
         named = ", ".join(map(str, differing))
-        text = f"not deterministic: other maps of the same surface came out in rounds {named}"
+        text = f"not deterministic: the same surface got different maps in rounds {named}"
         told.append(Notice(NoticeKind.NOT_DETERMINISTIC, text))
     cold = is_cold(rounds)
     if cold is not None:
@@ -531,7 +531,7 @@ def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
 
 
 def record_of(task: Task, outcome: Outcome, environment: str, started: str) -> Record:
-    """Return the record of a cell that came to this."""
+    """Return the record of a cell with this outcome."""
     return Record(
         cell=task.cell,
         title=task.algorithm.title,
@@ -547,7 +547,7 @@ def record_of(task: Task, outcome: Outcome, environment: str, started: str) -> R
 
 @dataclass
 class Launcher:
-    """Starts the processes; `scratch` is where they and it exchange files.
+    """Starts the processes; `scratch` is the folder for exchanging files with them.
 
     They are forked from a server where `forks` allows it and the system can. It stands until
     :meth:`close`; the next process gets a new one.
@@ -557,24 +557,24 @@ class Launcher:
     options: Options
     forks: bool = True
     _server: ForkServer | None = None
-    #: What the system says of the mesh files since they were written.
+    #: Status of the mesh files when they were written.
     _written: dict[Path, tuple[int, ...]] = field(default_factory=dict)
-    #: Nobody can have kept a result for motions that were drawn just now.
+    #: Drawn at the start, so that no result can have been stored for these motions.
     _drawn: str = field(default_factory=lambda: uuid.uuid4().hex[:12])
     #: How often each cell was timed.
     _times: Counter[str] = field(default_factory=Counter)
-    #: Of each cell, a call of its last process: its motion, and the sample of its map.
+    #: For each cell, a call of its last process: its motion and a sample of its map.
     _last: dict[str, tuple[str, Path]] = field(default_factory=dict)
     #: Seconds of each cell's checked call.
     _checked_seconds: dict[str, float] = field(default_factory=dict)
-    #: Whether two fresh processes gave the same map of the same surface.
+    #: Whether two new processes gave the same map of the same surface.
     _repeats: dict[str, bool | None] = field(default_factory=dict)
-    #: Which server of judges is asked: one that nobody asks at the same time.
+    #: Number of the server that forks the judges; no two launchers share one.
     number: int = 0
     _stopped: threading.Event = field(default_factory=threading.Event)
 
     def for_checks(self, jobs: int) -> list[Self]:
-        """Return so many others like this one, which may check at the same time.
+        """Return `count` launchers like this one, which may check at the same time.
 
         Called in the thread in which the program ends: servers end with the thread that made them.
         """
@@ -588,14 +588,14 @@ class Launcher:
         ]
 
     def take_over(self, other: Self, task: Task) -> None:
-        """Know of a task's check what another launcher knows of it."""
+        """Take over what another launcher knows about the check of a task."""
         label = task.cell.label
         if label in other._last:
             self._last[label] = other._last[label]
             self._checked_seconds[label] = other._checked_seconds[label]
 
     def stop(self) -> None:
-        """End the process that runs, and every other right after its start."""
+        """End the running process, and every later one right after its start."""
         self._stopped.set()
 
     def close(self) -> None:
@@ -605,7 +605,7 @@ class Launcher:
             self._server = None
 
     def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
-        """What one call comes to, and its map if that has the right shape and is finite."""
+        """Return the outcome of one call, and its map if it is finite and of the right shape."""
         answer = self._run(task, "check", self.options.timeout)
         if answer.outcome is None:
             return _unreadable("it holds no outcome"), None
@@ -623,7 +623,7 @@ class Launcher:
         return judged.outcome, uv
 
     def time(self, task: Task, checked: Checked) -> Round | Outcome:
-        """The timed calls of one process, or how it ended without.
+        """Return the timed calls of one process, or the outcome if it has none.
 
         Their surfaces are moved, for all cells alike. Where calls are short, the first one, which
         only warms up, gets a motion that a call of the process before has had: so what a fresh
@@ -650,7 +650,7 @@ class Launcher:
         if found is None or used is None:
             return answer.outcome or _unreadable("it holds no round")
         if not set(answer.motions) <= set(motions) or len(answer.names) != len(answer.motions):
-            return _unreadable("it tells of other calls than were asked for")
+            return _unreadable("it reports other calls than those requested")
         used.wall, used.cold = sum(found.calls), found.cold_seconds or 0.0
         wrong = impossible(used, found, began, ended)
         wrong = wrong or incomparable(used, answer.running, task.cell.threads)
@@ -662,12 +662,12 @@ class Launcher:
         return found.model_copy(update={"motions": turn, "repeated": judged.repeated})
 
     def _judged_calls(self, task: Task, checked: Checked, told: Answer) -> JudgedCalls | Outcome:
-        """What is to be said of the maps of a process; an outcome where that is nothing good."""
+        """Return the notices on the maps of a process, or an outcome if they are faulty."""
         label = task.cell.label
         known = dict([self._last[label]]) if label in self._last else {}
         judged = self._judge_once(task, checked, told, known)
         if isinstance(judged, JudgedCalls) and judged.doubtful is not None and not judged.faults:
-            # The surface, or the method, is one where rounding decides which of several maps.
+            # For this surface or method, rounding decides between several maps.
             maps = self.scratch / "maps.npy"
             (self.scratch / "uv.npy").replace(maps)
             again = self._run(task, "again", self.options.timeout, motions=(judged.doubtful,))
@@ -713,11 +713,11 @@ class Launcher:
         self._last[task.cell.label] = (motion, file)
 
     def _is_long(self, task: Task) -> bool:
-        """May its first call be one that is timed? What another process has had is not timed."""
+        """Whether the first call may be timed; a motion used by another process is not timed."""
         return self._checked_seconds.get(task.cell.label, 0.0) > LONG_CALL / 2
 
     def _judged(self, task: Task, what: JobTask, **more: Any) -> Answer:
-        """What a process says of a map that never saw what made it."""
+        """Return the judgement of a map, by a process that never imported its algorithm."""
         return self._run(task, what, max(self.options.timeout, JUDGE_SECONDS), **more)
 
     def _run(
@@ -751,24 +751,25 @@ class Launcher:
         limits = Limits(seconds, self.options.memory_bytes)
         ending = (self._by_judges if judges else self._forked)(job, limits, log)
         ending = ending or self._started(job, limits, log)
-        with suppress(OSError):  # there may be no folder any more
+        with suppress(OSError):  # the folder may be gone
             _remove(self.scratch / PROGRAMS)  # of a program that was ended
         if ending.limit is None and ending.code == 0 and answer_file.exists():
             answer = _with_note(_read_answer(answer_file), ending.left)
             return answer.model_copy(update={"running": ending.running})
-        with suppress(OSError):  # there may be none, or no folder any more
+        with suppress(OSError):  # it, or the folder, may be gone
             uv_file.unlink()
         outcome = _outcome_of(ending, seconds, self.options.memory_bytes)
         if not self.scratch.is_dir():
             gone = _fault(
-                FaultKind.PROCESS_ENDED, f"the folder for its answer is gone: {self.scratch}"
+                FaultKind.PROCESS_ENDED,
+                f"the folder for its answer no longer exists: {self.scratch}",
             )
             outcome = _with_fault(outcome, gone)
         return Answer(outcome=outcome)
 
     def _make_scratch(self) -> None:
-        """Have the folder to ourselves again, whatever an algorithm did to it."""
-        self.scratch = self.scratch.absolute()  # a process may be in another folder than this one
+        """Recreate the scratch folder, whatever an algorithm did to it."""
+        self.scratch = self.scratch.absolute()  # a process may run in a different folder
         if not self.scratch.is_dir():
             self.scratch.unlink(missing_ok=True)
             self.scratch.mkdir(parents=True)
@@ -780,7 +781,7 @@ class Launcher:
         return run_limited(start, limits, log, stopped=self._stopped.is_set)
 
     def _forked(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
-        """How a process ended that the server forked; None where it forks none."""
+        """Run a process forked from the server; return its end, None if it cannot fork."""
         if not self.forks or not can_fork(job.cell.threads):
             return None
         if self._server is None or self._server.backend != job.cell.backend:
@@ -799,7 +800,7 @@ class Launcher:
             return None
 
     def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
-        """How a process ended that the server of judges forked; None where it forks none."""
+        """Run a judge forked from its server; return how it ended, None if it cannot be forked."""
         server = _judges(self.number)
         if server is None:
             return None
@@ -819,7 +820,7 @@ class Launcher:
         return path
 
     def _mesh_files(self, task: Task) -> tuple[Path, Path]:
-        """V and F on disk, written once for all cells of a surface unless one changed them."""
+        """Return the files of V and F, written once per surface unless a cell changed them."""
         stem = task.cell.mesh_hash[:32]
         files = self.scratch / f"{stem}-V.npy", self.scratch / f"{stem}-F.npy"
         for file, array in zip(files, (task.mesh.V, task.mesh.F), strict=True):
@@ -832,7 +833,7 @@ class Launcher:
 
 @cache
 def _judges(number: int) -> ForkServer | None:
-    """The server that the judges of this number are forked from; it ends with this process."""
+    """Return the server that forks the judges of this number; it ends with this process."""
     if not can_fork(1):
         return None
     try:
@@ -844,7 +845,7 @@ def _judges(number: int) -> ForkServer | None:
 
 
 def _remove(path: Path) -> None:
-    """Remove what stands where one of our own files is to be written in the scratch folder."""
+    """Remove whatever is at the path of one of our own files in the scratch folder."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)
     else:
@@ -857,7 +858,7 @@ def _stamp(file: Path) -> tuple[int, ...]:
 
 
 def _read_answer(file: Path) -> Answer:
-    """Return a process's answer; a fault where it is none: an algorithm may have written to it."""
+    """Return a process's answer, or a fault: an algorithm may have written to the file."""
     try:
         size = file.stat().st_size
         if size > LARGEST_ANSWER_BYTES:
@@ -870,7 +871,7 @@ def _read_answer(file: Path) -> Answer:
 
 
 def _read_uv(file: Path, task: Task) -> NDArray[np.complex128] | None:
-    """Return the map that a check left, if it left one; ValueError for anything else."""
+    """Return the map that a check left, if any; raise ValueError if it is not a map."""
     if not file.exists():
         return None
     uv = np.lib.format.open_memmap(file, mode="r")
@@ -895,7 +896,7 @@ def _with_fault(outcome: Outcome, fault: Fault) -> Outcome:
 
 
 def _with_note(answer: Answer, left: int) -> Answer:
-    """Say of a checked call that it left processes behind."""
+    """Add the notice that a checked call left processes behind."""
     if answer.outcome is None or not left:
         return answer
     told = Notice(NoticeKind.PROCESSES_LEFT, f"left {left} processes behind, which were ended")

@@ -201,7 +201,7 @@ def timed_calls(
     problems = [fault for t in timings if (fault := phases_fault(t))][:1]
     for name, uv in zip(told.names(), told.maps, strict=True):
         if isinstance(uv, Fault):
-            words = f"{name} returned another map than the check"
+            words = f"{name} returned a different map from the check"
             problems += [Fault(kind=FaultKind.OTHER_MAP, detail=words), uv]
             break
     problems += [_changed()] if told.changed else _changes(mesh, cell)

@@ -100,7 +100,7 @@ def plan_cells(
             chosen = ", ".join(f"{a.name} ({a.mesh_type.__name__})" for a in algorithms)
             raise MeshError(
                 f"{mesh.name} is a {type(mesh).__name__}, which none of the chosen algorithms "
-                f"takes: {chosen}."
+                f"accepts: {chosen}."
             )
         facts = mesh_facts(mesh, standing.get(mesh.name, PaperRole()))
         for taker in takers:

@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-from cembench.core.errors import RegistryError, said_by
+from cembench.core.errors import RegistryError, describe_error
 from cembench.registry import COMMAND, Registry, declared_by, load_registry
 from cembench.running.process import Limits, ProcessEnd, die_with_parent, run_limited, spawning
 
@@ -69,7 +69,9 @@ def _main(plugin: str, answer: Path, parent: int) -> None:
     except RegistryError as error:
         told = str(error).encode(errors="replace")
     except BaseException as error:  # only the plug-in can interrupt this process
-        told = f"plug-in {plugin!r} cannot be imported: {said_by(error)}.".encode(errors="replace")
+        told = f"plug-in {plugin!r} cannot be imported: {describe_error(error)}.".encode(
+            errors="replace"
+        )
     answer.write_bytes(told)
     os._exit(0)
 

@@ -63,7 +63,7 @@ class ProcessEnd:
 
     @property
     def how(self) -> str:
-        """How it ended, in words: the signal, or the exit code with the last line of output."""
+        """A description of the end: the signal, or the exit code with the last line of output."""
         if self.code < 0:
             return f"was ended by signal {_signal_name(-self.code)}"
         last = f": {self.said.splitlines()[-1]}" if self.said else ""
@@ -236,7 +236,7 @@ def _end_all(
     for _ in range(2):
         marked = _marked(mark) if mark else []
         others = [one for one in {*tree.values(), *marked} if one.pid != process.pid]
-        left |= {one.pid for one in others if _lives(one)}
+        left |= {one.pid for one in others if _is_running(one)}
         if os.name == "posix":
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -246,13 +246,13 @@ def _end_all(
             with suppress(psutil.Error):
                 one.kill()
         patience = monotonic() + 1
-        while any(map(_lives, others)) and monotonic() < patience:
+        while any(map(_is_running, others)) and monotonic() < patience:
             sleep(0.01)
     ended = process.wait()
     return (ended if code is None else code), len(left)
 
 
-def _lives(process: psutil.Process) -> bool:
+def _is_running(process: psutil.Process) -> bool:
     """Whether a process is still running; a zombie is not."""
     try:
         return process.is_running() and process.status() != psutil.STATUS_ZOMBIE

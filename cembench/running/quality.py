@@ -47,8 +47,8 @@ def quality_notes(
     notes = []
     if extras.get("stopped") == "crowded":
         told = (
-            "the iteration ended early, because the boundary is too crowded for it: this is not "
-            "the map of least energy"
+            "the iteration ended early because the boundary is too crowded: this is not the map "
+            "of least energy"
         )
         notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, told))
     known = yardstick(target, mesh, uv)

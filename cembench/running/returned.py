@@ -25,8 +25,8 @@ from cembench.core.errors import (
     AlgorithmFailed,
     CembenchError,
     NotThere,
+    describe_error,
     message_of,
-    said_by,
     shortened,
 )
 from cembench.core.parameterization import Atlas, Parameterization
@@ -57,7 +57,9 @@ def map_of(found: Any, mesh: TriangleMesh, target: str = "disk") -> NDArray[np.c
     try:
         uv = found.corners if isinstance(found, Atlas) else found.uv
     except BaseException as error:
-        return Fault(kind=FaultKind.RAISED, detail=f"its uv cannot be read: {said_by(error)}")
+        return Fault(
+            kind=FaultKind.RAISED, detail=f"its uv cannot be read: {describe_error(error)}"
+        )
     plain = (
         np.asarray(uv) if isinstance(uv, np.ndarray) else None
     )  # drops the methods of a subclass
@@ -90,7 +92,7 @@ def report_of(found: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fau
         try:
             report[name] = read(getattr(found, name))
         except BaseException as error:
-            told = str(error) if isinstance(error, _WrongReportError) else said_by(error)
+            told = str(error) if isinstance(error, _WrongReportError) else describe_error(error)
             wrong.append(Fault(kind=FaultKind.WRONG_REPORT, detail=f"{name} {told}"))
     return report, wrong
 
@@ -100,7 +102,7 @@ def phases_fault(timing: Timing) -> Fault | None:
     names, seconds = list(timing.phases), [timing.total, *timing.phases.values()]
     told = ""
     if len(names) > MOST_PHASES:
-        told = f"it names {len(names)} phases; at most {MOST_PHASES} are kept"
+        told = f"it reports {len(names)} phases; allowed are at most {MOST_PHASES}"
     elif not all(
         isinstance(name, str) and len(name) <= 100 and shortened(name) == name for name in names
     ):
@@ -125,7 +127,7 @@ def outcome_of_error(error: BaseException, mesh: TriangleMesh) -> Outcome:
         said = shortened(message_of(error))
         return not_ok("failed", Fault(kind=FaultKind.RAISED, detail=said))
     status: Status = "failed"
-    fault = Fault(kind=FaultKind.RAISED, detail=said_by(error))
+    fault = Fault(kind=FaultKind.RAISED, detail=describe_error(error))
     if isinstance(error, MemoryError):
         status = "out_of_memory"
         said = shortened(message_of(error) or "not enough memory")
@@ -167,7 +169,7 @@ def _extras(given: Any) -> dict[str, Any]:
     try:
         text = to_json(given, inf_nan_mode="null")
     except Exception as error:
-        raise _WrongReportError(f"cannot be written as JSON: {said_by(error)}") from None
+        raise _WrongReportError(f"cannot be written as JSON: {describe_error(error)}") from None
     if len(text) > MOST_EXTRAS_BYTES:
         raise _WrongReportError(f"takes {len(text):,} bytes; allowed are {MOST_EXTRAS_BYTES:,}")
     plain: dict[str, Any] = json.loads(text)
@@ -187,5 +189,5 @@ def _traceback_of(error: BaseException) -> str:
     try:
         told = "".join(traceback.format_exception(error))
     except BaseException as another:
-        told = f"{said_by(error)} (no traceback: {_type_of(another)})"
+        told = f"{describe_error(error)} (no traceback: {_type_of(another)})"
     return shortened(told, LONGEST_TRACEBACK)

@@ -23,7 +23,7 @@ def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFindi
     findings = [parameters_fit(solver.algorithm)]
     if not findings[0].ok:
         return findings
-    kind = surfaces.kind_of(solver.algorithm)
+    kind = surfaces.mesh_kind(solver.algorithm)
     uneven = surfaces.uneven(registry, kind)
     first = solver.map(uneven)
     findings.append(returns_a_map(first))
@@ -31,10 +31,10 @@ def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFindi
         return findings
     return [
         *findings,
-        leaves_the_mesh(first),
-        tells_its_energy(first),
+        leaves_mesh_unchanged(first),
+        reports_its_energy(first),
         is_repeatable(first, solver.map(uneven)),
-        copes([solver.map(mesh) for mesh in surfaces.awkward(registry, kind)]),
+        handles_unusual_meshes([solver.map(mesh) for mesh in surfaces.awkward(registry, kind)]),
     ]
 
 
@@ -74,7 +74,7 @@ def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
     )
 
 
-def leaves_the_mesh(mapped: CheckedMap) -> ValidationFinding:
+def leaves_mesh_unchanged(mapped: CheckedMap) -> ValidationFinding:
     """Check that the call left V and F unchanged."""
     changes = [f.detail for f in mapped.outcome.faults if f.kind is FaultKind.MESH_CHANGED]
     return ValidationFinding(
@@ -87,7 +87,7 @@ def leaves_the_mesh(mapped: CheckedMap) -> ValidationFinding:
     )
 
 
-def tells_its_energy(mapped: CheckedMap) -> ValidationFinding:
+def reports_its_energy(mapped: CheckedMap) -> ValidationFinding:
     """Check that the reported iterations are plausible, and the last energy is the map's."""
     outcome = mapped.outcome
     history, iterations = outcome.energy_history, outcome.iterations or 0
@@ -134,7 +134,7 @@ def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
     )
 
 
-def copes(mapped: list[CheckedMap]) -> ValidationFinding:
+def handles_unusual_meshes(mapped: list[CheckedMap]) -> ValidationFinding:
     """Check that unusual meshes give a map, or an error with a cause."""
     bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
     said = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]

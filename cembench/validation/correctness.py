@@ -52,7 +52,7 @@ class RefinementSeries:
 
 def examine_correctness(solver: Solver, registry: Registry) -> list[ValidationFinding]:
     """Return the findings; if a surface has no map at all, only that finding."""
-    kind = surfaces.kind_of(solver.algorithm)
+    kind = surfaces.mesh_kind(solver.algorithm)
     series = [
         RefinementSeries(refined, tuple(solver.map(mesh) for mesh in refined.meshes))
         for refined in surfaces.refined(registry, kind)
@@ -71,10 +71,12 @@ def examine_correctness(solver: Solver, registry: Registry) -> list[ValidationFi
             limits.append(keeps_the_modulus(one))
         if one.surface.exact_map is not None and solver.algorithm.target != "free boundary":
             limits.append(reaches_the_exact_map(one))
-    return findings + (limits if solver.algorithm.conformal else [told_alone(f) for f in limits])
+    return findings + (
+        limits if solver.algorithm.conformal else [as_information(f) for f in limits]
+    )
 
 
-def told_alone(finding: ValidationFinding) -> ValidationFinding:
+def as_information(finding: ValidationFinding) -> ValidationFinding:
     """Return the finding as information only, for algorithms that promise no conformal limit."""
     if finding.ok:
         return finding
@@ -187,7 +189,7 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
     """Check the distance from the closed-form map, after the best Moebius map."""
     exact = series.surface.exact_map
     if exact is None:
-        raise ValueError(f"no closed-form map of {series.surface.name} is known")
+        raise ValueError(f"{series.surface.name} has no known closed-form map")
     errors = [distance(_uv(m), exact(m.mesh.V), moebius=True) for m in series.maps]
     return ValidationFinding(
         stage="correctness",
@@ -265,7 +267,7 @@ def same_map(
     """
     measured, ok = f"{second.outcome.status}: {second.outcome.cause}", False
     if uv is not None:
-        figures = _figures_apart(first, second)
+        figures = _largest_difference(first, second)
         apart = distance(uv, _uv(first), moebius=moebius)
         ok = min(figures, apart) <= SAME_FIGURES
         measured = f"figures differ by {figures:.1e}, maps by {apart:.1e}"
@@ -298,7 +300,7 @@ def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFind
     )
 
 
-def _figures_apart(first: CheckedMap, second: CheckedMap) -> float:
+def _largest_difference(first: CheckedMap, second: CheckedMap) -> float:
     """Return the largest relative difference of figures that motion, numbering and scale keep."""
     mine, other = all_metrics(first.mesh, _uv(first)), all_metrics(second.mesh, _uv(second))
     apart = [

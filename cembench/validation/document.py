@@ -18,7 +18,6 @@ from cembench.report.document import (
     missing,
     words,
 )
-from cembench.report.palette import looks
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.record_rows import row
 from cembench.results.records import Record
@@ -271,7 +270,7 @@ def _exponent(value: float | None) -> Value:
 
 def _growth_plot(found: GrowthComparison) -> Plot:
     growths: Sequence[Growth] = (found.ours, *found.others)
-    styles = looks([growth.what for growth in growths])
+    styles = series_styles([growth.what for growth in growths])
     series = tuple(
         PlotSeries(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])
         for growth in growths

@@ -80,7 +80,7 @@ def examine(
     registry: Registry,
     folder: Path,
     asked: ValidationOptions,
-    telling: ValidationHooks | None = None,
+    hooks: ValidationHooks | None = None,
 ) -> Validation:
     """Validate one algorithm; the timed runs are kept in the folder.
 
@@ -105,7 +105,7 @@ def examine(
         registry,
         folder,
         asked,
-        telling or ValidationHooks(),
+        hooks or ValidationHooks(),
         baselines(algorithm, registry, asked.against),
     )
     findings: list[ValidationFinding] = []
@@ -118,7 +118,7 @@ def examine(
         elif fault is not None:
             skipped[stage] = f"not examined, because of a fault in {fault}"
         else:
-            work.telling.stage(stage)
+            work.hooks.stage(stage)
             found, figures = examined(work)
             findings += found
             parts |= figures
@@ -157,7 +157,7 @@ class _Work:
     registry: Registry
     folder: Path
     asked: ValidationOptions
-    telling: ValidationHooks
+    hooks: ValidationHooks
     baselines: tuple[str, ...]
 
     @property
@@ -166,7 +166,7 @@ class _Work:
 
     @property
     def kind(self) -> type[TriangleMesh]:
-        return surfaces.kind_of(self.solver.algorithm)
+        return surfaces.mesh_kind(self.solver.algorithm)
 
     def measured(
         self, stage: Stage, meshes: Sequence[TriangleMesh], beside: Sequence[str], rounds: int
@@ -178,7 +178,7 @@ class _Work:
         plan = (how, self.solver.plugins, self.asked.standing)
         tasks = plan_cells(chosen, meshes, given, *plan)
         options = replace(self.asked.options, fresh=True)
-        with self.telling.watcher(len(tasks)) as watcher:
+        with self.hooks.watcher(len(tasks)) as watcher:
             return run_tasks(tasks, Store(self.folder / stage), options, watcher)
 
 
@@ -256,7 +256,7 @@ def baselines(
     if asked is None:
         usual = _USUAL_BASELINE[algorithm.target]
         return (usual,) if usual in registry.algorithms and usual != algorithm.name else ()
-    kind = surfaces.kind_of(algorithm)
+    kind = surfaces.mesh_kind(algorithm)
     for name in asked:
         other = registry.algorithm(name)
         if name == algorithm.name or not issubclass(kind, other.mesh_type):
@@ -266,7 +266,7 @@ def baselines(
                 if issubclass(kind, a.mesh_type) and a.name != algorithm.name
             )
             raise ParameterError(
-                f"--against {name}: {algorithm.name} cannot be compared with it; those that take "
-                f"a {kind.__name__} are: {fits or 'none'}."
+                f"--against {name}: {algorithm.name} cannot be compared with it; algorithms that "
+                f"take a {kind.__name__}: {fits or 'none'}."
             )
     return tuple(dict.fromkeys(asked))

@@ -155,7 +155,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
             ]
         ),
         angle=sides([p.angle / p.baseline_angle for p in pairs if p.angle and p.baseline_angle]),
-        speed=speed_of([(mine[name], theirs[name]) for name in names]),
+        speed=compare_speed([(mine[name], theirs[name]) for name in names]),
         solve_time=next((solve_words(r) for r in mine.values() if r.is_program), ""),
     )
 
@@ -200,7 +200,7 @@ def sides(ratios: Sequence[float]) -> PairedComparison:
     )
 
 
-def speed_of(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
+def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
     """Return the speed comparison over all surfaces on which both were timed."""
     by_surface = [paired_ratios(ours, theirs) for ours, theirs in pairs]
     by_surface = [ratios for ratios in by_surface if ratios]

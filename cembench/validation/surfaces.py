@@ -47,7 +47,7 @@ class RefinedSurface:
     exact_map: ExactMap | None
 
 
-def kind_of(algorithm: Algorithm) -> type[TriangleMesh]:
+def mesh_kind(algorithm: Algorithm) -> type[TriangleMesh]:
     """Return the kind of surface to test on; disks for an algorithm that takes any surface."""
     return HoledMesh if algorithm.mesh_type is HoledMesh else DiskMesh
 

@@ -12,7 +12,7 @@ from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 
 def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Result]:
-    """Map a surface with holes to a disk with circular holes, by every algorithm that can.
+    """Map a surface with holes to a disk with circular holes, with every suitable algorithm.
 
     Parameters
     ----------

@@ -43,7 +43,7 @@ def examine_holes(
     """Map a surface by every algorithm; return a row for each and write two exhibits.
 
     `outer` is a vertex of the outer boundary, `sweeps` the maximum number of sweeps, `command` the
-    command that makes the exhibits again. `complain` is called if Koebe's method fails, `tell`
+    command that recreates the exhibits. `complain` is called if Koebe's method fails, `tell`
     before each step.
     """
     rows = []
@@ -67,7 +67,7 @@ def examine_holes(
             rows.append(row)
             if uv is not None and count == 1:
                 tell(f"{algorithm.title} on {mesh.name}: drawing")
-                _lay_down_pictures(mesh, steps, uv, record, outer, run, command)
+                _write_figure_exhibits(mesh, steps, uv, record, outer, run, command)
     return rows
 
 
@@ -113,7 +113,7 @@ def _measured(
     return row, record, uv
 
 
-def _lay_down_pictures(
+def _write_figure_exhibits(
     mesh: HoledMesh,
     steps: list[MapStep],
     uv: Any,
@@ -132,9 +132,9 @@ def _lay_down_pictures(
         "flipped_triangles": metrics["flipped_triangles"],
     }
     caption = (
-        f"E_C {metrics['conformal_energy']:.4f}   angles off by "
-        f"{metrics['angle_error_mean_deg']:.2f} degrees in the mean   "
-        f"holes off circles by {metrics['boundary_circularity']:.1g}   "
+        f"E_C {metrics['conformal_energy']:.4f}   "
+        f"mean angle error {metrics['angle_error_mean_deg']:.2f} degrees   "
+        f"circularity error {metrics['boundary_circularity']:.1g}   "
         f"{metrics['flipped_triangles']} folds"
     )
     name = f"koebe-map-{mesh.name}"
@@ -221,8 +221,8 @@ _TABLE = (
     ("algorithm", "algorithm"),
     ("sweeps", "sweeps"),
     ("E_C", "conformal_energy"),
-    ("mean", "angle_error_mean_deg"),
-    ("SD", "angle_error_sd_deg"),
+    ("angle°", "angle_error_mean_deg"),
+    ("SD°", "angle_error_sd_deg"),
     ("circularity", "boundary_circularity"),
     ("before rounding", "circularity_before_rounding"),
     ("folds", "flipped_triangles"),
@@ -239,8 +239,9 @@ def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -
         columns=tuple(title for title, _ in _TABLE),
         rows=tuple(tuple(row.get(key) for _, key in _TABLE) for row in rows),
         notes=(
-            "Mean and SD are of the angles' errors in degrees; circularity is the largest "
-            "distance of a boundary from its fitted circle, in radii; seconds are of one call.",
+            "angle° and SD° are the mean and the standard deviation of the angle errors in "
+            "degrees; circularity is the largest distance of a boundary's image from its fitted "
+            "circle, relative to the radius; seconds are those of one call.",
         ),
     )
     standing = {row["mesh"] for row in rows} <= {STAND_IN}

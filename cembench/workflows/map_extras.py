@@ -17,7 +17,7 @@ from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Record
 from cembench.workflows.geometry_images import check_image_format, write_geometry_image
-from cembench.workflows.map_files import Wishes, check_wishes, save_map
+from cembench.workflows.map_files import FileOptions, check_file_options, save_map
 from cembench.workflows.places import Place
 
 
@@ -67,7 +67,7 @@ def write_extras(
         write_geometry_image(extras.samples, mesh, z, extras.side)
     if extras.remeshed is not None:
         new, new_z = regular_remesh(mesh, z, extras.side)
-        told = save_map(extras.remeshed, new, new_z, Wishes(extras.place))
+        told = save_map(extras.remeshed, new, new_z, FileOptions(extras.place))
     if extras.page is not None:
         from cembench.report.render.view_page import write_view_page
         from cembench.workflows.view import map_page
@@ -78,13 +78,16 @@ def write_extras(
 
 
 def check_extras(
-    meshes: Sequence[Path], outputs: Sequence[Path | None], wishes: Wishes, extras: Extras
+    meshes: Sequence[Path],
+    outputs: Sequence[Path | None],
+    file_options: FileOptions,
+    extras: Extras,
 ) -> None:
     """Raise the errors of textures and extra files before anything is mapped."""
-    check_wishes(meshes, wishes)
-    if wishes.textured and None in outputs:
+    check_file_options(meshes, file_options)
+    if file_options.textured and None in outputs:
         raise ParameterError("--checker and --bake need a file that uses the texture: add -o.")
-    if len(set(outputs)) < len(outputs) and outputs[0] and wishes.place is not Place.unit:
+    if len(set(outputs)) < len(outputs) and outputs[0] and file_options.place is not Place.unit:
         raise ParameterError("surfaces in one file share the unit square: leave out --uv.")
     if extras.files and len(meshes) > 1:
         raise ParameterError(
@@ -102,7 +105,7 @@ def check_extras(
         check_writable_format(extras.remeshed, with_uv=True)
 
 
-def check_shells(surfaces: int, path: Path, wishes: Wishes, extras: Extras) -> None:
+def check_shells(surfaces: int, path: Path, file_options: FileOptions, extras: Extras) -> None:
     """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
     if surfaces < 2:
         return
@@ -111,7 +114,7 @@ def check_shells(surfaces: int, path: Path, wishes: Wishes, extras: Extras) -> N
             f"{path} holds {surfaces} surfaces; --geometry-image, --remesh and --html take one. "
             "`cembench repair --components all` writes each to its own file."
         )
-    if wishes.place is not Place.unit:
+    if file_options.place is not Place.unit:
         raise ParameterError(
             f"{path} holds {surfaces} surfaces, which share the unit square: leave out --uv."
         )

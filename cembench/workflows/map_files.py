@@ -32,7 +32,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Wishes:
+class FileOptions:
     """Options for writing a map.
 
     Parameters
@@ -56,7 +56,7 @@ class Wishes:
         return self.checker or self.bake is not None
 
 
-def beside(output: Path, wishes: Wishes) -> list[Path]:
+def beside(output: Path, file_options: FileOptions) -> list[Path]:
     """Return the additional files that are written beside an output.
 
     Raises
@@ -66,7 +66,7 @@ def beside(output: Path, wishes: Wishes) -> list[Path]:
 
     """
     suffix = output.suffix.lower()
-    if not wishes.textured or suffix == ".glb":
+    if not file_options.textured or suffix == ".glb":
         return []
     texture = output.with_name(f"{output.stem}_texture.png")
     if suffix == ".obj":
@@ -74,11 +74,12 @@ def beside(output: Path, wishes: Wishes) -> list[Path]:
     if suffix == ".ply":
         return [texture]
     raise ParameterError(
-        f"{output}: {suffix} names no texture; --checker and --bake go with .glb, .obj or .ply."
+        f"{output}: {suffix} files cannot refer to a texture; use --checker and --bake with "
+        ".glb, .obj or .ply."
     )
 
 
-def check_wishes(meshes: Sequence[Path], wishes: Wishes) -> None:
+def check_file_options(meshes: Sequence[Path], file_options: FileOptions) -> None:
     """Raise the texture errors of :func:`write_map` before anything is mapped.
 
     Raises
@@ -89,19 +90,19 @@ def check_wishes(meshes: Sequence[Path], wishes: Wishes) -> None:
         The texture cannot be read.
 
     """
-    if wishes.bake is None:
+    if file_options.bake is None:
         return
     from cembench.drawing.texture import read_texture
 
-    if wishes.checker:
-        raise ParameterError("--checker and --bake are two textures; choose one.")
+    if file_options.checker:
+        raise ParameterError("--checker and --bake each give a texture; choose one.")
     if len(meshes) > 1:
-        raise ParameterError("--bake paints the texture of one surface; map them one by one.")
-    read_texture(wishes.bake)
+        raise ParameterError("--bake works with one surface; map the surfaces one by one.")
+    read_texture(file_options.bake)
 
 
 def write_map(
-    output: Path, surface: SurfaceFile, z: Complex, wishes: Wishes | None = None
+    output: Path, surface: SurfaceFile, z: Complex, file_options: FileOptions | None = None
 ) -> tuple[Notice, ...]:
     """Write a surface with its map as texture coordinates.
 
@@ -116,7 +117,7 @@ def write_map(
         The surface and the file it was read from.
     z : complex128 (n,)
         The map.
-    wishes : Wishes, optional
+    file_options : FileOptions, optional
         Placement of the coordinates, and the texture.
 
     Returns
@@ -130,22 +131,22 @@ def write_map(
         A file cannot be written, or the texture cannot be read or does not fit.
 
     """
-    wishes = wishes or Wishes()
-    moved = placed(z, wishes.place)
+    file_options = file_options or FileOptions()
+    moved = placed(z, file_options.place)
     textured = _textured(surface, moved)
-    texture = _texture(surface, textured, wishes, output)
+    texture = _texture(surface, textured, file_options, output)
     original = None
     suffix = output.suffix.lower()
     if suffix == ".obj" == surface.path.suffix.lower() and not surface.repaired:
         text = surface.path.read_text(encoding="latin-1")  # any bytes, as they are
         corners = (surface.uncut.F, surface.cut.mesh.F) if surface.uncut and surface.cut else ()
         original = with_uv(text, moved, *corners)
-    _write(output, textured, texture, wishes, original)
+    _write(output, textured, texture, file_options, original)
     return _folded_by_rounding(output, z, moved, surface.mesh.F)
 
 
 def write_shells(
-    output: Path, shells: Shells, maps: Sequence[Complex], wishes: Wishes
+    output: Path, shells: Shells, maps: Sequence[Complex], file_options: FileOptions
 ) -> tuple[Notice, ...]:
     """Write a file of several surfaces, with their maps side by side in the unit square.
 
@@ -155,12 +156,12 @@ def write_shells(
     mesh = shells.whole
     whole = SurfaceFile(shells.path, mesh)
     textured = Textured(mesh.V, mesh.F, _columns(uv), corners, name=mesh.name)
-    texture = _texture(whole, textured, wishes, output)
+    texture = _texture(whole, textured, file_options, output)
     original = None
     if output.suffix.lower() == ".obj" == shells.path.suffix.lower():
         text = shells.path.read_text(encoding="latin-1")  # any bytes, as they are
         original = with_uv(text, uv, *(() if corners is None else (mesh.F, corners)))
-    _write(output, textured, texture, wishes, original)
+    _write(output, textured, texture, file_options, original)
     before = np.zeros(len(uv), dtype=np.complex128)
     F = mesh.F if corners is None else corners
     for part, z, faces in zip(shells.parts, maps, shells.faces, strict=True):
@@ -169,7 +170,7 @@ def write_shells(
 
 
 def write_corner_map(
-    output: Path, surface: SurfaceFile, corners: Complex, wishes: Wishes
+    output: Path, surface: SurfaceFile, corners: Complex, file_options: FileOptions
 ) -> tuple[Notice, ...]:
     """Write a surface with one UV per corner (3 m,), as an atlas has.
 
@@ -179,31 +180,34 @@ def write_corner_map(
         As for :func:`write_map`; a texture cannot be baked for an atlas.
 
     """
-    if wishes.bake is not None:
+    if file_options.bake is not None:
         raise ParameterError("--bake needs a map with one UV per vertex; this is an atlas.")
     mesh = surface.mesh
     found = cut_map(mesh, corners.reshape(-1, 3))
-    moved = placed(found.uv, wishes.place)
+    moved = placed(found.uv, file_options.place)
     textured = Textured(mesh.V, mesh.F, _columns(moved), found.surface.F, name=mesh.name)
-    _write(output, textured, _checker(wishes, output), wishes, None)
+    _write(output, textured, _checker(file_options, output), file_options, None)
     return _folded_by_rounding(output, found.uv, moved, found.surface.F)
 
 
 def save_map(
-    output: Path, mesh: TriangleMesh, z: Complex, wishes: Wishes | None = None
+    output: Path, mesh: TriangleMesh, z: Complex, file_options: FileOptions | None = None
 ) -> tuple[Notice, ...]:
     """Write a surface that was not read from a file; like :func:`write_map`."""
-    wishes = wishes or Wishes()
-    if wishes.bake is not None:
+    file_options = file_options or FileOptions()
+    if file_options.bake is not None:
         raise ParameterError("--bake needs a surface read from an OBJ file.")
-    moved = placed(z, wishes.place)
+    moved = placed(z, file_options.place)
     surface = Textured(mesh.V, mesh.F, _columns(moved), name=mesh.name)
-    _write(output, surface, _checker(wishes, output), wishes, None)
+    _write(output, surface, _checker(file_options, output), file_options, None)
     return _folded_by_rounding(output, z, moved, mesh.F)
 
 
 def write_atlas(
-    output: Path, surfaces: Sequence[SurfaceFile], maps: Sequence[Complex], wishes: Wishes
+    output: Path,
+    surfaces: Sequence[SurfaceFile],
+    maps: Sequence[Complex],
+    file_options: FileOptions,
 ) -> tuple[Notice, ...]:
     """Write several surfaces to one file, with their maps side by side in the unit square.
 
@@ -212,12 +216,12 @@ def write_atlas(
     areas = [float(corner_products(file.mesh.V, file.mesh.F)[1].sum()) for file in surfaces]
     moved = packed(maps, areas)
     parts = [_textured(file, z) for file, z in zip(surfaces, moved, strict=True)]
-    texture = _checker(wishes, output)
+    texture = _checker(file_options, output)
     if output.suffix.lower() == ".glb":
         whole = glb_bytes(*(replace(part, texture=texture) for part in parts))
         write_bytes(output, whole, error=MeshError, parents=False)
     else:
-        _write(output, _joined(parts), texture, wishes, None)
+        _write(output, _joined(parts), texture, file_options, None)
     told = [
         _folded_by_rounding(output, z, after, file.mesh.F)
         for file, z, after in zip(surfaces, maps, moved, strict=True)
@@ -242,10 +246,10 @@ def _columns(z: Complex) -> Real:
 
 
 def _texture(
-    surface: SurfaceFile, textured: Textured, wishes: Wishes, output: Path
+    surface: SurfaceFile, textured: Textured, file_options: FileOptions, output: Path
 ) -> bytes | None:
-    if wishes.bake is None:
-        return _checker(wishes, output)
+    if file_options.bake is None:
+        return _checker(file_options, output)
     from cembench.drawing.texture import baked_png, read_texture
 
     if surface.repaired:
@@ -256,11 +260,11 @@ def _texture(
     old = read_obj_uv(surface.path, textured.F)
     assert textured.uv is not None
     corners = textured.F if textured.corners is None else textured.corners
-    return baked_png(read_texture(wishes.bake), old, textured.uv[corners])
+    return baked_png(read_texture(file_options.bake), old, textured.uv[corners])
 
 
-def _checker(wishes: Wishes, output: Path) -> bytes | None:
-    if not wishes.checker and output.suffix.lower() != ".glb":
+def _checker(file_options: FileOptions, output: Path) -> bytes | None:
+    if not file_options.checker and output.suffix.lower() != ".glb":
         return None
     from cembench.drawing.texture import checker_png
 
@@ -268,10 +272,14 @@ def _checker(wishes: Wishes, output: Path) -> bytes | None:
 
 
 def _write(
-    output: Path, surface: Textured, texture: bytes | None, wishes: Wishes, original: str | None
+    output: Path,
+    surface: Textured,
+    texture: bytes | None,
+    file_options: FileOptions,
+    original: str | None,
 ) -> None:
     """Write the files of a surface, the texture first, so that no file names a missing one."""
-    for path in beside(output, wishes):
+    for path in beside(output, file_options):
         if path.suffix == ".png":
             assert texture is not None
             write_bytes(path, texture, error=RenderError, parents=False)
@@ -283,7 +291,7 @@ def _write(
         write_textured(output, replace(surface, texture=texture))
         return
     text = original or obj_bytes(surface).decode()
-    if wishes.textured:
+    if file_options.textured:
         library = output.with_suffix(".mtl").name.encode("utf-8", "surrogateescape")
         text = with_material(text, library.decode("latin-1"))
     write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)

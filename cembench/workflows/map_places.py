@@ -47,7 +47,9 @@ def picture_files(
     ]
     twice = [picture for picture in pictures if pictures.count(picture) > 1]
     if twice:
-        raise ParameterError(f"two pictures would be written to {twice[0]}; draw them one by one.")
+        raise ParameterError(
+            f"two pictures would be written to {twice[0]}; draw them one at a time."
+        )
     return pictures
 
 
@@ -82,7 +84,7 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
     twice = [file for file in files if files.count(file) > 1]
     if twice:
         raise ParameterError(
-            f"two surfaces would be written to {twice[0]}; map them into different folders."
+            f"two surfaces would be written to {twice[0]}; write them to different folders."
         )
     return list(files)
 

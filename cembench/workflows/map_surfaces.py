@@ -19,7 +19,7 @@ from cembench.running.plan import MeasurementSettings, Task, paper_role_of_file,
 from cembench.running.surface_file import SurfaceFile
 from cembench.workflows.map_extras import Extras, write_extras
 from cembench.workflows.map_files import (
-    Wishes,
+    FileOptions,
     write_atlas,
     write_corner_map,
     write_map,
@@ -104,7 +104,7 @@ def jobs_of(
 def map_surfaces(
     files: Sequence[FileJobs],
     options: Options,
-    wishes: Wishes,
+    file_options: FileOptions,
     extras: Extras,
     busy: Busy,
     *,
@@ -124,12 +124,14 @@ def map_surfaces(
     for file in files:
         maps: list[Complex] = []
         for k, job in enumerate(file.jobs):
-            found = _mapped(file, job, options, wishes, extras, busy, keep_invalid=keep_invalid)
+            found = _mapped(
+                file, job, options, file_options, extras, busy, keep_invalid=keep_invalid
+            )
             if found.uv is not None and (found.ok or keep_invalid):
                 maps.append(found.uv)
             is_last = k == len(file.jobs) - 1
             if k and is_last and len(maps) == len(file.jobs):
-                told = _write_shells(file, maps, wishes, busy)
+                told = _write_shells(file, maps, file_options, busy)
                 found = Mapped(found.surface, found.record, found.uv, found.written, told)
             yield found
 
@@ -148,17 +150,19 @@ def incomplete(
     return missing
 
 
-def write_together(output: Path, found: Sequence[Mapped], wishes: Wishes) -> tuple[Notice, ...]:
+def write_together(
+    output: Path, found: Sequence[Mapped], file_options: FileOptions
+) -> tuple[Notice, ...]:
     """Write all surfaces to one file; all must have a map."""
     maps = [mapped.uv for mapped in found if mapped.uv is not None]
-    return write_atlas(output, [mapped.surface for mapped in found], maps, wishes)
+    return write_atlas(output, [mapped.surface for mapped in found], maps, file_options)
 
 
 def _mapped(
     file: FileJobs,
     job: Job,
     options: Options,
-    wishes: Wishes,
+    file_options: FileOptions,
     extras: Extras,
     busy: Busy,
     *,
@@ -177,7 +181,7 @@ def _mapped(
         written["output"] = str(file.output)
         if alone:
             write: Any = write_corner_map if is_atlas else write_map
-            notices = write(file.output, job.surface, uv, wishes)
+            notices = write(file.output, job.surface, uv, file_options)
             told += [(file.output, notice) for notice in notices]
     if extras.files:
         with busy("writing"):
@@ -193,11 +197,11 @@ def _mapped(
 
 
 def _write_shells(
-    file: FileJobs, maps: Sequence[Complex], wishes: Wishes, busy: Busy
+    file: FileJobs, maps: Sequence[Complex], file_options: FileOptions, busy: Busy
 ) -> tuple[tuple[Path, Notice], ...]:
     told: tuple[Notice, ...] = ()
     if file.output is not None:
-        told = write_shells(file.output, file.shells, maps, wishes)
+        told = write_shells(file.output, file.shells, maps, file_options)
     if file.picture is not None:
         with busy("drawing"):
             draw_shells(file.shells, maps, file.picture)

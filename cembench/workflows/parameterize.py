@@ -152,17 +152,17 @@ class Result:
 
         """
         from cembench.core.outputs import refuse_existing
-        from cembench.workflows.map_files import Wishes, beside, save_map
+        from cembench.workflows.map_files import FileOptions, beside, save_map
         from cembench.workflows.places import Place
 
         path = Path(path)
         if uv not in tuple(Place):
             raise ParameterError(f"uv={uv!r} is unknown; allowed: 'unit', 'disk'.")
-        wishes = Wishes(Place(uv), checker)
+        file_options = FileOptions(Place(uv), checker)
         check_writable_format(path, with_uv=True)
-        for file in (path, *beside(path, wishes)):
+        for file in (path, *beside(path, file_options)):
             refuse_existing(file, overwrite=overwrite)
-        for notice in save_map(path, self.mesh, self.z, wishes):
+        for notice in save_map(path, self.mesh, self.z, file_options):
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
 

@@ -85,7 +85,7 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
 
     """
     if not folder.is_dir():
-        raise ParameterError(f"{folder} is not a folder; name one that holds mesh files.")
+        raise ParameterError(f"{folder} is not a folder; name a folder that holds mesh files.")
     found = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
     names = Names()
     for path in _first(found, limit):
@@ -115,7 +115,7 @@ def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Pro
         except (zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, OSError) as error:
             raise ParameterError(
                 f"{path} cannot be read as an archive ({type(error).__name__}: {error}); name a "
-                "whole .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz file."
+                "complete .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz file."
             ) from None
 
 

@@ -204,7 +204,7 @@ def gathered(
             refused.append(one)
         elif not isinstance(one.mesh, kinds):
             kind = type(one.mesh).__name__
-            why = f"it is a {kind}, which none of the chosen algorithms takes"
+            why = f"it is a {kind}, which none of the chosen algorithms accepts"
             refused.append(replace(one, mesh=None, error=why))
         elif one.mesh.hash not in seen:
             seen.add(one.mesh.hash)
@@ -222,7 +222,7 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
     cut = sum(one.cut for one in found.surfaces)
     text = (
         f"{', '.join(sets)}: {count} surfaces were given, {len(found.surfaces)} of them can be "
-        f"mapped{f', {cut} after they were cut open' if cut else ''}. Shares of success are of "
+        f"mapped{f', {cut} after they were cut open' if cut else ''}. Success rates refer to "
         "those that can be mapped."
     )
     tables = [

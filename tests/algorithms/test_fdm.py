@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 from cembench.algorithms import fdm as module
-from cembench.algorithms.fdm import _middle, _public_turn, fdm
+from cembench.algorithms.fdm import _divisor_of_public_program, _middle, fdm
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
@@ -113,7 +113,7 @@ def test_the_public_program_returns_the_last_iterate_and_turns_by_a_and_half_of_
     assert fdm(mesh).extras["iterations_dropped"] > 0
     p, q = np.exp(0.4j), np.exp(0.6j)
     assert np.angle(_middle(p, q)) == pytest.approx(0.5)
-    assert np.angle(_public_turn(p, q)) == pytest.approx(0.7)
+    assert np.angle(_divisor_of_public_program(p, q)) == pytest.approx(0.7)
 
 
 def test_delaunay_weights_are_nearer_to_the_surface_where_its_edges_are_not_delaunay():

@@ -148,7 +148,7 @@ def test_landmarks_that_cannot_meet_are_exit_code_1(coarse):
     assert aside[near] < np.deg2rad(10)
     code, out, err = morph(inside[[(centre, centre), (near, far), (far, near)]])
     assert (code, out) == (1, "")
-    assert "going on would fold triangles" in err
+    assert "a further step would fold triangles" in err
 
 
 def test_a_real_face_morphs_into_a_real_head(cli):

@@ -145,10 +145,10 @@ def test_a_leash_lets_the_energy_fall_as_far_as_anywhere_within_it():
         return EnergyModel(S, domain, np.ones(k) / k).energy
 
     model = EnergyModel(S, here, np.ones(k) / k)
-    for leash in (0.001, 0.03):
-        images = [here.through(leash * np.exp(1j * t * np.pi / 18)) for t in range(36)]
+    for max_modulus in (0.001, 0.03):
+        images = [here.through(max_modulus * np.exp(1j * t * np.pi / 18)) for t in range(36)]
         lowest = min(energy(image) for image in images)
-        gain = energy(here) - energy(here.through(moebius_descent(model, leash)))
+        gain = energy(here) - energy(here.through(moebius_descent(model, max_modulus)))
         assert gain > 0
         assert gain == pytest.approx(energy(here) - lowest, rel=0.03)
 

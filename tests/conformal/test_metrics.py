@@ -165,6 +165,7 @@ def test_every_metric_says_how_it_is_shown():
     for metric in METRICS:
         assert metric.title
         assert metric.meaning
+        assert "|" not in metric.meaning  # it goes into a Markdown table
         assert format(1, metric.form)
         assert format(1, metric.precise)
         assert metric.text(None) == "inf"

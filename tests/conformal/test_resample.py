@@ -85,7 +85,9 @@ def test_holes_stay_holes_in_a_geometry_image():
     expected = locate(to_unit_square(z), mesh.F, (x[None] + 1j * x[::-1, None]).ravel())[0] >= 0
     assert (known.ravel() == expected).mean() > 0.999
     assert known[32, 32] == expected.reshape(65, 65)[32, 32]
-    with pytest.raises(ParameterError, match=r"not onto the disk: the surface has \d+ boundaries"):
+    with pytest.raises(
+        ParameterError, match=r"does not cover the disk: the surface has \d+ boundaries"
+    ):
         geometry_image(mesh, z, 65)
 
 

@@ -40,7 +40,7 @@ def pixels(path):
 
 
 def panels(path, size):
-    picture, side = pixels(path), compose.side_of(size)
+    picture, side = pixels(path), compose.panel_side(size)
     return [picture[row : row + side, col : col + side] for col, row in compose.panels_of(size)]
 
 
@@ -136,7 +136,7 @@ def test_long_words_stay_on_the_page(tmp_path):
     assert (picture[:, :8] == 255).all()
     assert (picture[:, -8:] == 255).all()
     assert (picture[-2:] == 255).all()
-    assert (picture[compose.gap_of(SMALL) + compose.side_of(SMALL) :] < 200).any()
+    assert (picture[compose.panel_gap(SMALL) + compose.panel_side(SMALL) :] < 200).any()
 
 
 def test_a_picture_that_cannot_be_drawn_is_an_error(tmp_path, monkeypatch):

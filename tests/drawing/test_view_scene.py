@@ -10,8 +10,8 @@ from cembench.drawing.view_scene import (
     DEGREES,
     MOST,
     ViewedMap,
-    most_each,
-    turned_onto,
+    rotated_to_match,
+    triangles_per_surface,
     upright,
     view_scene,
 )
@@ -74,11 +74,13 @@ def test_maps_are_turned_alike(bowl):
     first = upright(mesh, z)
     for angle in (0.3, 2, -3):
         np.testing.assert_allclose(upright(mesh, z * np.exp(1j * angle)), first, atol=1e-9)
-        np.testing.assert_allclose(turned_onto(z * np.exp(1j * angle), first), first, atol=1e-9)
+        np.testing.assert_allclose(
+            rotated_to_match(z * np.exp(1j * angle), first), first, atol=1e-9
+        )
     np.testing.assert_array_equal(np.abs(np.abs(first) - np.abs(z)) < 1e-12, True)
 
 
 def test_many_surfaces_share_what_a_page_may_hold():
-    assert most_each(1) == MOST
-    assert most_each(20) == 10_000
-    assert most_each(1000) == 5_000
+    assert triangles_per_surface(1) == MOST
+    assert triangles_per_surface(20) == 10_000
+    assert triangles_per_surface(1000) == 5_000

@@ -54,7 +54,7 @@ def test_flat_vertices_get_a_height_of_0(disk, tmp_path):
 
 def test_arrays_are_named_for_files_of_arrays_only(disk, tmp_path):
     write_mesh(tmp_path / "a.obj", disk)
-    with pytest.raises(MeshError, match=r"arrays are named for \.mat, \.npz files only"):
+    with pytest.raises(MeshError, match=r"arrays can be named only for \.mat, \.npz files"):
         read_mesh(tmp_path / "a.obj", arrays=("v", "f"))
 
 

@@ -177,7 +177,7 @@ def test_options_out_of_range(options, message):
 
 
 def test_nothing_left():
-    with pytest.raises(MeshError, match="nothing is left to repair"):
+    with pytest.raises(MeshError, match="nothing can be repaired"):
         repair(np.zeros((3, 3)), np.array([[0, 1, 2]]))
 
 

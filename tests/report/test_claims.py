@@ -139,7 +139,7 @@ def test_on_a_flat_disk_the_map_with_a_pole_has_mu_z_squared():
         middle = np.abs(z[mesh.F].mean(axis=1))
         between = (middle > 0.4) & (middle < 0.9)
         off.append(np.abs((K - 1) / (K + 1) - middle**2)[between].mean())
-        figures = start.near_and_at_boundary(mesh)
+        figures = start.distortion_near_pole_and_boundary(mesh)
         near, rim = [*near, figures[0]], [*rim, figures[1]]
     np.testing.assert_allclose(np.log2(np.array(off[:-1]) / off[1:]), 1, atol=0.15)
     assert near[0] > 1.3 * near[1] > 1.3**2 * near[2]  # what is left there is the mesh's

@@ -19,7 +19,7 @@ from PIL import Image
 from cembench.core.errors import RenderError
 from cembench.report import pictures
 from cembench.report.document import Column, Figure, Report, Section, Table, Text, Value
-from cembench.report.pictures import on_any_ground
+from cembench.report.pictures import with_transparent_background
 from cembench.report.render import html
 from cembench.report.render.html import write_html
 from tests.report.sample_report import HOSTILE, sample_report
@@ -272,7 +272,7 @@ def test_the_white_round_a_picture_becomes_transparent_and_the_white_in_it_stays
     pixels[10:50, 20:60] = (80, 130, 180)
     pixels[25:35, 35:45] = 255  # within
     pixels[5, 5] = 200  # a speck, as JPEG leaves them
-    found = np.asarray(on_any_ground(Image.fromarray(pixels)))
+    found = np.asarray(with_transparent_background(Image.fromarray(pixels)))
     assert (found[:8, :, 3] == 0).all()
     assert (found[12:48, 22:58, 3] == 255).all()
     assert found.shape == (60, 80, 4)

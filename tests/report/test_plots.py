@@ -11,7 +11,7 @@ from cembench.report.content.figures.cost_by_faces import cost_by_faces, fit, pr
 from cembench.report.content.figures.energy_by_iteration import energy_by_iteration
 from cembench.report.content.figures.performance_profile import performance_profile, ratios
 from cembench.report.content.figures.time_by_phase import time_by_phase
-from cembench.report.palette import PARTS, looks
+from cembench.report.palette import PARTS, series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, plotly_of, write_plot
 from tests.report.small_run import meshes, ok, record, write_run
 
@@ -63,9 +63,9 @@ def test_plotly_is_told_the_same_values(plot):
 
 def test_algorithms_look_different_from_one_another_and_the_same_everywhere():
     names = ["cem", "qiem", "fdm", "ldm", "harmonic-circle", "lscm", "mine", "yours"]
-    found = looks(names)
+    found = series_styles(names)
     assert len({found[name].colour for name in names}) == len(names)
-    assert looks(["zebra", "cem"])["cem"] == found["cem"]
+    assert series_styles(["zebra", "cem"])["cem"] == found["cem"]
 
 
 def test_a_fitted_exponent_is_that_of_a_power_law():
@@ -122,7 +122,7 @@ def test_energies_of_algorithms_not_in_the_paper_stand_beside_those_of_cem(tmp_p
 
 
 def test_no_phase_has_an_algorithm_s_colour():
-    algorithms = {look.colour.lower() for look in looks(list("abcdef")).values()}
+    algorithms = {look.colour.lower() for look in series_styles(list("abcdef")).values()}
     assert not algorithms & {colour.lower() for colour in PARTS}
     assert len(set(PARTS)) == len(PARTS)
 

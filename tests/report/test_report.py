@@ -171,7 +171,7 @@ def test_no_run_and_no_record_are_errors_and_nothing_is_written(cli):
     (cli.folder / "empty" / "records").mkdir(parents=True)
     code, _, err = cli("report", "empty", "-o", "out")
     assert code == 2
-    assert "empty holds no record: none of its cells is finished" in err
+    assert "empty holds no record: no cell is finished yet" in err
     assert not (cli.folder / "out").exists()
 
 
@@ -241,7 +241,7 @@ def test_a_store_keeps_surfaces_and_knows_a_wrong_one(tmp_path):
     one, two = sorted((tmp_path / "run" / "meshes").iterdir())[:2]
     one.write_bytes(two.read_bytes())
     wrong = next(r for r in store.records() if r.cell.mesh_hash.startswith(one.stem))
-    with pytest.raises(RecordError, match="does not hold the surface that its name says"):
+    with pytest.raises(RecordError, match="does not hold the surface named in its file name"):
         store.mesh(wrong.cell)
     one.write_bytes(b"cut")
     with pytest.raises(RecordError, match="is not an archive of arrays"):

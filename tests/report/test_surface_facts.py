@@ -62,7 +62,7 @@ def test_facts_of_an_older_algorithm_or_a_damaged_file_do_not_hold(known, monkey
 def test_a_surface_that_is_not_kept_has_no_facts():
     cap = load_registry().surface("spherical-cap")
     assert kept_facts(load_registry(), cap) is None
-    with pytest.raises(RegistryError, match="'spherical-cap' is not kept on disk"):
+    with pytest.raises(RegistryError, match="'spherical-cap' is not stored on disk"):
         find_facts(load_registry(), cap)
 
 

@@ -202,8 +202,8 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
         facts = one.mesh.model_copy(update={"origin": "model"})
         store.save(one.model_copy(update={"mesh": facts}), uv, {"id": "machine", "cpu": "x"})
     evidence = Evidence.of(tmp_path)
-    assert [s.name for s in evidence.models if s not in evidence.one_each] == ["spherical-cap"]
-    assert evidence.standing_for("Liu's Neutral Face").origin == "model"
+    assert [s.name for s in evidence.models if s not in evidence.one_per_model] == ["spherical-cap"]
+    assert evidence.surface_for_model("Liu's Neutral Face").origin == "model"
     rates, models = measured_rates(evidence, "ldm", "reuse")
     assert dict(zip(models, rates, strict=True))["Liu's Neutral Face"] == pytest.approx(7.0)
     assert len(models) == len(set(models)) == 2

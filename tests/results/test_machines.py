@@ -12,7 +12,7 @@ from cembench.report.content.machines import machines_section
 from cembench.report.content.surface_page import figures_table
 from cembench.report.document import Table
 from cembench.report.render.terminal import results_table
-from cembench.report.render.terminal_many import machines_told
+from cembench.report.render.terminal_many import machine_lines
 from cembench.results.machines import machine_of, marks, software_differences
 from cembench.results.merging import merge, others_of
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
@@ -112,8 +112,8 @@ def test_tables_of_several_machines_mark_seconds_and_say_so(two_machines, tmp_pa
     assert max(map(len, shown.splitlines())) <= 80
     alone = [r for r in records if r.environment == "e1"]
     assert "1.000 a" not in printed(results_table(alone, environments))
-    assert machines_told(alone, environments) == []
-    assert "which mixes them" in str(machines_told(records, environments)[0])
+    assert machine_lines(alone, environments) == []
+    assert "which mixes them" in str(machine_lines(records, environments)[0])
     assert marks(alone, environments).explained() == []
     assert software_differences(records, environments) == ["node-2: python: None / 3.13"]
 

@@ -52,7 +52,7 @@ def tasks_of(*names, faces=600, **how):
         ("off-circle", "invalid", "off the unit circle by up to 0.001"),
         ("folded", "invalid", "triangles are folded"),
         ("writes", "invalid", "changed the mesh"),
-        ("wound-twice", "invalid", "goes round the circle 2 times, not once"),
+        ("wound-twice", "invalid", "winds around the circle 2 times instead of once"),
         ("raises-real-time-signal", "failed", "ended by signal 37"),
         ("exits-politely", "failed", "SystemExit: 0"),
     ],
@@ -113,14 +113,14 @@ def test_a_run_over_the_unruly_measures_the_good(tmp_path):
         assert outcomes[name].notes[0].kind is NoticeKind.PROCESSES_LEFT
     (note,) = outcomes["by-chance"].notes
     assert note.kind is NoticeKind.NOT_DETERMINISTIC
-    assert note.text.endswith("came out in rounds 1")
+    assert note.text.endswith("different maps in rounds 1")
     assert outcomes["good"].notes == ()
 
 
 def test_what_a_process_does_to_its_answer_or_to_the_others_fails_it_alone(tmp_path):
     expected = {
-        "removes-scratch": ("failed", "the folder for its answer is gone"),
-        "replaces-scratch": ("failed", "the folder for its answer is gone"),
+        "removes-scratch": ("failed", "the folder for its answer no longer exists"),
+        "replaces-scratch": ("failed", "the folder for its answer no longer exists"),
         "answers-itself": ("failed", "an answer that cannot be read: Input should be 'ok'"),
         "answers-at-length": ("failed", "cannot be read: it takes 33,554,432 bytes"),
         "spoils-meshes": ("ok", None),
@@ -148,7 +148,7 @@ def test_a_timed_call_that_returns_a_worse_map_makes_the_cell_invalid(tmp_path, 
     outcome = record.outcome
     assert (outcome.status, outcome.rounds) == ("invalid", ())
     assert outcome.cause.startswith("in round 1 of 1: call 1 of ")
-    assert "returned another map than the check" in outcome.cause
+    assert "returned a different map from the check" in outcome.cause
     assert cause in outcome.cause
     assert tuple(fault.kind for fault in outcome.faults)[:2] == kinds
 

@@ -174,7 +174,7 @@ def phases(*names):
     [
         ((5,), "a phase's name is not a text"),
         (("x" * 101,), "a phase's name is not a text"),
-        (map(str, range(200)), "201 phases; at most 100"),
+        (map(str, range(200)), "201 phases; allowed are at most 100"),
     ],
 )
 def test_phases_are_few_and_have_names(names, cause):

@@ -56,7 +56,7 @@ class Noting(Watcher):
     def begins(self, processes):
         self.expected += processes
 
-    def goes_on(self, task, rounds):
+    def adds_rounds(self, task, rounds):
         self.expected += rounds
 
     def starts(self, task, step):

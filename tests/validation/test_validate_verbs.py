@@ -98,7 +98,7 @@ def test_what_remembers_its_calls_is_caught_in_the_rounds(here):
             "unknown algorithm 'none'; known: abf++, abf-linear, angenent-haker, backslash,",
         ),
         (":right", ("--against", "koebe-cem"), "--against koebe-cem: right cannot be compared"),
-        (":right", ("--surfaces", "catenoid-ring"), "which none of the chosen algorithms takes"),
+        (":right", ("--surfaces", "catenoid-ring"), "which none of the chosen algorithms accepts"),
         (":right", ("-p", "steps=2"), "no chosen algorithm has a parameter 'steps'"),
         (":right", ("-p", "steps"), "-p 'steps' is not of the form NAME=VALUE"),
         (":right", ("--up-to", 100), "--up-to 100 is too few"),

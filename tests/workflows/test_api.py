@@ -201,7 +201,7 @@ def test_repair_says_what_it_did_and_gives_every_component():
         (("nowhere.obj"), {}, "no such file"),
         (7, {}, "pair of arrays"),
         ((V, F + 0.5), {}, "integer|whole"),
-        ((V, F + len(V)), {}, "nothing is left to repair"),
+        ((V, F + len(V)), {}, "nothing can be repaired"),
     ],
 )
 def test_what_repair_refuses(given, options, error):

@@ -13,7 +13,7 @@ from PIL import Image
 import cembench
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.workflows import geometry_images
-from cembench.workflows.map_files import Wishes, save_map
+from cembench.workflows.map_files import FileOptions, save_map
 from cembench.workflows.places import Place
 from tests import gallery
 from tests.commands.test_cli import FAULTY
@@ -64,7 +64,7 @@ def test_a_checkerboard_is_found_from_obj_and_from_ply(result, tmp_path):
         result.save(tmp_path / "a.ply", checker=True)
     result.save(tmp_path / "b.ply", checker=True)
     assert b"TextureFile b_texture.png" in (tmp_path / "b.ply").read_bytes()
-    with pytest.raises(cembench.ParameterError, match=r"names no texture; .* go with \.glb"):
+    with pytest.raises(cembench.ParameterError, match=r"cannot refer to a texture; .* with \.glb"):
         result.save(tmp_path / "a.vtp", checker=True)
 
 
@@ -73,7 +73,7 @@ def test_triangles_that_rounding_folds_are_counted(tmp_path):
     z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / np.abs(mesh.V[:, :2]).max()
     inner = np.setdiff1d(np.arange(mesh.n), mesh.boundary)
     z[inner] *= 1e-12  # the disk's middle, as on a long finger
-    assert save_map(tmp_path / "a.obj", mesh, z, Wishes(Place.disk)) == ()
+    assert save_map(tmp_path / "a.obj", mesh, z, FileOptions(Place.disk)) == ()
     (notice,) = save_map(tmp_path / "a.ply", mesh, z)
     assert notice.kind == "folded_by_rounding"
     assert "single precision" in str(notice)
@@ -165,8 +165,8 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("-o", "a.fbx"), "allowed here: .obj, .ply, .glb, .vtp, .npz"),
         (("-o", "a.obj", "--bake", "nothing.png"), "nothing.png cannot be read: No such file"),
         (("-o", "a.obj", "--bake", "flat.obj"), "it is not a picture"),
-        (("-o", "a.obj", "--bake", "paint.png", "--checker"), "two textures; choose one"),
-        (("-o", "a.vtp", "--checker"), "names no texture"),
+        (("-o", "a.obj", "--bake", "paint.png", "--checker"), "each give a texture; choose one"),
+        (("-o", "a.vtp", "--checker"), "cannot refer to a texture"),
         (("--checker",), "need a file that uses the texture"),
         (("--geometry-image", "a.tif"), "allowed: .npy, .exr, .png"),
         (("--geometry-image", "no/a.npy"), "there is no folder no"),
@@ -174,7 +174,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("--html", "a.obj"), "use the suffix .html"),
         (("--html", "no/a.html"), "there is no folder no"),
         (("-o", "a.obj", "--uv", "square"), "'square' is not one of"),
-        (("-a", "lscm", "--remesh", "a.obj"), "is not onto the disk"),
+        (("-a", "lscm", "--remesh", "a.obj"), "does not cover the disk"),
     ],
 )
 def test_bad_wishes_are_refused_before_anything_is_written(arguments, message, cli, given):

@@ -89,7 +89,7 @@ def in_single_precision(points: Points, format_name: str) -> NDArray[np.float32]
     largest = float(np.finfo(np.float32).max)
     if np.abs(points).max(initial=0.0) > largest:
         raise MeshError(
-            f"coordinates up to {np.abs(points).max():.3g} do not fit into {format_name}, which "
+            f"coordinates up to {np.abs(points).max():.3g} are too large for {format_name}, which "
             f"holds numbers up to {largest:.3g}; scale the surface, or write OBJ."
         )
     return points.astype("<f4")

@@ -1,4 +1,4 @@
-"""Which maps are about as good as the best; only among those is the fastest algorithm named."""
+"""Which maps are about as good as the best; the fastest algorithm is named only among those."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def beside_others(evidence: Evidence) -> Table | None:
             rows.append(_row(evidence, surface, series, record))
             shown.append(record)
             if record.outcome.status != "ok":
-                notes[f"{surface.title}, {series.label}: {evidence.why_not(record)}"] = None
+                notes[f"{surface.title}, {series.label}: {evidence.missing_reason(record)}"] = None
     return Table(
         "beside-others",
         "Beside libraries and programs of others",
@@ -39,7 +39,7 @@ def beside_others(evidence: Evidence) -> Table | None:
             Column("algorithm", numeric=False),
             Column("status", numeric=False),
             Column("E_C / A"),
-            Column("mean°"),
+            Column("angle°"),
             Column("folds"),
             Column("islands"),
             Column("call", "seconds"),
@@ -66,7 +66,7 @@ def _row(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, record: Record
 ) -> tuple[Value, ...]:
     outcome, key = record.outcome, record.cell.key
-    why = evidence.why_not(record) if outcome.status != "ok" else ""
+    why = evidence.missing_reason(record) if outcome.status != "ok" else ""
 
     def value(number: float | None, text: str) -> Value:
         if number is None:

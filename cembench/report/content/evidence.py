@@ -17,7 +17,7 @@ from cembench.core.errors import RecordError
 from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.palette import SeriesStyle, looks
+from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import paper
 from cembench.results import record_rows as frame
 from cembench.results.comparison import compare
@@ -101,7 +101,7 @@ class Evidence:
         records = store.records()
         if not records:
             raise RecordError(
-                f"{run} holds no record: none of its cells is finished. `cembench status {run}` "
+                f"{run} holds no record: no cell is finished yet. `cembench status {run}` "
                 "shows what was requested; run the same `cembench run` again to resume it."
             )
         kept = _latest(records)
@@ -151,20 +151,20 @@ class Evidence:
         return tuple(s for s in self.surfaces if s.paper_row)
 
     @cached_property
-    def one_each(self) -> tuple[MeasuredSurface, ...]:
+    def one_per_model(self) -> tuple[MeasuredSurface, ...]:
         """One surface for each model of the paper, the model itself preferred over a stand-in."""
         real_first = sorted(self.models, key=lambda s: s.origin != "model")
         chosen = {s.paper_row: s for s in reversed(real_first)}
         return tuple(s for s in self.models if chosen[s.paper_row] is s)
 
     @cached_property
-    def set_aside(self) -> tuple[MeasuredSurface, ...]:
+    def stand_ins_left_out(self) -> tuple[MeasuredSurface, ...]:
         """The stand-ins left out of averages, because the run has the model or another stand-in."""
-        return tuple(s for s in self.models if s not in self.one_each)
+        return tuple(s for s in self.models if s not in self.one_per_model)
 
-    def standing_for(self, model: str) -> MeasuredSurface | None:
+    def surface_for_model(self, model: str) -> MeasuredSurface | None:
         """Return the surface that is, or stands in for, this model; None if there is none."""
-        return next((s for s in self.one_each if s.paper_row == model), None)
+        return next((s for s in self.one_per_model if s.paper_row == model), None)
 
     @property
     def others(self) -> tuple[MeasuredSurface, ...]:
@@ -211,9 +211,9 @@ class Evidence:
         }
 
     @cached_property
-    def looks(self) -> dict[str, SeriesStyle]:
+    def styles(self) -> dict[str, SeriesStyle]:
         """Colour, marker and dash of each series by its label, the same in every plot."""
-        found = looks([s.name for s in self.series])
+        found = series_styles([s.name for s in self.series])
         return {s.label: found[s.name] for s in self.series}
 
     def find(
@@ -261,7 +261,7 @@ class Evidence:
     def _names(self) -> dict[str, str]:
         return distinct_slugs({s.mesh_hash: s.name for s in self.surfaces})
 
-    def why_not(self, record: Record | None) -> str:
+    def missing_reason(self, record: Record | None) -> str:
         """Return why there is no figure for this cell."""
         if record is None:
             return "not in this run"

@@ -37,7 +37,7 @@ def exhibit_gaps(evidence: Evidence) -> list[Gap]:
     return [
         Gap(
             f"{figure}: {what}",
-            "the run has no exhibit that shows it.",
+            "the run has no exhibit for it.",
             f"cembench {verb} --run {evidence.store.folder}",
         )
         for figure, what, verb in EXPECTED

@@ -15,7 +15,13 @@ from cembench.conformal.metrics import angle_errors
 from cembench.core.atomic import write_bytes
 from cembench.core.names import digest, distinct_slugs
 from cembench.drawing import shading
-from cembench.drawing.view_scene import ViewedMap, most_each, turned_onto, upright, view_scene
+from cembench.drawing.view_scene import (
+    ViewedMap,
+    rotated_to_match,
+    triangles_per_surface,
+    upright,
+    view_scene,
+)
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import (
     DISK,
@@ -75,7 +81,7 @@ class Inspection:
     scene: bytes = b""
 
     @property
-    def why_not(self) -> str:
+    def missing_reason(self) -> str:
         """Why there are no pictures."""
         return (
             f"the run does not hold the surface {self.surface.name}: it was measured before runs "
@@ -98,7 +104,7 @@ def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) 
     for series, record, found_uv in maps:
         if found_uv is None:
             continue
-        uv = turned_onto(found_uv, viewed[0].z) if viewed else upright(mesh, found_uv)
+        uv = rotated_to_match(found_uv, viewed[0].z) if viewed else upright(mesh, found_uv)
         viewed.append(ViewedMap(series.label, uv, _about(series, record)))
         panel = shading.image_panel(mesh, uv, SIDE)
         checkerboards[series.label] = drawer.checkerboard(series, record, panel, uv)
@@ -107,7 +113,7 @@ def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) 
         if shown is None or (series.algorithm == REFERENCE and series.main):
             shown = (series, panel)
     curved, meshed = drawer.curvature_and_mesh(*shown) if shown else (None, None)
-    most = most_each(len(evidence.surfaces))
+    most = triangles_per_surface(len(evidence.surfaces))
     scene = view_scene(mesh, viewed, surface.title, most) if viewed else b""
     return Inspection(surface, True, checkerboards, curved, meshed, angles, scene)
 
@@ -117,7 +123,7 @@ def _about(series: AlgorithmSeries, record: Record) -> str:
     metrics = record.outcome.metrics
     error, folds = metrics.get("angle_error_mean_deg"), metrics.get("flipped_triangles")
     target = "" if series.target == DISK else f" (not a map to the disk: {series.target})"
-    off = "" if error is None else f"; angles off by {error:.2f} degrees in the mean"
+    off = "" if error is None else f"; mean angle error {error:.2f} degrees"
     return f"{series.label}{target}{off}; {folds} folded triangles."
 
 

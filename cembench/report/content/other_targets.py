@@ -26,7 +26,7 @@ def other_targets(evidence: Evidence) -> Table | None:
             if series.target == DISK or record is None:
                 continue
             outcome, key = record.outcome, record.cell.key
-            why = evidence.why_not(record) if outcome.status != "ok" else ""
+            why = evidence.missing_reason(record) if outcome.status != "ok" else ""
 
             def value(number: float | None, form: str, key: str = key, why: str = why) -> Value:
                 if number is None:

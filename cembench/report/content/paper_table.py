@@ -24,7 +24,7 @@ from cembench.results import paper
 Quantities = Callable[[AlgorithmSeries | None, str | None], Sequence[Quantity]]
 
 
-def three_kinds(
+def tables_of_kind(
     evidence: Evidence,
     number: int,
     title: str,

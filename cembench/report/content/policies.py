@@ -15,18 +15,18 @@ from cembench.report.plots import PlotSeries as Bars
 BOTH = ("reuse", "backslash")
 
 
-def has_both(evidence: Evidence) -> bool:
+def has_both_policies(evidence: Evidence) -> bool:
     """Whether the run measured both policies."""
     return all(policy in evidence.policies for policy in BOTH)
 
 
-def both_gap(evidence: Evidence) -> Gap:
+def one_policy_gap(evidence: Evidence) -> Gap:
     """Return the gap of a run with only one policy."""
     other = next(policy for policy in BOTH if policy not in evidence.policies)
     return Gap(
         "Factorisations reused or repeated",
         f"this run has only one linear-algebra policy: {', '.join(evidence.policies)}.",
-        f"the same `cembench run` with --solves reuse,backslash (lacking here: {other})",
+        f"the same `cembench run` with --solves reuse,backslash (missing here: {other})",
     )
 
 
@@ -38,7 +38,7 @@ def seconds_under(
     if record is None or record.outcome.status != "ok" or record.outcome.median_seconds is None:
         key = record.cell.key if record else ""
         text = record.outcome.status if record and record.outcome.status != "ok" else "-"
-        return Value(text, None, "", key, evidence.why_not(record)), None
+        return Value(text, None, "", key, evidence.missing_reason(record)), None
     seconds = record.outcome.median_seconds
     return Value(significant(seconds), seconds, surface.origin, record.cell.key), seconds
 
@@ -124,7 +124,7 @@ def policies_plot(evidence: Evidence) -> Plot:
             a, b = (seconds_under(evidence, surface, series, p)[1] for p in BOTH)
             names.append(surface.title)
             values.append(b / a if a and b else None)
-        drawn.append(Bars(series.label, names, values, "both", evidence.looks[series.label]))
+        drawn.append(Bars(series.label, names, values, "both", evidence.styles[series.label]))
     return Plot(
         "reuse-against-backslash",
         "Cost of repeated factorisation",

@@ -88,10 +88,10 @@ def here(
         return missing("the run does not have this algorithm")
     record = evidence.find(surface, quantity.series, policy)
     if record is None:
-        return missing(evidence.why_not(record))
+        return missing(evidence.missing_reason(record))
     if record.outcome.status != "ok":
         text = record.outcome.status.replace("out_of_memory", "memory")
-        return Value(text, None, "", record.cell.key, evidence.why_not(record))
+        return Value(text, None, "", record.cell.key, evidence.missing_reason(record))
     number = quantity.measured(record)
     if number is None:
         return Value("-", None, "", record.cell.key, "the record holds no such figure")
@@ -128,7 +128,9 @@ def table_beside(
             columns.append(Column("printed", quantity.heading))
         columns.append(Column("here", quantity.heading))
     rows = [_row(evidence, surface, quantities, policy) for surface in surfaces]
-    counted = [r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.set_aside]
+    counted = [
+        r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.stand_ins_left_out
+    ]
     last = _footer_rows(counted, len(columns), footers)
     places = _places(columns, rows)
     remarks = [*notes, *([absent] if absent else []), *places.values(), *_sizes(surfaces)]

@@ -79,7 +79,7 @@ def build_report(
     progress("tables, plots and claims", n - 2, n)
     of_paper = not many and bool(evidence.models)
     tested = claims(evidence, inspections) if of_paper else []
-    beyond = _beyond(evidence, folder, by_surface=not many)
+    beyond = _beyond_the_paper(evidence, folder, by_surface=not many)
     first = _first_plot(beyond)
     sections = [] if many else [_summary(evidence, of_paper=of_paper)]
     machines = machines_section(evidence)
@@ -110,7 +110,7 @@ def build_report(
         else findings(evidence, inspections, tested)
     )
     return Report(
-        title=PAPER if of_paper else _own_title(evidence),
+        title=PAPER if of_paper else _title_of_own_surfaces(evidence),
         findings=replace(found, plot=first) if found else None,
         command=command,
         facts=tuple(facts(evidence)),
@@ -119,7 +119,7 @@ def build_report(
     )
 
 
-def _until(evidence: Evidence) -> str:
+def _precision_words(evidence: Evidence) -> str:
     """Return the precision that cells were measured to, if any."""
     goals = sorted({r.cell.precision for r in evidence.records if r.cell.precision is not None})
     if not goals:
@@ -142,7 +142,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
         ("surfaces", ", ".join(f"{count} {_KINDS[o]}" for o, count in origins.items())),
         ("algorithms", ", ".join(series.label for series in evidence.series)),
         ("solves", ", ".join(evidence.policies)),
-        ("rounds", (", ".join(map(str, rounds)) or "none") + _until(evidence)),
+        ("rounds", (", ".join(map(str, rounds)) or "none") + _precision_words(evidence)),
         ("threads", ", ".join(sorted({str(r.cell.threads) for r in evidence.records}))),
         ("backend", ", ".join(sorted({r.cell.backend for r in evidence.records}))),
     ]
@@ -231,7 +231,7 @@ def _pictures(
     evidence: Evidence, inspections: Inspections, figure: str, model: str
 ) -> list[Figure]:
     """Return CEM's pictures of a model, as in the paper."""
-    surface = evidence.standing_for(model)
+    surface = evidence.surface_for_model(model)
     series = evidence.series_of(REFERENCE)
     if surface is None or series is None:
         return []
@@ -254,24 +254,24 @@ def _pictures(
     ]
 
 
-def _beyond(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
+def _beyond_the_paper(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
     # Over many surfaces, the profile of the time stands beside those of accuracy.
     profiles = [performance_profile(evidence)] if by_surface else []
     items = _drawn([*profiles, accuracy_against_time(evidence), time_by_phase(evidence)], folder)
     if not evidence.models:  # otherwise it is below Table 2
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
-    if policies.has_both(evidence):
+    if policies.has_both_policies(evidence):
         items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
         items += _drawn([policies.policies_plot(evidence)], folder)
     else:
-        items.append(policies.both_gap(evidence))
+        items.append(policies.one_policy_gap(evidence))
     if by_surface:
         items += [table for make in (other_targets, beside_others) if (table := make(evidence))]
     return Section("beyond", "Beyond the paper", tuple(items))
 
 
-def _own_title(evidence: Evidence) -> str:
+def _title_of_own_surfaces(evidence: Evidence) -> str:
     """Return a title for a run on surfaces that are not the paper's."""
     algorithms = len({series.algorithm for series in evidence.series})
     surfaces = evidence.surfaces

@@ -47,7 +47,7 @@ def profile_panel(
         ordered = sorted(r for r in ratios[series.label] if r <= last)
         x = [1.0, *ordered, last]
         y = [100 * sum(r <= tau for r in ordered) / n for tau in x]
-        lines.append(PlotSeries(series.label, x, y, "steps", evidence.looks[series.label]))
+        lines.append(PlotSeries(series.label, x, y, "steps", evidence.styles[series.label]))
     return PlotPanel(
         Axis(f"tau, times {best}", log=True, low=1.0, high=last),
         Axis("surfaces (%)", low=0, high=104),

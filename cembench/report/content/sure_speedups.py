@@ -67,7 +67,7 @@ def _compared(evidence: Evidence, series: AlgorithmSeries, policy: str) -> _Comp
     if series.algorithm == REFERENCE or not series.main:
         return None
     found, ratios = [], []
-    for surface in (*evidence.one_each, *evidence.others):
+    for surface in (*evidence.one_per_model, *evidence.others):
         record = evidence.find(surface, series, policy)
         base = evidence.base(record) if record is not None else None
         one = compare(record, base) if record is not None and base is not None else None

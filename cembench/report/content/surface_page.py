@@ -56,7 +56,7 @@ def surface_page(
         )
     if not seen.kept:
         command = "repeat the command of the run: it adds the surfaces and measures nothing twice"
-        items.append(Gap("Pictures", f"{seen.why_not}.", command))
+        items.append(Gap("Pictures", f"{seen.missing_reason}.", command))
     items.append(figures_table(evidence, surface, name))
     section = Section(f"surface-{name}", surface.title, tuple(items), page=True)
     return section, _plot(evidence, surface, seen, name)
@@ -101,7 +101,7 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
             star = "" if series.target == DISK else " *"
             rows.append(_line(evidence, surface, record, series.label + star))
             if record.outcome.cause:
-                causes.append(f"{series.label} ({policy}): {evidence.why_not(record)}")
+                causes.append(f"{series.label} ({policy}): {evidence.missing_reason(record)}")
             told = seconds_words(record)
             causes += [f"{series.label}: {told}"] if told else []
             causes += [f"{series.label} ({policy}): {note}" for note in record.outcome.notes]
@@ -116,12 +116,13 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
         f"{surface.title}: all figures",
         tuple(columns),
         tuple(rows),
-        "Seconds are the median of the rounds, ±% is half the width of its 95 % interval; "
-        "dilatation is the ratio of the largest to the smallest stretch of a triangle, its mean "
-        "and its maximum; |mu| is the modulus of the Beltrami coefficient, with its mean by the "
-        "surface's area. E_C of a disk changes under Moebius maps: 'E_C, gauge' is that of the "
-        "image whose mean by area is 0, and can be compared between methods, like area SD, the "
-        "standard deviation of log area ratios (for disks, in that gauge). Memory is the increase "
+        "Seconds are the median of the rounds, and ±% is half the width of its 95 % interval. "
+        "angle° and SD° are the mean and the standard deviation of the angle errors in degrees. K "
+        "is the dilatation: the ratio of a triangle's largest to its smallest stretch. |mu| is the "
+        "modulus of the Beltrami coefficient, averaged over the surface's area. E_C of a disk map "
+        "changes under Moebius maps of the disk. 'E_C, gauge' is E_C in the common gauge, with the "
+        "area-weighted mean at 0; compare that one between methods. area SD is the standard "
+        "deviation of log area ratios, for disk maps in the same gauge. Memory is the increase "
         "during the call.",
         tuple(dict.fromkeys(causes)),
     )
@@ -131,7 +132,7 @@ def _line(
     evidence: Evidence, surface: MeasuredSurface, record: Record, label: str
 ) -> tuple[Value, ...]:
     outcome, row, key = record.outcome, evidence.row(record), record.cell.key
-    why = evidence.why_not(record)
+    why = evidence.missing_reason(record)
 
     def value(number: float | None, text: str, lacking: str = "not measured") -> Value:
         if number is None:
@@ -173,7 +174,7 @@ def _plot(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, name: 
     """Return the plot of histograms, energies by iteration and phases, as available."""
     panels: list[PlotPanel] = []
     curves = [
-        histogram(s.label, seen.angles[s.label], evidence.looks[s.label], SHOWN, "line")
+        histogram(s.label, seen.angles[s.label], evidence.styles[s.label], SHOWN, "line")
         for s in evidence.series
         if s.label in seen.angles
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
-from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import POLICIES, Quantity, significant
 from cembench.report.document import Table
 
@@ -20,7 +20,7 @@ def table_1(evidence: Evidence) -> list[Table]:
     tables = []
     for policy in evidence.policies:
         caption = CAPTION + f"Here {POLICIES.get(policy, policy)}."
-        tables += three_kinds(
+        tables += tables_of_kind(
             evidence,
             1,
             "computational cost in seconds, and iterations of CEM",

@@ -15,7 +15,7 @@ from cembench.report.content.averages import (
 )
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
 from cembench.report.content.linear_algebra_work import work_of
-from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import (
     POLICIES,
     Number,
@@ -38,7 +38,7 @@ def table_2(evidence: Evidence) -> list[Table]:
     """Return the rates of speedup and their averages in both readings, for each policy."""
     tables: list[Table] = []
     for policy in evidence.policies:
-        tables += three_kinds(
+        tables += tables_of_kind(
             evidence,
             2,
             "rate of speedup of CEM",
@@ -143,7 +143,7 @@ def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:
     """Return an algorithm's numeric factorisations over CEM's, of the models that count."""
     series, base = evidence.series_of(algorithm), evidence.series_of(REFERENCE)
     ratios = []
-    for surface in evidence.one_each if series and base else ():
+    for surface in evidence.one_per_model if series and base else ():
         assert series is not None
         assert base is not None
         ours = work_of(evidence, surface, series, policy)
@@ -169,7 +169,7 @@ def measured_rates(
     """Return the rates of speedup of CEM over an algorithm by model, and the models."""
     rates, models = [], []
     series = evidence.series_of(algorithm)
-    for surface in evidence.one_each if series else ():
+    for surface in evidence.one_per_model if series else ():
         assert series is not None
         record = evidence.find(surface, series, policy)
         rate = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence
-from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import Quantity, metric
 from cembench.report.document import Table
 
@@ -16,7 +16,7 @@ CAPTION = (
 
 def table_3(evidence: Evidence) -> list[Table]:
     """Return the table of conformal energies, which do not depend on the policy."""
-    return three_kinds(evidence, 3, "conformal energy", _quantities, caption=CAPTION)
+    return tables_of_kind(evidence, 3, "conformal energy", _quantities, caption=CAPTION)
 
 
 def _quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence
-from cembench.report.content.paper_table import three_kinds
+from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import Quantity, metric
 from cembench.report.document import Table
 
@@ -16,7 +16,7 @@ CAPTION = (
 
 def table_4(evidence: Evidence) -> list[Table]:
     """Return the table of means and standard deviations of angular distortions."""
-    return three_kinds(
+    return tables_of_kind(
         evidence, 4, "angular distortion in degrees, mean and SD", _quantities, caption=CAPTION
     )
 

@@ -45,10 +45,10 @@ def results_table(
 ) -> RenderableType:
     """Return the results, one row per cell, grouped by surface, with a table per policy.
 
-    `environments` are the store's: seconds are marked if they are of several machines. Mean and SD
-    are of the angle errors in degrees. Seconds are the median of the rounds, followed by half the
-    width of its 95 % interval in percent, with a ! if that is wide. The causes of cells that did
-    not end ok are listed below.
+    `environments` are the store's: seconds are marked if they come from several machines. angle°
+    and SD° are the mean and the standard deviation of the angle errors in degrees. Seconds are the
+    median of the rounds, followed by half the width of its 95 % interval in percent, with a ! if
+    that is wide. The causes of cells that did not end ok are listed below.
     """
     ordered = list(records)
     marked = marks(ordered, environments)
@@ -67,7 +67,7 @@ def _cells_table(records: Sequence[Record], marked: Marks) -> Table:
     longest = max((len(_name(record)) for record in records), default=9)
     shown = metrics_shown("overview")
     columns = [
-        names("surface", max(8, min(16, 80 - 53 - longest))),
+        names("surface", max(8, min(16, 80 - 54 - longest))),
         names("algorithm"),
         *figures(*(metric.heading for metric in shown), "iter", "seconds", "±%"),
         names("status"),
@@ -340,7 +340,7 @@ def _printed(record: Record) -> str:
     energy, mean, sd = (printed.get(name + end) for end in ("", "_mean", "_sd"))
     if energy is None or mean is None or sd is None:
         return what
-    return f"{what}; printed: E_C {energy:.4f}, angles {mean:.2f} in the mean, SD {sd:.2f}"
+    return f"{what}; printed: E_C {energy:.4f}, mean angle error {mean:.2f}, SD {sd:.2f}"
 
 
 def _given(record: Record) -> str:

@@ -43,7 +43,7 @@ def many_table(records: Sequence[Record]) -> RenderableType:
     return Group(grid(columns, lines, title=title), *([Text("")] if told else []), *told)
 
 
-def machines_told(records: Sequence[Record], environments: Environments) -> list[Text]:
+def machine_lines(records: Sequence[Record], environments: Environments) -> list[Text]:
     """Say that the median seconds are of several machines, if they are."""
     marked = marks(records, environments)
     if not marked.letters:

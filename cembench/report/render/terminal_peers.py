@@ -41,7 +41,7 @@ def peers_table(records: Sequence[Record]) -> RenderableType:
 
 
 def _of_surface(records: Sequence[Record]) -> Table:
-    headings = ("E_C / A", "mean°", "isl.", "call", "wall", "start", "solve")
+    headings = ("E_C / A", "angle°", "isl.", "call", "wall", "start", "solve")
     rows: list[list[str | Text]] = []
     for target, group in groupby(records, key=lambda record: record.target):
         rows.append([Text(f"to {target}", style="dim"), *("" for _ in headings), ""])

@@ -1,4 +1,4 @@
-"""Run cells on a cluster: units go out, records come back, each into the run's folder at once.
+"""Run cells on a cluster: send units, and save their records in the run's folder at once.
 
 Where a unit goes is decided by dask's scheduler. It gets one unit for each worker that is there, so
 that a worker which is lost takes one unit with it and no other is suspected.
@@ -56,7 +56,7 @@ def run_on_cluster(
     faces: int | None = None,
     same_environment: bool = False,
 ) -> list[Record]:
-    """Measure what the store does not hold yet on a cluster; the records, in the tasks' order.
+    """Measure the cells that the store does not hold on a cluster; return records in order.
 
     As :func:`cembench.running.local.run_tasks`, whose machinery each worker has. The budget is of
     each machine, and a unit gets its share. `faces` is what registered surfaces were made with;
@@ -85,7 +85,7 @@ def run_on_cluster(
 
 @dataclass
 class _Flight:
-    """A unit that is out."""
+    """A unit that a worker has."""
 
     parcel: Parcel
     future: Future | None = None
@@ -151,7 +151,7 @@ class _ClusterRun:
         self._save_state(at_once=True)
 
     def end(self) -> None:
-        """Let go of what is out: the workers notice that nobody wants it."""
+        """Cancel the units that workers have; the workers notice it."""
         futures = [flight.future for flight in self.flying.values() if flight.future is not None]
         with suppress(Exception):  # the scheduler may be gone
             self.client.unsubscribe_topic(self.topic)
@@ -160,7 +160,7 @@ class _ClusterRun:
                 self.client.cancel(futures, force=True)
 
     def _parcels(self, pending: Sequence[Task]) -> list[Parcel]:
-        """Pack the units, the longest first: one that came last would keep the others waiting."""
+        """Pack the units, the longest first: a long last one keeps the others waiting."""
         token = run_folder.claim(self.store.folder).token or ""
         if self.options.fresh or self.options.rerun_failed:
             token += self.topic  # what an earlier run left unfinished on a machine does not count
@@ -231,7 +231,7 @@ class _ClusterRun:
             self._look()
 
     def _look(self) -> None:
-        """See which workers are there; raise where the scheduler is not."""
+        """Find the connected workers; raise if the scheduler cannot be reached."""
         self.looked = monotonic()
         if self.client.status != "running":
             raise self._gone()
@@ -250,7 +250,7 @@ class _ClusterRun:
             self.since = self.looked
         elif self.looked - self.since > _PATIENCE and not self.told_alone:
             self.told_alone = True
-            self.watcher.tells("no worker is there yet; waiting for one")
+            self.watcher.shows("no worker is there yet; waiting for one")
         self._save_state()
 
     def _gone(self) -> ClusterError:
@@ -275,8 +275,8 @@ class _ClusterRun:
             flight.doing = "waits for another worker of its machine"
         elif task is None:
             return
-        elif about["what"] == "goes_on":
-            self.watcher.goes_on(task, about["rounds"])
+        elif about["what"] == "adds_rounds":
+            self.watcher.adds_rounds(task, about["rounds"])
         else:
             step = Step(**about["step"])
             flight.doing = f"{step} of {task.cell.algorithm}"
@@ -289,14 +289,14 @@ class _ClusterRun:
             self.machines[flight.takers[-1]].at = where or flight.parcel.unit.mesh
 
     def _known(self, machine: str, environment: dict[str, Any]) -> None:
-        """Say once of a machine that its software is not ours."""
+        """Report once if the software of a machine differs from ours."""
         told = differences(self.environment, environment)
         if told and machine not in self.environments:
-            self.watcher.tells(f"{machine} has other software: {'; '.join(told)}")
+            self.watcher.shows(f"{machine} has other software: {'; '.join(told)}")
         self.environments[machine] = environment
 
     def _taken(self, flight: _Flight, worker: str, machine: str) -> None:
-        """Know who measures a unit; a unit that ended workers often enough is let go."""
+        """Record who measures a unit; give up a unit that has ended too many workers."""
         flight.takers.append(worker)
         flight.since = monotonic()
         self.machines.setdefault(worker, MachineState(machine=machine))
@@ -311,7 +311,7 @@ class _ClusterRun:
 
     def _tell_again(self, flight: _Flight, machine: str) -> None:
         unit = flight.parcel.unit
-        self.watcher.tells(
+        self.watcher.shows(
             f"{unit.mesh} ({unit.cells[0].solves}) is measured again on {machine}: the worker on "
             f"{flight.machine} was lost{f' in {flight.doing}' if flight.doing else ''}"
         )
@@ -332,7 +332,7 @@ class _ClusterRun:
                 if flight.ended >= MOST_LOST:
                     self._give_up(flight)
                 else:
-                    self.watcher.tells(f"{flight.parcel.unit.mesh} is measured again: {error}")
+                    self.watcher.shows(f"{flight.parcel.unit.mesh} is measured again: {error}")
                     flight.takers.clear()
                     self._send_again(flight)
             else:
@@ -346,7 +346,7 @@ class _ClusterRun:
         self.waiting.appendleft(flight)
 
     def _take(self, flight: _Flight, answer: Answer) -> None:
-        """Save the records of a unit, or do what its worker asks for."""
+        """Save the records of a unit, or send what its worker asks for."""
         unit = flight.parcel.unit
         state = self.machines.setdefault(answer.address, MachineState(machine=answer.machine))
         state.machine, state.at = answer.machine, ""
@@ -384,7 +384,7 @@ class _ClusterRun:
         self._save_state(at_once=True)
 
     def _seconds_left(self) -> float | None:
-        """As many times what was expected as the units took that are done."""
+        """Return the ratio of the actual to the expected seconds of the finished units."""
         if not self.expected or not self.workers:
             return None
         slower = self.taken / self.expected
@@ -407,7 +407,7 @@ class _ClusterRun:
     def _refuse(self, flight: _Flight, answer: Answer) -> None:
         self.refused.add(answer.address)
         told = f"{answer.machine} measures nothing: its software differs: {answer.refused}"
-        self.watcher.tells(told)
+        self.watcher.shows(told)
         flight.takers.clear()
         self._send_again(flight)
         if not self._usable():
@@ -417,7 +417,7 @@ class _ClusterRun:
             )
 
     def _give_up(self, flight: _Flight) -> None:
-        """Record a unit that ends whatever measures it."""
+        """Record the cells of a unit that ends every worker as failed."""
         machine = flight.machine or "a machine of the cluster"
         told = (
             f"its surface ended {MOST_LOST} workers that measured it, the last on {machine}"

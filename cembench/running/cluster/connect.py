@@ -1,4 +1,4 @@
-"""From what ``--cluster`` says to a client of dask: workers here, a scheduler, or Slurm."""
+"""Connect to the cluster that ``--cluster`` names: local workers, a scheduler, or Slurm."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
 
 @dataclass(frozen=True)
 class ClusterPlace:
-    """Where the workers are, as ``--cluster`` says it."""
+    """The location of the workers, as given by ``--cluster``."""
 
     #: "local", "address" or "slurm".
     kind: str
@@ -46,7 +46,7 @@ class ClusterPlace:
 
 
 def parse_cluster(text: str) -> ClusterPlace:
-    """Read what ``--cluster`` says.
+    """Parse the value of ``--cluster``.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def _allowed() -> str:
 
 @contextmanager
 def connected(where: ClusterPlace) -> Iterator[Client]:
-    """Give a client; workers that it started end with it.
+    """Yield a client; workers that it started end with it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""One machine of a cluster: what it keeps, and whose turn it is to time.
+"""One machine of a cluster: its stored files, and the lock for timing.
 
 Several workers may stand on one machine. Their checks run side by side; while one of them times,
 no other checks or times. A lock of the system holds that, so it ends with the process that has it,
@@ -30,7 +30,7 @@ Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 class Turn:
-    """The right to work on this machine: shared by those who check, of one alone who times.
+    """The right to work on this machine: shared by checks, exclusive for timing.
 
     Examples
     --------
@@ -45,22 +45,22 @@ class Turn:
         self._file = -1
 
     def __enter__(self) -> Self:
-        """Open the lock's file, which all users of the machine have in common."""
+        """Open the lock file, which all users of the machine share."""
         self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
         with suppress(OSError):  # another user's
             self.path.chmod(0o666)
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give the turn to others."""
+        """Release the lock."""
         os.close(self._file)
 
     def share(self) -> None:
-        """Wait until nobody times, then keep others from timing."""
+        """Wait until nobody is timing, then keep others from timing."""
         self._lock(alone=False)
 
     def alone(self, waits: Callable[[], None] = lambda: None) -> None:
-        """Wait until nobody else works, then keep others from working; calls `waits` before."""
+        """Wait until nobody else works, then keep others from working; call `waits` first."""
         if not self._lock(alone=True, at_once=True):
             waits()
             self._lock(alone=True)
@@ -96,7 +96,7 @@ def forget_units(keys: list[str]) -> None:
 
 
 def kept_surface(mesh_hash: str) -> Arrays | None:
-    """Return V and F of a surface that was sent before; None where it was not."""
+    """Return V and F of a surface that was sent before; None if it was not."""
     path = _surface_file(mesh_hash)
     if not is_there(path):
         return None
@@ -110,7 +110,7 @@ def kept_surface(mesh_hash: str) -> Arrays | None:
 
 
 def keep_surface(mesh_hash: str, arrays: Arrays) -> None:
-    """Keep a surface for the next unit with it."""
+    """Store a surface for the next unit that uses it."""
     V, F = arrays
     write(_surface_file(mesh_hash), lambda file: np.savez(file, V=V, F=F))
 
@@ -120,7 +120,7 @@ def _surface_file(mesh_hash: str) -> Path:
 
 
 def clear_old(days: float = KEPT_DAYS) -> None:
-    """Delete surfaces and units that nobody has asked for in so many days."""
+    """Delete surfaces and units that have not been used for a number of days."""
     since = time() - 86400 * days
     for old in (*place().glob("units/*"), *place().glob("surfaces/*"), *place().glob("plugins/*")):
         with suppress(OSError):

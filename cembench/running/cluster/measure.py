@@ -41,19 +41,19 @@ UNIT, RUN = "unit.json", "run"
 
 
 class Teller(Watcher):
-    """Tells the client how the cells of a unit go on, and waits for the machine before timing."""
+    """Reports the progress of a unit to the client, and waits for the machine before timing."""
 
     def __init__(self, tell: Tell, turn: Turn) -> None:
         self.tell = tell
         self.turn = turn
 
-    def timing_begins(self) -> None:
-        """Wait until no other worker of the machine is at work."""
+    def timing_starts(self) -> None:
+        """Wait until no other worker of the machine is busy."""
         self.turn.alone(lambda: self.tell({"what": "queues"}))
 
-    def goes_on(self, task: Task, rounds: int) -> None:
+    def adds_rounds(self, task: Task, rounds: int) -> None:
         """Tell."""
-        self.tell({"what": "goes_on", "cell": task.cell.label, "rounds": rounds})
+        self.tell({"what": "adds_rounds", "cell": task.cell.label, "rounds": rounds})
 
     def starts(self, task: Task, step: Step) -> None:
         """Tell."""
@@ -66,7 +66,7 @@ class Teller(Watcher):
 
 
 def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
-    """Measure a unit in a folder of its own, and go on with what is there of it.
+    """Measure a unit in its own folder, and resume it if the folder has a part of it.
 
     None where the machine has other software and must not measure, which is told.
 
@@ -91,12 +91,12 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
 
 @cache
 def _environment() -> dict[str, Any]:
-    """Return the environment, which a process asks the system for once."""
+    """Return the environment, determined once per process."""
     return describe_environment()
 
 
 def surface_of(unit: Unit) -> TriangleMesh:
-    """Return a unit's surface, which this machine was given."""
+    """Return the surface of a unit, which was sent to this machine."""
     arrays = kept_surface(unit.mesh_hash)
     kind = MESH_TYPES[unit.mesh_type]
     mesh = arrays and kind.trusted(*arrays, unit.mesh, unit.notices)
@@ -129,7 +129,7 @@ def _options(unit: Unit) -> Options:
 
 
 def main() -> None:
-    """Measure units as they are asked for, until nobody can ask any more."""
+    """Measure requested units until standard input ends."""
     # What an algorithm prints, or reads, is not what passes between the worker and this process.
     asked = os.fdopen(os.dup(0))
     told = os.fdopen(os.dup(1), "w", buffering=1)

@@ -1,4 +1,4 @@
-"""How far a run on a cluster is, in its folder: what `cembench status` shows of the machines."""
+"""The progress of a run on a cluster, stored in its folder for `cembench status`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class MachineState(BaseModel):
-    """A worker, and what it measures."""
+    """A worker and the unit that it measures."""
 
     machine: Printable
     units: Count = 0
@@ -27,7 +27,7 @@ class MachineState(BaseModel):
 
 
 class ClusterState(BaseModel):
-    """Units are surfaces under one policy."""
+    """The progress; a unit is a surface under one policy."""
 
     units: Count
     done: Count = 0
@@ -38,12 +38,12 @@ class ClusterState(BaseModel):
 
 
 def save_state(folder: Path, state: ClusterState) -> None:
-    """Write down how far a run is."""
+    """Save the progress of a run."""
     state.written_at = datetime.now(UTC).isoformat(timespec="seconds")
     write_model(folder / MACHINES, state)
 
 
 def read_state(folder: Path) -> ClusterState | None:
-    """Return how far a run was when that was last written; None for one that had no cluster."""
+    """Return the last saved progress of a run; None for a run without a cluster."""
     path = folder / MACHINES
     return read_json(path, TypeAdapter(ClusterState), "a state") if is_there(path) else None

@@ -1,4 +1,4 @@
-"""What travels to a machine: one surface under one policy, with all its algorithms and rounds.
+"""Units of work for a machine: one surface under one policy, with its algorithms and rounds.
 
 So every ratio is formed of seconds from one machine and one sitting.
 """
@@ -60,13 +60,13 @@ class Unit(BaseModel):
         return self.cells[0].mesh_hash
 
     def run_options(self) -> Options:
-        """The options of the run, as the worker goes about its cells."""
+        """The options of the run."""
         return TypeAdapter(Options).validate_python(self.options)
 
 
 @dataclass(frozen=True)
 class Parcel:
-    """A unit with the tasks that it was made of, and what it is expected to take."""
+    """A unit with its tasks and its expected seconds."""
 
     unit: Unit
     tasks: tuple[Task, ...]
@@ -114,7 +114,7 @@ def parcel(
 
 
 def _plugins(tasks: Sequence[Task]) -> tuple[tuple[str, ...], PluginFiles]:
-    """Return the plug-ins that these tasks need, and the files that those are made of.
+    """Return the plug-ins that these tasks need, and the files of those.
 
     A module, or a program's command line, has to be on the workers: only its name travels.
     """
@@ -139,7 +139,7 @@ def _declares(plugin: Path, task: Task) -> bool:
 
 
 def makespan(seconds: Sequence[float], machines: int) -> float:
-    """Seconds until all units are done on so many machines, the longest being taken first.
+    """Return the seconds that `machines` machines take for all units, the longest first.
 
     >>> makespan([3.0, 2.0, 2.0], 2)
     4.0

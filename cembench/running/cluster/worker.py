@@ -1,4 +1,4 @@
-"""What a dask worker does: it has a unit measured by a process of its own, and returns records."""
+"""A dask worker: it measures a unit in a separate process and returns the records."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _one_unit = threading.Lock()
 
 @dataclass(frozen=True)
 class Answer:
-    """What comes of a unit: its records; or why this machine does not measure it."""
+    """The records of a unit, or the reason why this machine does not measure it."""
 
     machine: str
     address: str
@@ -57,7 +57,7 @@ class Answer:
 
 
 def dask_setup(worker: Any) -> None:
-    """Leave Ctrl-C to the client; dask calls this in each worker that was started here."""
+    """Leave Ctrl-C to the client; dask calls this in each local worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
@@ -101,7 +101,7 @@ def measure_unit(
 
 
 async def forget(keys: list[str]) -> None:
-    """Delete what is kept of units whose records the client has; dask waits for nothing."""
+    """Delete the files of units whose records the client has; the result is not awaited."""
     host.forget_units(keys)
 
 
@@ -111,7 +111,7 @@ def _asked(store: Store, unit: Unit) -> list[Record]:
 
 
 def _has_surface(unit: Unit, sent: host.Arrays | None) -> bool:
-    """Have the surface here: kept from before, or sent, or generated."""
+    """Make the surface available: stored before, sent, or generated."""
     if host.kept_surface(unit.mesh_hash) is not None:
         return True
     arrays = sent or _generated(unit)
@@ -134,7 +134,7 @@ def _generated(unit: Unit) -> host.Arrays | None:
 
 
 def _placed(named: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
-    """Write the files of plug-ins, once for each content; return the plug-ins' names here."""
+    """Write the files of plug-ins, once per content; return the names of the plug-ins here."""
     here = []
     for plugin in named:
         if plugin not in files:
@@ -153,7 +153,7 @@ def _placed(named: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
 
 
 class Measurer:
-    """The process that measures, started once a worker, and again after it has ended."""
+    """The measuring process, started once per worker, and again after it has ended."""
 
     def __init__(self) -> None:
         self.process = subprocess.Popen(
@@ -175,7 +175,7 @@ class Measurer:
     def measure(
         self, key: str, tell: Callable[[Mapping[str, Any]], None], is_wanted: Callable[[], bool]
     ) -> str:
-        """Measure a unit; returns why it is refused, or nothing. It ends if nobody wants it."""
+        """Measure a unit; return why it is refused, or nothing. Ends if the unit is cancelled."""
         assert self.process.stdin is not None
         self.process.stdin.write(key + "\n")
         self.process.stdin.flush()
@@ -200,20 +200,20 @@ class Measurer:
             tell(event)
 
     def close(self) -> None:
-        """End it, with all that it started."""
+        """End the process and everything it started."""
         self.process.kill()
         self.process.wait()
 
 
 class MeasurerGoneError(Exception):
-    """The process that measures ended without an answer."""
+    """The measuring process ended without an answer."""
 
 
 _measurers: list[Measurer] = []
 
 
 def _measurer() -> Measurer:
-    """Return the process that measures; a new one where there is none, or none any more."""
+    """Return the measuring process; start one if there is none."""
     if _measurers and _measurers[0].process.poll() is None:
         return _measurers[0]
     _measurers[:] = [Measurer()]
@@ -221,7 +221,7 @@ def _measurer() -> Measurer:
 
 
 def _environment() -> dict[str, str]:
-    """Return this process's environment without what dask set for its own workers' memory."""
+    """Return the environment of this process without the memory settings of dask."""
     theirs = dask.config.get("distributed.nanny.pre-spawn-environ", {})
     found = dict(os.environ)
     for name, value in theirs.items():

@@ -128,8 +128,8 @@ class ProgramCalls:
         program = self.algorithm.program
         if start is None:
             told.append(
-                "it failed on a small mesh, so its start-up time is unknown and is part of its "
-                "wall-clock time"
+                "it failed on a small mesh, so its start-up time is unknown and stays part of "
+                "its wall-clock time"
             )
         if program is not None and program.seconds and self.own[-1] is None:
             told.append(f"it printed no solve time that matches {program.seconds!r}")

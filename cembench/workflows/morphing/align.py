@@ -51,8 +51,8 @@ def without_new_folds(mesh: DiskMesh, z: Complex) -> Complex:
     z, _ = interior_without_folds(mesh, z)
     if folds := len(folded_triangles(z, mesh.F)):
         raise AlgorithmFailed(
-            f"a Moebius map of the disk folds {folds} triangle(s), and they cannot be laid flat "
-            "with the boundary held: the mesh is too coarse there"
+            f"a Moebius map of the disk folds {folds} triangle(s), and they cannot be unfolded "
+            "with the boundary fixed: the mesh is too coarse there"
         )
     return z
 

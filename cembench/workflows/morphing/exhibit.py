@@ -22,7 +22,7 @@ from cembench.workflows.morphing.pages import registration_page, strip_page
 IN_THE_FIGURES = ("Liu's Wry Face", "Liu's Neutral Face", "Liu's Smile Face")
 
 
-def lay_down(
+def write_morph_exhibits(
     run: Path,
     morph: Morph,
     figures: dict[str, Any],
@@ -94,8 +94,8 @@ def registration_table(figures: dict[str, Any]) -> ExhibitTable:
         "surface": "surface",
         "landmark_error_share": "landmark error / size",
         "dirichlet_energy": "E_D",
-        "dilatation_mean": "dilatation, mean",
-        "dilatation_max": "dilatation, max",
+        "dilatation_mean": "mean dilatation",
+        "dilatation_max": "maximum dilatation",
         "flipped_triangles": "folds",
         "distance_mean_edges": "mean distance / edge",
         "hausdorff_edges": "Hausdorff / edge",

@@ -70,8 +70,8 @@ def read_landmarks(
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise ParameterError(
-            f"landmarks {path} cannot be read: {error}. It must be a CSV file, a row a landmark: "
-            "name, vertex on the first surface, vertex on the second, ..."
+            f"landmarks {path} cannot be read: {error}. It must be a CSV file with one row per "
+            "landmark: name, vertex on the first surface, vertex on the second, ..."
         ) from None
     names: list[str] = []
     rows: list[list[int]] = []
@@ -84,8 +84,8 @@ def read_landmarks(
         where = f"landmarks {path}, line {number} ({cells[0]!r})"
         if len(cells) != len(meshes) + 1:
             raise ParameterError(
-                f"{where}: {len(cells) - 1} vertices for {len(meshes)} surfaces; a row is a name "
-                "and one vertex for each surface, so that all have the same number of landmarks."
+                f"{where}: {len(cells) - 1} vertices for {len(meshes)} surfaces; each row needs "
+                "a name and one vertex for each surface."
             )
         names.append(cells[0])
         rows.append(
@@ -93,7 +93,7 @@ def read_landmarks(
         )
     if not names:
         raise ParameterError(
-            f"landmarks {path}: the file has no rows; write at least one, or leave out --landmarks."
+            f"landmarks {path}: the file has no rows; add at least one, or leave out --landmarks."
         )
     found = Landmarks(tuple(names), np.array(rows, dtype=np.int64))
     check_landmarks(found, meshes)
@@ -185,7 +185,7 @@ def check_order(
         contrary = "clockwise" if sines[0][j, k] > 0 else "counter-clockwise"
         raise ParameterError(
             f"contradictory order of landmarks: from {names[j]!r} to {names[k]!r} it goes {way} "
-            f"about {names[0]!r} on {surfaces[0]}, but {contrary} on {surfaces[1]}. No map without "
-            "folds keeps the boundary and does that: exchange the two if they were mixed up (left "
-            "and right?), or turn over a surface that is a mirror image."
+            f"about {names[0]!r} on {surfaces[0]}, but {contrary} on {surfaces[1]}. No map "
+            "without folds can do that with the boundary fixed: swap the two if they were mixed "
+            "up (left and right?), or reverse the orientation of a surface that is a mirror image."
         )

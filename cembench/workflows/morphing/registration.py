@@ -1,7 +1,7 @@
 """Registration: a map to the disk with small Dirichlet energy that meets landmarks (34).
 
-E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, the boundary held on the circle. The
-minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
+E_R(f) = E_D(f) + lambda sum_j |f(landmark_j) - target_j|^2, with the boundary fixed on the
+circle. The minimiser solves one sparse symmetric positive definite system, L_ii + 2 lambda D.
 
 A single point has no capacity in the plane: a vertex pulled alone leaves its surroundings as a
 spike, and triangles fold. So a landmark here is a small disk around its vertex that moves with it:
@@ -124,10 +124,10 @@ def register(
             break
     raise AlgorithmFailed(
         f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a "
-        f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and going on "
-        "would fold triangles. Use fewer landmarks, look for one that is misplaced, name the "
-        "surface first on which they spread wider in the disk (a face before a whole head), or "
-        "take a smaller --lambda so that they need not meet."
+        f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and a further "
+        "step would fold triangles. Use fewer landmarks, check for a misplaced one, put the "
+        "surface first on which they are more spread out in the disk (a face before a whole "
+        "head), or take a smaller --lambda so that they need not coincide."
     )
 
 

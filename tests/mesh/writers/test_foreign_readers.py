@@ -145,7 +145,7 @@ def test_glb_holds_several_surfaces_and_one_texture(surface, tmp_path):
 
 @pytest.mark.parametrize("name", ["a.glb", "a.stl"])
 def test_what_single_precision_cannot_hold_is_refused(name, surface, tmp_path):
-    with pytest.raises(MeshError, match=r"do not fit into .* up to 3\.4e\+38"):
+    with pytest.raises(MeshError, match=r"are too large for .* up to 3\.4e\+38"):
         write_textured(tmp_path / name, Textured(surface.V * 1e40, surface.F))
     assert not list(tmp_path.iterdir())
 

@@ -33,7 +33,7 @@ class Listener(Watcher):
     def begins(self, processes):
         self.expected += processes
 
-    def tells(self, words):
+    def shows(self, words):
         self.told.append(words)
 
     def ends(self, task, step, seconds):

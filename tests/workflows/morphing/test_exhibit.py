@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from cembench.results.exhibits import read_exhibits
-from cembench.workflows.morphing.exhibit import IN_THE_FIGURES, lay_down
+from cembench.workflows.morphing.exhibit import IN_THE_FIGURES, write_morph_exhibits
 from cembench.workflows.morphing.morph import morph
 from tests.workflows.morphing.reliefs import three
 
@@ -18,7 +18,9 @@ def run(found, tmp_path):
     """What is laid down for a morph, drawn small."""
 
     def lay(rows):
-        lay_down(tmp_path, found, found.metrics(24), "cembench morph", rows, sides=(48, 64))
+        write_morph_exhibits(
+            tmp_path, found, found.metrics(24), "cembench morph", rows, sides=(48, 64)
+        )
         return tmp_path, read_exhibits(tmp_path)
 
     return lay

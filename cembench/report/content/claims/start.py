@@ -108,7 +108,7 @@ def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
         "Theorem 1",
         "The last, the first and the middle vertex, one of the pole's and one of the boundary give "
         f"the same map up to a constant, within {SAME:g} of its size.",
-        f"so on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
+        f"true on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
         if off
         else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
         verdict_of(held, len(off)),
@@ -151,7 +151,7 @@ def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
     """Test the claim that the distortion of map (12) is large near p and small at the boundary."""
     ratios: dict[MeasuredSurface, tuple[float, float]] = {}
     for surface, mesh in _disks(evidence):
-        ratios[surface] = near_and_at_boundary(mesh)
+        ratios[surface] = distortion_near_pole_and_boundary(mesh)
     held = sum(near > rim for near, rim in ratios.values())
     listed = "; ".join(
         f"{s.title}: {near:.1f} near p, {rim:.2f} at the boundary"
@@ -173,7 +173,7 @@ def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
     )
 
 
-def near_and_at_boundary(mesh: TriangleMesh) -> tuple[float, float]:
+def distortion_near_pole_and_boundary(mesh: TriangleMesh) -> tuple[float, float]:
     """Return the mean angular distortion of map (12) in degrees, near p and at the boundary."""
     L, rhs, corners = start_system(mesh)
     f = pinned(Solved(), L, rhs, mesh.n - 1)

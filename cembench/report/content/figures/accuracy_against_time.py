@@ -43,7 +43,7 @@ def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
     if not any(clouds.values()):
         return None
     drawn = [
-        through(s.label, clouds[s.label], "points", evidence.looks[s.label])
+        through(s.label, clouds[s.label], "points", evidence.styles[s.label])
         for s in evidence.disk_series
         if clouds[s.label]
     ]
@@ -52,7 +52,7 @@ def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
     return PlotPanel(
         Axis("time, times the fastest", log=True),
         Axis("mean angular distortion, times the smallest", log=True),
-        (*drawn, through("not beaten in the mean", front, "both")),
+        (*drawn, through("not beaten on average", front, "both")),
         f"solves: {policy}",
     )
 

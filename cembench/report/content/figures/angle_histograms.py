@@ -10,7 +10,7 @@ from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.figures.energy_by_iteration import model_gap
 from cembench.report.content.inspection import BIN, LAST, Angles, Inspection
 from cembench.report.document import Gap
-from cembench.report.palette import SeriesStyle, looks
+from cembench.report.palette import SeriesStyle, series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
 #: The models of the paper's figure, in its order.
@@ -26,13 +26,13 @@ def angle_histograms(
     series = evidence.series_of(REFERENCE)
     panels, gaps = [], []
     for model in MODELS:
-        surface = evidence.standing_for(model)
+        surface = evidence.surface_for_model(model)
         seen = inspections[surface.mesh_hash] if surface else None
         angles = seen.angles.get(series.label) if seen and series else None
         if angles and surface:
             panels.append(_panel(f"{model} ({surface.origin})", angles))
         elif seen and not seen.kept:
-            gaps.append(Gap(f"Figure 9: {model}", seen.why_not))
+            gaps.append(Gap(f"Figure 9: {model}", seen.missing_reason))
         else:
             gaps.append(model_gap(evidence, model, "Figure 9"))
     if not panels:
@@ -50,7 +50,7 @@ def angle_histograms(
 
 
 def _panel(title: str, angles: Angles) -> PlotPanel:
-    bars = histogram("CEM", angles, looks([REFERENCE])[REFERENCE], SHOWN)
+    bars = histogram("CEM", angles, series_styles([REFERENCE])[REFERENCE], SHOWN)
     heading = f"{title}: {angles.below_one:.1%} below 1°"
     return PlotPanel(
         Axis("angular distortion (degrees)", low=0, high=SHOWN),

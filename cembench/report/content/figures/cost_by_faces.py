@@ -9,7 +9,7 @@ import numpy as np
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Column, Table, Value, count, missing, words
-from cembench.report.palette import SeriesStyle, looks
+from cembench.report.palette import SeriesStyle, series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, through
 from cembench.results import paper
 
@@ -64,11 +64,11 @@ def cost_by_faces(evidence: Evidence) -> Plot:
     panels = []
     for policy in evidence.policies:
         groups = [
-            (s.label, evidence.looks[s.label], measured_points(evidence, s.label, policy))
+            (s.label, evidence.styles[s.label], measured_points(evidence, s.label, policy))
             for s in evidence.disk_series
         ]
         panels.append(_panel(groups, f"measured here, solves: {policy}"))
-    usual = looks(paper.ALGORITHMS)
+    usual = series_styles(paper.ALGORITHMS)
     groups = [(a.upper(), usual[a], printed_points(a)) for a in paper.ALGORITHMS]
     panels.append(_panel(groups, "printed in the paper (Table 1)"))
     return Plot(

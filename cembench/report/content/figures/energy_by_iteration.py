@@ -16,7 +16,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
     panels = []
     gaps = []
     for model in MODELS:
-        surface = evidence.standing_for(model)
+        surface = evidence.surface_for_model(model)
         panel = surface and history_panel(evidence, surface, f"{model} ({surface.origin})")
         if panel:
             panels.append(panel)
@@ -54,7 +54,7 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
         ):
             continue
         history = record.outcome.energy_history
-        look = evidence.looks[series.label]
+        look = evidence.styles[series.label]
         shown.append(PlotSeries(series.label, list(range(len(history))), history, "both", look))
         if is_cem and series.main:
             shown.insert(0, shown.pop())
@@ -66,10 +66,14 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
 
 def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
     """Return the gap for a model without a map by CEM in the run."""
-    surface = evidence.standing_for(model)
+    surface = evidence.surface_for_model(model)
     series = evidence.series_of(REFERENCE)
     record = evidence.find(surface, series) if surface and series else None
-    why = evidence.why_not(record) if surface else "no surface of this run is or stands in for it"
+    why = (
+        evidence.missing_reason(record)
+        if surface
+        else "no surface of this run is or stands in for it"
+    )
     return Gap(
         f"{figure}: {model}",
         f"no map of {model} by CEM: {why}.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.palette import looks
+from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 from cembench.results import paper
 
@@ -48,7 +48,7 @@ def _pair(
     evidence: Evidence, metric: str, axis: Axis, table: int, column: Callable[[str], str]
 ) -> tuple[PlotPanel, PlotPanel]:
     """Return the measured and the printed panel for the same models."""
-    style = looks(paper.ALGORITHMS)
+    style = series_styles(paper.ALGORITHMS)
     measured, printed = [], []
     for algorithm in paper.ALGORITHMS:
         series = evidence.series_of(algorithm)

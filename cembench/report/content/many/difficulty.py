@@ -124,7 +124,7 @@ def errors_by_difficulty(
                 error = figure(evidence, surface, one, policy, ANGLE)
                 if error is not None and 0 < error < inf:
                     points.append(Point(place(surface), error, surface.title))
-            clouds.append(through(one.label, points, "points", evidence.looks[one.label]))
+            clouds.append(through(one.label, points, "points", evidence.styles[one.label]))
         panels.append(PlotPanel(axis, Axis("mean angle error (degrees)", log=True), tuple(clouds)))
     others = ", ".join(s.label for s in series[DRAWN:])
     left = f" Not drawn: {others}." if others else ""

@@ -82,7 +82,7 @@ def hardest_table(evidence: Evidence, policy: str, surfaces: tuple[MeasuredSurfa
             if record is None:
                 cells.append(missing("not tried"))
             elif error is None or error == inf:
-                cells.append(Value(record.outcome.status, why=evidence.why_not(record)))
+                cells.append(Value(record.outcome.status, why=evidence.missing_reason(record)))
             else:
                 cells.append(Value(f"{error:.2f}", error, surface.origin, record.cell.key))
         rows.append(
