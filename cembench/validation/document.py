@@ -18,6 +18,7 @@ from cembench.report.document import (
     missing,
     words,
 )
+from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.record_rows import row
 from cembench.results.records import Record
