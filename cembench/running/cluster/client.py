@@ -12,7 +12,7 @@ import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from queue import Empty, SimpleQueue
 from time import monotonic
@@ -170,7 +170,7 @@ class _ClusterRun:
         share = self.options.budget
         if share is not None:
             share *= max(1, len(self.workers)) / len(groups)
-        options = Options(**{**vars(self.options), "budget": share})
+        options = replace(self.options, budget=share)
         found = []
         for group in groups:
             seconds = sum(estimate(t.cell, t.facts.faces, known).seconds for t in group)
@@ -178,7 +178,9 @@ class _ClusterRun:
         return sorted(found, key=lambda one: -one.seconds)
 
     def _hear(self, event: tuple[Any, Mapping[str, Any]]) -> None:
-        self.events.put(("event", event[1]))
+        about = event[1]
+        for one in about["events"]:
+            self.events.put(("event", {**one, "unit": about["unit"], "machine": about["machine"]}))
 
     def _send(self) -> None:
         """Send a unit to each worker that has none."""
@@ -267,7 +269,7 @@ class _ClusterRun:
         if about["what"] == "takes":
             self._taken(flight, about["worker"], about["machine"])
             return
-        task = {t.cell.label: t for t in flight.parcel.tasks}.get(about.get("cell", ""))
+        task = flight.parcel.by_label.get(about.get("cell", ""))
         if about["what"] == "began":
             self._known(about["machine"], json.loads(about["environment"]))
         elif about["what"] == "queues":

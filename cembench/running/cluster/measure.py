@@ -23,9 +23,9 @@ import psutil
 from cembench.core.atomic import read_model
 from cembench.core.errors import ClusterError
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import load_algorithm
+from cembench.registry import Algorithm, load_algorithm
 from cembench.results.machines import differences
-from cembench.results.records import Cell, Record
+from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster.host import Turn, kept_surface, unit_folder
 from cembench.running.cluster.units import Unit
@@ -76,23 +76,18 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
         The machine has other code than the client, or not the surface.
 
     """
-    environment = _environment()
+    environment = describe_environment()
     told = differences(unit.software, environment) if unit.software else []
     if told:
         tell({"what": "refused", "why": "; ".join(told)})
         return None
     mesh = surface_of(unit)
-    tasks = [task_of(unit, cell, mesh) for cell in unit.cells]
+    tasks = tasks_of(unit, mesh)
     tell({"what": "began", "environment": json.dumps(environment)})
     with Turn() as turn:
         turn.share()
-        return run_tasks(tasks, Store(folder), _options(unit), Teller(tell, turn))
-
-
-@cache
-def _environment() -> dict[str, Any]:
-    """Return the environment, which a process asks the system for once."""
-    return describe_environment()
+        teller = Teller(tell, turn)
+        return run_tasks(tasks, Store(folder), _options(unit), teller, environment=environment)
 
 
 def surface_of(unit: Unit) -> TriangleMesh:
@@ -107,17 +102,36 @@ def surface_of(unit: Unit) -> TriangleMesh:
     return mesh
 
 
-def task_of(unit: Unit, cell: Cell, mesh: TriangleMesh) -> Task:
-    """Return a cell's task on this machine, whose algorithm is the client's."""
-    algorithm = load_algorithm(cell.algorithm, unit.plugins)
-    sources = sources_of(algorithm)
-    if hash_of(sources) != cell.code_hash:
-        raise ClusterError(
-            f"{cell.algorithm} is other code on {machine_name()} than here: "
-            f"{', '.join(sources)} differ. Install the same version of cembench and of plug-ins "
-            "on all machines."
-        )
-    return Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources)
+def tasks_of(unit: Unit, mesh: TriangleMesh) -> list[Task]:
+    """Return a unit's tasks on this machine, whose algorithms are the client's.
+
+    The files of a plug-in are read once a unit, however many algorithms it declares.
+    """
+    read: dict[tuple[Path | None, str], Mapping[str, str]] = {}
+    tasks = []
+    for cell in unit.cells:
+        algorithm = _algorithm(cell.algorithm, unit.plugins)
+        declared = (algorithm.file, algorithm.module)
+        if algorithm.program is not None:  # whose files are its own
+            sources: Mapping[str, str] = sources_of(algorithm)
+        elif declared in read:
+            sources = read[declared]
+        else:
+            sources = read[declared] = sources_of(algorithm)
+        if hash_of(sources) != cell.code_hash:
+            raise ClusterError(
+                f"{cell.algorithm} is other code on {machine_name()} than here: "
+                f"{', '.join(sources)} differ. Install the same version of cembench and of "
+                "plug-ins on all machines."
+            )
+        tasks.append(Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources))
+    return tasks
+
+
+@cache
+def _algorithm(name: str, plugins: tuple[str, ...]) -> Algorithm:
+    """Return an algorithm, which a process looks up once: plug-ins lie in folders by content."""
+    return load_algorithm(name, plugins)
 
 
 def _options(unit: Unit) -> Options:

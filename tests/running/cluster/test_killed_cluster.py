@@ -27,7 +27,7 @@ class Cluster:
     def __init__(self, folder, cache):
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
-            port = free.getsockname()[1]
+            self.port = port = free.getsockname()[1]
         address = f"tcp://127.0.0.1:{port}"
         dask = (sys.executable, "-m", "dask")
         worker = (*dask, "worker", address, "--nthreads", "1", "--no-dashboard", "--memory-limit")
@@ -125,11 +125,12 @@ def test_a_killed_client_leaves_nothing_behind_and_the_same_command_goes_on(tmp_
             time.sleep(0.01)
         started = psutil.Process(cluster.running["client"].pid).children(recursive=True)
         cluster.running["client"].kill()
-        cluster.running["client"].communicate()
+        cluster.running["client"].wait()
         kept = cluster.records()
         psutil.wait_procs(started)  # for ever, should one not end
         cluster.start("client")
-        rows = json.loads(cluster.running["client"].communicate()[0])
+        cluster.running["client"].wait()
+        rows = json.loads(cluster.said("client", "out").read_text())
     finally:
         cluster.end()
     assert [row["status"] for row in rows] == ["ok", "invalid"] * 2

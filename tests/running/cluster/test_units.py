@@ -238,3 +238,11 @@ def test_how_far_a_run_is_can_be_read_again(tmp_path):
     state = ClusterState(units=3, done=1, machines=[MachineState(machine="a", units=1, at="foot")])
     save_state(tmp_path, state)
     assert read_state(tmp_path) == state
+
+
+def test_what_is_kept_of_a_unit_counts_under_another_share_of_the_budget():
+    one = parcel(tasks_of("good"), NO_TOKEN, Options(budget=5.0)).unit
+    other = parcel(tasks_of("good"), NO_TOKEN, Options(budget=7.0)).unit
+    assert one.options != other.options
+    assert one.key == other.key
+    assert parcel(tasks_of("nan"), NO_TOKEN, Options(budget=5.0)).unit.key != one.key
