@@ -165,7 +165,9 @@ class _ClusterRun:
         if self.options.fresh or self.options.rerun_failed:
             token += self.topic  # what an earlier run left unfinished on a machine does not count
         groups = grouped(pending)
-        known = self.store.finished()
+        known: dict[str, list[Record]] = {}
+        for record in self.store.finished():
+            known.setdefault(record.cell.algorithm, []).append(record)
         software = software_of(self.environment) if self.same_environment else {}
         share = self.options.budget
         if share is not None:
@@ -173,7 +175,10 @@ class _ClusterRun:
         options = replace(self.options, budget=share)
         found = []
         for group in groups:
-            seconds = sum(estimate(t.cell, t.facts.faces, known).seconds for t in group)
+            seconds = sum(
+                estimate(t.cell, t.facts.faces, known.get(t.cell.algorithm, ())).seconds
+                for t in group
+            )
             found.append(parcel(group, token, options, self.faces, software, seconds))
         return sorted(found, key=lambda one: -one.seconds)
 

@@ -159,3 +159,22 @@ def makespan(seconds: Sequence[float], machines: int) -> float:
     for one in sorted(seconds, reverse=True):
         heapq.heappush(free, heapq.heappop(free) + one)
     return max(free)
+
+
+def most_useful(seconds: Sequence[float]) -> int:
+    """Return how many machines are of use at most: with them, the longest unit takes as long.
+
+    One per cent is no matter.
+
+    >>> most_useful([3.0, 2.0, 1.0])
+    2
+    """
+    enough, longest = len(seconds), max(seconds, default=0.0)
+    fewest = 1
+    while fewest < enough:
+        tried = (fewest + enough) // 2
+        if makespan(seconds, tried) > 1.01 * longest:
+            fewest = tried + 1
+        else:
+            enough = tried
+    return enough

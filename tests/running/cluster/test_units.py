@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from cembench.commands.cluster import hours
+from cembench.commands.cluster import hours, show_hours
 from cembench.core.errors import ClusterError, ParameterError
 from cembench.registry import load_registry
 from cembench.results.machines import differences, software_of
@@ -94,9 +94,21 @@ def test_hours_name_what_limits_them():
     cost = Estimate(1.0, 100.0, 1e6, "recorded", 100.0)
     found = hours(tasks, [cost, cost, replace(cost, seconds=700.0), cost], None)
     assert found["seconds"] == {1: 1000.0, 10: 800.0, 100: 800.0}
-    assert (found["longest"], found["units"]) == ("two", 2)
+    assert (found["longest"], found["units"], found["useful"]) == ("two", 2, 2)
     held = hours(tasks, [None, None, cost, cost], None)
     assert (held["units"], held["seconds"][10]) == (1, 200.0)
+
+
+def test_hours_are_told_in_eighty_columns_with_what_limits_them(capsys):
+    cost = Estimate(1.0, 100.0, 1e6, "recorded", 100.0)
+    costs = [cost, cost, replace(cost, seconds=700.0), cost]
+    show_hours(hours(two_surfaces("reuse"), costs, None))
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    assert "10 machines  about 13 min, as long as two takes" in told
+    assert "2 of them, the longest about 13 min: more than 2 machines gain nothing" in told
+    show_hours(hours([], [], None))
+    assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize(
