@@ -21,7 +21,7 @@ from typing import Any
 import psutil
 
 from cembench.core.atomic import read_model
-from cembench.core.errors import ClusterError
+from cembench.core.errors import CembenchError, ClusterError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, load_algorithm
 from cembench.results.machines import differences
@@ -29,7 +29,7 @@ from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster.host import Turn, kept_surface, unit_folder
 from cembench.running.cluster.units import Unit
-from cembench.running.environment import describe_environment, machine_name
+from cembench.running.environment import describe_environment, machine_name, usable_cores
 from cembench.running.local import Options, Step, Watcher, run_tasks
 from cembench.running.plan import Task
 from cembench.running.sources import hash_of, sources_of
@@ -138,7 +138,7 @@ def _options(unit: Unit) -> Options:
     """Return the options of a run, with this machine's memory and cores as their bounds."""
     options = unit.run_options()
     free = int(0.9 * psutil.virtual_memory().available)
-    jobs = min(options.jobs, psutil.cpu_count() or 1)
+    jobs = min(options.jobs, usable_cores())
     return replace(options, memory_bytes=options.memory_bytes or free, jobs=jobs)
 
 
@@ -162,7 +162,7 @@ def main() -> None:
             if measure(read_model(folder / UNIT, Unit), folder / RUN, tell) is not None:
                 tell({"what": "done"})
         except Exception as error:
-            known = isinstance(error, ClusterError)
+            known = isinstance(error, CembenchError)
             tell({"what": "failed", "why": str(error) if known else traceback.format_exc()})
 
 

@@ -24,7 +24,7 @@ from distributed import get_worker
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write_bytes, write_text
-from cembench.core.errors import ClusterError
+from cembench.core.errors import CembenchError, ClusterError
 from cembench.core.loading import is_there, read_bytes
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
@@ -139,7 +139,10 @@ def _generated(unit: Unit) -> host.Arrays | None:
     family = registry.surfaces.get(unit.mesh)
     if family is None or family.kept is not None:
         return None
-    made: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
+    try:
+        made: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
+    except CembenchError:  # its data, or a library, are not on this machine
+        return None
     return (made.V, made.F) if made.hash == unit.mesh_hash else None
 
 

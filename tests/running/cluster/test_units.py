@@ -2,6 +2,7 @@
 
 import json
 import sys
+import tempfile
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -258,3 +259,21 @@ def test_what_is_kept_of_a_unit_counts_under_another_share_of_the_budget():
     assert one.options != other.options
     assert one.key == other.key
     assert parcel(tasks_of("nan"), NO_TOKEN, Options(budget=5.0)).unit.key != one.key
+
+
+def test_whose_turn_it_is_hangs_on_one_file_of_the_machine(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    assert host.Turn().path == Path("/tmp/cembench-machine.lock")
+    path = tmp_path / "lock"
+    path.write_bytes(b"")
+    path.chmod(0o444)  # another user's: reading is enough to lock it
+    with host.Turn(path) as one:
+        one.alone()
+        with host.Turn(path) as other:
+            assert not other._lock(alone=True, at_once=True)
+    with (
+        pytest.raises(ClusterError, match="by which the workers of a machine take turns"),
+        host.Turn(tmp_path / "none" / "lock"),
+    ):
+        pass
