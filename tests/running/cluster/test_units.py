@@ -16,7 +16,7 @@ from cembench.registry import load_registry
 from cembench.results.machines import differences, software_of
 from cembench.results.store import Store
 from cembench.running.cluster import host
-from cembench.running.cluster.connect import parse_cluster
+from cembench.running.cluster.connect import parse_cluster, quiet_variables
 from cembench.running.cluster.measure import measure
 from cembench.running.cluster.state import ClusterState, MachineState, read_state, save_state
 from cembench.running.cluster.units import Unit, grouped, makespan, parcel
@@ -277,3 +277,9 @@ def test_whose_turn_it_is_hangs_on_one_file_of_the_machine(tmp_path, monkeypatch
         host.Turn(tmp_path / "none" / "lock"),
     ):
         pass
+
+
+def test_the_page_names_how_dask_is_kept_quiet():
+    page = (Path(__file__).parents[3] / "docs" / "cluster.md").read_text()
+    for name, value in quiet_variables().items():
+        assert page.count(f"{name}={value}") == 2
