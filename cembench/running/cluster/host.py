@@ -102,13 +102,14 @@ def _opened(path: Path) -> int:
 
     Some systems refuse to open another user's file in a common folder in a way that would make it.
     """
-    while True:
-        with suppress(FileNotFoundError):
-            return os.open(path, os.O_RDONLY)
-        with suppress(FileExistsError):
-            file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
-            os.fchmod(file, 0o644)  # whatever the user's umask is
-            return file
+    with suppress(FileNotFoundError):
+        return os.open(path, os.O_RDONLY)
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+    except FileExistsError:  # made by another worker just now
+        return os.open(path, os.O_RDONLY)
+    path.chmod(0o644)  # whatever the user's umask is
+    return file
 
 
 def place() -> Path:

@@ -188,8 +188,11 @@ class Measurer:
     def measure(self, key: str, tell: Tell, is_wanted: Callable[[], bool]) -> str:
         """Measure a unit; returns why it is refused, or nothing. It ends if nobody wants it."""
         assert self.process.stdin is not None
-        self.process.stdin.write(key + "\n")
-        self.process.stdin.flush()
+        try:
+            self.process.stdin.write(key + "\n")
+            self.process.stdin.flush()
+        except OSError as error:
+            raise MeasurerGoneError(f"the process that measures ended before: {error}") from error
         untold: list[Mapping[str, Any]] = []
         told, looked = -inf, monotonic()
         while True:

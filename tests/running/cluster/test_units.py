@@ -272,11 +272,13 @@ def test_whose_turn_it_is_hangs_on_one_file_of_the_machine(tmp_path, monkeypatch
         one.alone()
         with host.Turn(path) as other:
             assert not other._lock(alone=True, at_once=True)
-    with (
-        pytest.raises(ClusterError, match="by which the workers of a machine take turns"),
-        host.Turn(tmp_path / "none" / "lock"),
-    ):
-        pass
+    (tmp_path / "link").symlink_to(tmp_path / "none")
+    for cannot in (tmp_path / "none" / "lock", tmp_path / "link"):
+        with (
+            pytest.raises(ClusterError, match="by which the workers of a machine take turns"),
+            host.Turn(cannot),
+        ):
+            pass
 
 
 def test_the_page_names_how_dask_is_kept_quiet():

@@ -67,6 +67,16 @@ def test_what_a_process_told_before_it_ended_arrives():
     assert [event["what"] for events in told for event in events] == ["starts"]
 
 
+def test_a_process_that_ended_before_it_was_asked_is_told(monkeypatch):
+    def broken(text):
+        raise BrokenPipeError(32, "Broken pipe")
+
+    asked = measurer(said("done"))
+    monkeypatch.setattr(asked.process, "write", broken)
+    with pytest.raises(MeasurerGoneError, match="ended before"):
+        asked.measure("a key", lambda events: None, lambda: True)
+
+
 def test_a_unit_that_nobody_waits_for_ends_also_while_much_happens(monkeypatch):
     monkeypatch.setattr(worker, "LOOK_EVERY", 0.0)
 
