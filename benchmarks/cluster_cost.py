@@ -2,23 +2,28 @@
 
 Cells of algorithms that are never called go through two workers of this machine, and through the
 local runner. Told are CPU seconds of all processes that take part: they hang on what else the
-machine does much less than the clock.
+machine does much less than the clock. A unit is a sitting of its own, so its rounds have their own
+reference kernel; the local runner has one for the rounds of all cells. What that makes is told too.
 """
 
 from __future__ import annotations
 
 import argparse
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from time import process_time
 
 import psutil
 from cembench.surfaces.flat_disk import flat_disk
 
 from benchmarks.empty_algorithms import COUNT
 from cembench.registry import load_registry
+from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster.client import run_on_cluster
 from cembench.running.cluster.connect import connected, parse_cluster
+from cembench.running.kernel import kernel_seconds
 from cembench.running.local import run_tasks
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 
@@ -36,16 +41,18 @@ def main() -> None:
         # What a process does once: imports, and the other worker's start.
         run_on_cluster(_tasks(4, "first"), Store(place / "first"), client)
         before = _cpu_seconds()
-        run_on_cluster(tasks, Store(place / "there"), client)
+        records = run_on_cluster(tasks, Store(place / "there"), client)
         there = _cpu_seconds() - before
         before = _cpu_seconds()
-        run_tasks(tasks, Store(place / "here"))
+        alone = run_tasks(tasks, Store(place / "here"))
         here = _cpu_seconds() - before
     cells = len(tasks)
+    kernels = _kernels(records) - _kernels(alone)
     print(
         f"{cells} empty cells: {1000 * there / cells:.1f} ms of CPU time a cell by two workers, "
         f"{1000 * here / cells:.1f} ms by the local runner, {1000 * (there - here) / cells:.1f} ms "
-        "more"
+        f"more, of which {1000 * kernels / cells:.1f} ms are each surface's own reference "
+        "kernels"
     )
 
 
@@ -54,6 +61,15 @@ def _tasks(surfaces: int, name: str) -> list[Task]:
     chosen = [registry.algorithm(f"empty-{k}") for k in range(COUNT)]
     meshes = [flat_disk(600 + 10 * k).renamed(f"{name}-{k}") for k in range(surfaces)]
     return plan_cells(chosen, meshes, {}, MeasurementSettings(), [PLUGIN])
+
+
+def _kernels(records: Sequence[Record]) -> float:
+    """CPU seconds that the reference kernel took, by what it takes in this process now."""
+    count = len({(r.sitting, r.kernel_seconds) for one in records for r in one.outcome.rounds})
+    began = process_time()
+    for _ in range(10):
+        kernel_seconds()
+    return count * (process_time() - began) / 10
 
 
 def _cpu_seconds() -> float:

@@ -65,7 +65,6 @@ from cembench.commands.options import (
     installed_backend,
     memory_bytes,
     settings_of_rounds,
-    usual_jobs,
 )
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
@@ -279,6 +278,7 @@ def run(
     from cembench.results.paper.profiles import algorithms_of, paper_parameters, surfaces_of
     from cembench.results.record_rows import REFERENCE
     from cembench.results.store import Store
+    from cembench.running.environment import usable_cores
     from cembench.running.local import Options
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
@@ -297,7 +297,7 @@ def run(
         most_rounds=max_rounds,
         budget=budget_seconds(budget, profile),
         repeat_busy=repeat_busy,
-        jobs=jobs or (usual_jobs() if sets else 1),
+        jobs=jobs or (usable_cores() if sets else 1),
     )
     declared, named = declared_command(command, program)
     plugin = [*plugin, *declared]

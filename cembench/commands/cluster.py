@@ -97,29 +97,32 @@ def hours(
     Returns
     -------
     dict
-        ``seconds`` by number of machines; ``units``, how many there are; ``longest``, the surface
-        whose unit takes longest, and its seconds.
+        ``seconds`` by number of machines; ``units``, how many there are; ``useful``, how many
+        machines are of use at most; ``longest``, the surface whose unit takes longest, and its
+        seconds.
 
     """
-    from cembench.running.cluster.units import grouped, makespan
+    from cembench.running.cluster.units import grouped, makespan, most_useful
     from cembench.running.estimate import planned_seconds
 
-    known = {t.cell.label: cost for t, cost in zip(tasks, costs, strict=True) if cost is not None}
-    groups = grouped([task for task in tasks if task.cell.label in known])
-    found = {}
-    priced = [[known[t.cell.label] for t in group] for group in groups]
+    known = {id(task): cost for task, cost in zip(tasks, costs, strict=True) if cost is not None}
+    groups = grouped([task for task in tasks if id(task) in known])
+    priced = [[known[id(task)] for task in group] for group in groups]
     whole = sum(one.seconds for group in priced for one in group)
+    found: dict[int, float] = {}
+    seconds: list[float] = []
     for machines in ESTIMATED_FOR:
         share = None if budget is None else budget * machines / (whole or 1.0)
         seconds = [
             planned_seconds(g, None if share is None else share * sum(one.seconds for one in g))
             for g in priced
         ]
-        found[machines] = makespan(seconds, machines) if seconds else 0.0
+        found[machines] = makespan(seconds, machines)
     longest = max(zip(seconds, groups, strict=True), key=lambda one: one[0], default=None)
     return {
         "seconds": found,
         "units": len(groups),
+        "useful": most_useful(seconds),
         "longest": None if longest is None else longest[1][0].cell.mesh,
         "longest_seconds": None if longest is None else longest[0],
     }
@@ -129,17 +132,14 @@ def show_hours(found: dict[str, Any]) -> None:
     """Print what :func:`hours` found."""
     from cembench.commands.progress import duration
 
+    if not found["units"]:
+        return
+    out.print("\nOn a cluster, where a surface under a policy is one machine's as a whole:")
     for machines, seconds in found["seconds"].items():
-        longest = found["longest_seconds"] or 0.0
-        limit = (
-            f": no less than {found['longest']} takes"
-            if machines > 1 and seconds <= 1.01 * longest
-            else ""
-        )
+        limited = machines > 1 and seconds <= 1.01 * found["longest_seconds"]
+        limit = f", as long as {found['longest']} takes" if limited else ""
         name = "machine " if machines == 1 else "machines"
         out.print(f"{machines:>6} {name}  about {duration(seconds)}{limit}", soft_wrap=True)
-    out.print(
-        f"{found['units']} surfaces with a policy travel, each to one machine; the longest takes "
-        f"about {duration(found['longest_seconds'] or 0.0)}.",
-        soft_wrap=True,
-    )
+    longest, useful = duration(found["longest_seconds"]), f"{found['useful']:,}"
+    most = f"more than {useful} machines gain nothing" if found["useful"] > 1 else "one is enough"
+    out.print(f"{found['units']:>6,} of them, the longest about {longest}: {most}", soft_wrap=True)

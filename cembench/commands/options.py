@@ -7,7 +7,6 @@ machine can do; they keep sums, clocks and system limits from overflowing.
 from __future__ import annotations
 
 import math
-import os
 from enum import StrEnum
 from typing import Annotated
 
@@ -228,11 +227,6 @@ def settings_of_rounds(rounds: int | None, precision: str | None) -> tuple[int, 
     if rounds is not None:
         return rounds, None
     return 0, USUAL_PRECISION if precision is None else precision_share(precision)
-
-
-def usual_jobs() -> int:
-    """Return the number of checks that run in parallel by default: one per core."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def memory_bytes(given: str | None) -> int:

@@ -149,7 +149,9 @@ def show(
 
     store = Store(run)
     found = _chosen(sound_records(store, Depth.records), cell)
-    findings = [f for record in found for f in verify_map(store, store.record_file(record), record)]
+    findings = [
+        f for record in found for f in verify_map(store, store.record_file(record.cell), record)
+    ]
     if as_json:
         print_json([row(record) for record in found])
     else:

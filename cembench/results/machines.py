@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from string import ascii_lowercase
+from string import ascii_uppercase
 from typing import Any
 
 from cembench.results.records import Record
@@ -35,7 +35,7 @@ def machine_of_record(record: Record, environments: Environments) -> str:
 class Marks:
     """A letter for each machine if there are several; with one machine nothing is marked."""
 
-    #: By the machines' names, most cells first.
+    #: By the machines' names, most cells first; capitals, as small ones mark notes.
     letters: Mapping[str, str]
     counts: Mapping[str, int]
     #: By environment.
@@ -50,7 +50,8 @@ class Marks:
         if not self.letters:
             return []
         named = "; ".join(
-            f"{letter}: {name or 'not named'}, {self.counts[name]} cells"
+            f"{letter}: {name or 'not named'}, {self.counts[name]} "
+            f"{'cell' if self.counts[name] == 1 else 'cells'}"
             for name, letter in self.letters.items()
         )
         return [
@@ -80,8 +81,8 @@ def marks(records: Iterable[Record], environments: Environments) -> Marks:
 
 
 def _letter(number: int) -> str:
-    more, this = divmod(number, len(ascii_lowercase))
-    return (_letter(more - 1) if more else "") + ascii_lowercase[this]
+    more, this = divmod(number, len(ascii_uppercase))
+    return (_letter(more - 1) if more else "") + ascii_uppercase[this]
 
 
 def software_differences(records: Sequence[Record], environments: Environments) -> list[str]:

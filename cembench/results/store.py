@@ -294,9 +294,9 @@ class Store:
             return path
         return min(path.parent.glob(f"*--{cell.key[:12]}{path.suffix}"), default=None)
 
-    def record_file(self, record: Record) -> Path:
-        """Return the path of a record."""
-        return self._record_path(record.cell)
+    def record_file(self, cell: Cell) -> Path:
+        """Return the path of a cell's record, if it was saved."""
+        return self._record_path(cell)
 
     def map_file(self, cell: Cell) -> Path:
         """Return the path of a cell's map, if it was saved."""

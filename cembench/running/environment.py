@@ -31,6 +31,11 @@ def with_threads(count: int) -> dict[str, str]:
     return os.environ | dict.fromkeys(THREAD_VARIABLES, str(count))
 
 
+def usable_cores() -> int:
+    """Return how many hardware threads this process may use: fewer than there are, in a job."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 def machine_name() -> str:
     """Return the name of this machine in records: `CEMBENCH_MACHINE`, or the system's name."""
     return printable(os.environ.get(MACHINE_VARIABLE) or platform.node() or "unnamed")

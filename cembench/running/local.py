@@ -170,11 +170,14 @@ def run_tasks(
     options: Options | None = None,
     watcher: Watcher | None = None,
     launcher: Callable[[Path, Options], Launcher] | None = None,
+    *,
+    environment: dict[str, Any] | None = None,
 ) -> list[Record]:
     """Measure the cells that the store does not hold; return records in the tasks' order.
 
     Each process's result is on disk before the next one starts. A second run into the same store
-    waits for the first. `launcher` makes what starts the processes, given a folder for its files.
+    waits for the first. `launcher` makes what starts the processes, given a folder for its files;
+    `environment` is this machine's, where the caller has just described it.
     """
     options, watcher = options or Options(), watcher or Watcher()
     launcher = launcher or Launcher
@@ -182,7 +185,7 @@ def run_tasks(
         store.save_plan([task.cell for task in tasks])
         for mesh in {task.cell.mesh_hash: task.mesh for task in tasks}.values():
             store.save_mesh(mesh)
-        run = _Run(store, starting, options, watcher, describe_environment())
+        run = _Run(store, starting, options, watcher, environment or describe_environment())
         run.measure(tasks)
     return [run.records[task.cell.label] for task in tasks]
 

@@ -105,13 +105,13 @@ def test_tables_of_several_machines_mark_seconds_and_say_so(two_machines, tmp_pa
     merge(two_machines, into)
     records, environments = into.records(), into.environments()
     shown = printed(results_table(records, environments))
-    assert "1.000 a" in shown
-    assert "4.000 a" in shown
-    assert "0.500 b" in shown
-    assert "Seconds of 2 machines (a: node-1, 2 cells; b: node-2, 1 cells)" in shown
+    assert "1.000 A" in shown
+    assert "4.000 A" in shown
+    assert "0.500 B" in shown
+    assert "Seconds of 2 machines (A: node-1, 2 cells; B: node-2, 1 cell)" in shown
     assert max(map(len, shown.splitlines())) <= 80
     alone = [r for r in records if r.environment == "e1"]
-    assert "1.000 a" not in printed(results_table(alone, environments))
+    assert "1.000 A" not in printed(results_table(alone, environments))
     assert machine_lines(alone, environments) == []
     assert "which mixes them" in str(machine_lines(records, environments)[0])
     assert marks(alone, environments).explained() == []
@@ -130,12 +130,12 @@ def test_a_report_of_several_machines_marks_seconds_and_names_other_software(
     assert "node-2: python: None / 3.13" in told
     (table,) = [item for item in section.items if isinstance(item, Table)]
     assert [[value.text for value in row] for row in table.rows] == [
-        ["a", "node-1", "a processor", "1", "2"],
-        ["b", "node-2", "a processor", "1", "1"],
+        ["A", "node-1", "a processor", "1", "2"],
+        ["B", "node-2", "a processor", "1", "1"],
     ]
     cap = next(s for s in evidence.surfaces if s.name == "cap")
     texts = [value.text for row in figures_table(evidence, cap, "x").rows for value in row]
-    assert "0.500 b" in texts
+    assert "0.500 B" in texts
     assert machines_section(Evidence.of(tmp_path / "1")) is None
 
 

@@ -12,7 +12,7 @@ import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from queue import Empty, SimpleQueue
 from time import monotonic
@@ -165,21 +165,31 @@ class _ClusterRun:
         if self.options.fresh or self.options.rerun_failed:
             token += self.topic  # what an earlier run left unfinished on a machine does not count
         groups = grouped(pending)
-        known = self.store.finished()
+        known: dict[str, list[Record]] = {}
+        for record in self.store.finished():
+            known.setdefault(record.cell.algorithm, []).append(record)
         software = software_of(self.environment) if self.same_environment else {}
-        costs = [sum(estimate(t.cell, t.facts.faces, known).seconds for t in g) for g in groups]
+        costs = [
+            sum(
+                estimate(t.cell, t.facts.faces, known.get(t.cell.algorithm, ())).seconds
+                for t in group
+            )
+            for group in groups
+        ]
         share = self.options.budget
         if share is not None:  # of each second that is expected, so that no unit is cut more
             share *= max(1, len(self.workers)) / sum(costs)
         found = []
         for group, seconds in zip(groups, costs, strict=True):
             budget = None if share is None else share * seconds
-            options = Options(**{**vars(self.options), "budget": budget})
+            options = replace(self.options, budget=budget)
             found.append(parcel(group, token, options, self.faces, software, seconds))
         return sorted(found, key=lambda one: -one.seconds)
 
     def _hear(self, event: tuple[Any, Mapping[str, Any]]) -> None:
-        self.events.put(("event", event[1]))
+        about = event[1]
+        for one in about["events"]:
+            self.events.put(("event", {**one, "unit": about["unit"], "machine": about["machine"]}))
 
     def _send(self) -> None:
         """Send a unit to each worker that has none."""
@@ -268,7 +278,7 @@ class _ClusterRun:
         if about["what"] == "takes":
             self._taken(flight, about["worker"], about["machine"])
             return
-        task = {t.cell.label: t for t in flight.parcel.tasks}.get(about.get("cell", ""))
+        task = flight.parcel.by_label.get(about.get("cell", ""))
         if about["what"] == "began":
             self._known(about["machine"], json.loads(about["environment"]))
         elif about["what"] == "queues":

@@ -30,6 +30,9 @@ SLURM = {
     "exclusive": ("yes", "yes: nobody else is on the machine; no"),
     "interface": ("", "the network, as ib0"),
 }
+#: Dask's own watch over its workers, which would take time from what they measure: the names of
+#: its configuration, and what is set. docs/cluster.md has them for workers that users start.
+QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})")
 _ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
 
@@ -128,11 +131,19 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
         return
     # The first worker that a unit ends may be bad luck, the second is the unit's.
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        dask.config.set({"distributed.scheduler.allowed-failures": 1, **QUIET}),
         _local(where) if where.kind == "local" else _slurm(where) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
+
+
+def quiet_variables() -> dict[str, str]:
+    """Return what is set by :data:`QUIET`, as variables for workers that are started elsewhere."""
+    return {
+        f"DASK_{name.upper().replace('-', '_').replace('.', '__')}": str(value)
+        for name, value in QUIET.items()
+    }
 
 
 def _local(where: ClusterPlace) -> Any:
@@ -167,6 +178,7 @@ def _slurm(where: ClusterPlace) -> Any:
         python=sys.executable,
         worker_extra_args=["--no-dashboard"],
         job_extra_directives=["--exclusive"] if chosen["exclusive"] == "yes" else [],
+        job_script_prologue=[f"export {name}={value}" for name, value in quiet_variables().items()],
         job_name="cembench",
         local_directory=str(place() / "dask"),
         log_directory=str(logs),

@@ -20,12 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write
-from cembench.core.errors import RecordError
+from cembench.core.errors import ClusterError, RecordError
 from cembench.core.loading import is_there, read_arrays
 from cembench.mesh.datasets import cache_directory
 
 #: Days after which what nobody came back for is deleted from a machine.
 KEPT_DAYS = 14.0
+_KEPT = ("units", "surfaces", "plugins", "slurm")
 Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
@@ -41,14 +42,25 @@ class Turn:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        self.path = path or Path(tempfile.gettempdir()) / "cembench-machine.lock"
+        self.path = path or _common_folder() / "cembench-machine.lock"
         self._file = -1
 
     def __enter__(self) -> Self:
-        """Open the lock file, which all users of the machine share."""
-        self._file = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o666)
-        with suppress(OSError):  # another user's
-            self.path.chmod(0o666)
+        """Open the lock's file, which all users of the machine have in common.
+
+        Raises
+        ------
+        ClusterError
+            It cannot be opened.
+
+        """
+        try:
+            self._file = _opened(self.path)
+        except OSError as error:
+            raise ClusterError(
+                f"{self.path}, by which the workers of a machine take turns, cannot be opened: "
+                f"{error.strerror or error}. Let all users read it, or delete it."
+            ) from error
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -77,6 +89,27 @@ class Turn:
         except BlockingIOError:
             return False
         return True
+
+
+def _common_folder() -> Path:
+    """Return a folder that all jobs and users of this machine have, whatever TMPDIR is."""
+    common = Path("/tmp")
+    return common if common.is_dir() else Path(tempfile.gettempdir())
+
+
+def _opened(path: Path) -> int:
+    """Open a file for locking, which may be another user's, and is made where there is none.
+
+    Some systems refuse to open another user's file in a common folder in a way that would make it.
+    """
+    with suppress(FileNotFoundError):
+        return os.open(path, os.O_RDONLY)
+    try:
+        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
+    except FileExistsError:  # made by another worker just now
+        return os.open(path, os.O_RDONLY)
+    path.chmod(0o644)  # whatever the user's umask is
+    return file
 
 
 def place() -> Path:
@@ -122,7 +155,7 @@ def _surface_file(mesh_hash: str) -> Path:
 def clear_old(days: float = KEPT_DAYS) -> None:
     """Delete surfaces and units that have not been used for a number of days."""
     since = time() - 86400 * days
-    for old in (*place().glob("units/*"), *place().glob("surfaces/*"), *place().glob("plugins/*")):
+    for old in (old for name in _KEPT for old in place().glob(f"{name}/*")):
         with suppress(OSError):
             if old.stat().st_mtime < since:
                 shutil.rmtree(old) if old.is_dir() else old.unlink()

@@ -21,15 +21,15 @@ from typing import Any
 import psutil
 
 from cembench.core.atomic import read_model
-from cembench.core.errors import ClusterError
+from cembench.core.errors import CembenchError, ClusterError
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import load_algorithm
+from cembench.registry import Algorithm, load_algorithm
 from cembench.results.machines import differences
-from cembench.results.records import Cell, Record
+from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster.host import Turn, kept_surface, unit_folder
 from cembench.running.cluster.units import Unit
-from cembench.running.environment import describe_environment, machine_name
+from cembench.running.environment import describe_environment, machine_name, usable_cores
 from cembench.running.local import Options, Step, Watcher, run_tasks
 from cembench.running.plan import Task
 from cembench.running.sources import hash_of, sources_of
@@ -76,23 +76,18 @@ def measure(unit: Unit, folder: Path, tell: Tell) -> list[Record] | None:
         The machine has other code than the client, or not the surface.
 
     """
-    environment = _environment()
+    environment = describe_environment()
     told = differences(unit.software, environment) if unit.software else []
     if told:
         tell({"what": "refused", "why": "; ".join(told)})
         return None
     mesh = surface_of(unit)
-    tasks = [task_of(unit, cell, mesh) for cell in unit.cells]
+    tasks = tasks_of(unit, mesh)
     tell({"what": "began", "environment": json.dumps(environment)})
     with Turn() as turn:
         turn.share()
-        return run_tasks(tasks, Store(folder), _options(unit), Teller(tell, turn))
-
-
-@cache
-def _environment() -> dict[str, Any]:
-    """Return the environment, determined once per process."""
-    return describe_environment()
+        teller = Teller(tell, turn)
+        return run_tasks(tasks, Store(folder), _options(unit), teller, environment=environment)
 
 
 def surface_of(unit: Unit) -> TriangleMesh:
@@ -107,24 +102,43 @@ def surface_of(unit: Unit) -> TriangleMesh:
     return mesh
 
 
-def task_of(unit: Unit, cell: Cell, mesh: TriangleMesh) -> Task:
-    """Return a cell's task on this machine, whose algorithm is the client's."""
-    algorithm = load_algorithm(cell.algorithm, unit.plugins)
-    sources = sources_of(algorithm)
-    if hash_of(sources) != cell.code_hash:
-        raise ClusterError(
-            f"{cell.algorithm} is other code on {machine_name()} than here: "
-            f"{', '.join(sources)} differ. Install the same version of cembench and of plug-ins "
-            "on all machines."
-        )
-    return Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources)
+def tasks_of(unit: Unit, mesh: TriangleMesh) -> list[Task]:
+    """Return a unit's tasks on this machine, whose algorithms are the client's.
+
+    The files of a plug-in are read once a unit, however many algorithms it declares.
+    """
+    read: dict[tuple[Path | None, str], Mapping[str, str]] = {}
+    tasks = []
+    for cell in unit.cells:
+        algorithm = _algorithm(cell.algorithm, unit.plugins)
+        declared = (algorithm.file, algorithm.module)
+        if algorithm.program is not None:  # whose files are its own
+            sources: Mapping[str, str] = sources_of(algorithm)
+        elif declared in read:
+            sources = read[declared]
+        else:
+            sources = read[declared] = sources_of(algorithm)
+        if hash_of(sources) != cell.code_hash:
+            raise ClusterError(
+                f"{cell.algorithm} is other code on {machine_name()} than here: "
+                f"{', '.join(sources)} differ. Install the same version of cembench and of "
+                "plug-ins on all machines."
+            )
+        tasks.append(Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources))
+    return tasks
+
+
+@cache
+def _algorithm(name: str, plugins: tuple[str, ...]) -> Algorithm:
+    """Return an algorithm, which a process looks up once: plug-ins lie in folders by content."""
+    return load_algorithm(name, plugins)
 
 
 def _options(unit: Unit) -> Options:
     """Return the options of a run, with this machine's memory and cores as their bounds."""
     options = unit.run_options()
     free = int(0.9 * psutil.virtual_memory().available)
-    jobs = min(options.jobs, psutil.cpu_count() or 1)
+    jobs = min(options.jobs, usable_cores())
     return replace(options, memory_bytes=options.memory_bytes or free, jobs=jobs)
 
 
@@ -148,7 +162,7 @@ def main() -> None:
             if measure(read_model(folder / UNIT, Unit), folder / RUN, tell) is not None:
                 tell({"what": "done"})
         except Exception as error:
-            known = isinstance(error, ClusterError)
+            known = isinstance(error, CembenchError)
             tell({"what": "failed", "why": str(error) if known else traceback.format_exc()})
 
 

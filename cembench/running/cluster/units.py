@@ -9,6 +9,7 @@ import hashlib
 import heapq
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -46,8 +47,13 @@ class Unit(BaseModel):
 
     @property
     def key(self) -> str:
-        """Hash of the content."""
-        return hashlib.sha256(self.model_dump_json().encode()).hexdigest()[:24]
+        """Hash of what is measured and for which run, not of how its cells are gone about.
+
+        So what a worker keeps of an unfinished unit counts when the run goes on with another
+        budget, or with more machines to share it.
+        """
+        what = self.model_dump_json(include={"token", "cells", "mesh_type"})
+        return hashlib.sha256(what.encode()).hexdigest()[:24]
 
     @property
     def mesh(self) -> str:
@@ -77,6 +83,11 @@ class Parcel:
     def surface(self) -> TriangleMesh:
         """The surface itself."""
         return self.tasks[0].mesh
+
+    @cached_property
+    def by_label(self) -> dict[str, Task]:
+        """The tasks by the labels of their cells."""
+        return {task.cell.label: task for task in self.tasks}
 
 
 def grouped(tasks: Sequence[Task]) -> list[list[Task]]:
@@ -148,3 +159,22 @@ def makespan(seconds: Sequence[float], machines: int) -> float:
     for one in sorted(seconds, reverse=True):
         heapq.heappush(free, heapq.heappop(free) + one)
     return max(free)
+
+
+def most_useful(seconds: Sequence[float]) -> int:
+    """Return how many machines are of use at most: with them, the longest unit takes as long.
+
+    One per cent is no matter.
+
+    >>> most_useful([3.0, 2.0, 1.0])
+    2
+    """
+    enough, longest = len(seconds), max(seconds, default=0.0)
+    fewest = 1
+    while fewest < enough:
+        tried = (fewest + enough) // 2
+        if makespan(seconds, tried) > 1.01 * longest:
+            fewest = tried + 1
+        else:
+            enough = tried
+    return enough

@@ -9,11 +9,13 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from queue import Empty, SimpleQueue
+from time import monotonic
 from typing import IO, Any
 
 import dask
@@ -22,11 +24,10 @@ from distributed import get_worker
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write_bytes, write_text
-from cembench.core.errors import ClusterError
-from cembench.core.loading import read_bytes
+from cembench.core.errors import CembenchError, ClusterError
+from cembench.core.loading import is_there, read_bytes
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
-from cembench.results.records import Record, signed
 from cembench.results.store import Store
 from cembench.running.cluster import host
 from cembench.running.cluster.measure import RUN, UNIT
@@ -36,8 +37,15 @@ from cembench.running.plan import generate_surface
 
 #: Seconds between two looks whether anybody still wants the unit.
 LOOK_EVERY = 1.0
-#: A record as it was signed, and its map.
+#: Seconds between two messages of what happens: what comes between them travels together.
+TELL_EVERY = 0.05
+#: A record's file, and its map.
 Found = tuple[bytes, NDArray[np.complex128] | None]
+
+#: Takes what happened since it was last called.
+Tell = Callable[[Sequence[Mapping[str, Any]]], None]
+#: What a process tells last of a unit.
+_ENDS = ("done", "refused", "failed", "gone")
 
 _one_unit = threading.Lock()
 
@@ -75,29 +83,30 @@ def measure_unit(
     worker = get_worker()
     key = worker.get_current_task()
 
-    def tell(event: Mapping[str, Any]) -> None:
-        worker.log_event(topic, {**event, "unit": unit.key, "machine": machine_name()})
+    def tell(events: Sequence[Mapping[str, Any]]) -> None:
+        about = {"unit": unit_key, "machine": machine_name(), "events": list(events)}
+        worker.log_event(topic, about)
 
     def is_wanted() -> bool:
         state = worker.state.tasks.get(key)
         return state is not None and state.state in ("executing", "long-running")
 
     unit = Unit.model_validate_json(text)
+    unit_key = unit.key
     with _one_unit:
         about = (machine_name(), worker.address)
         host.clear_old()
         if not _has_surface(unit, surface):
             return Answer(*about, lacks_surface=True)
-        folder = host.unit_folder(unit.key)
+        folder = host.unit_folder(unit_key)
         placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
         write_text(folder / UNIT, placed.model_dump_json())
-        tell({"what": "takes", "worker": worker.address})
-        refused = _measurer().measure(unit.key, tell, is_wanted)
+        tell([{"what": "takes", "worker": worker.address}])
+        refused = _measurer().measure(unit_key, tell, is_wanted)
         if refused:
             return Answer(*about, refused=refused)
         store = Store(folder / RUN)
-        found = tuple((signed(r), store.uv(r.cell)) for r in _asked(store, unit))
-        return Answer(*about, found, store.environments())
+        return Answer(*about, _found(store, unit), store.environments())
 
 
 async def forget(keys: list[str]) -> None:
@@ -105,9 +114,10 @@ async def forget(keys: list[str]) -> None:
     host.forget_units(keys)
 
 
-def _asked(store: Store, unit: Unit) -> list[Record]:
-    keys = {cell.key for cell in unit.cells}
-    return [record for record in store.records() if record.cell.key in keys]
+def _found(store: Store, unit: Unit) -> tuple[Found, ...]:
+    """Return the records of a unit as they lie on disk, with their maps."""
+    files = [(cell, store.record_file(cell)) for cell in unit.cells]
+    return tuple((read_bytes(file), store.uv(cell)) for cell, file in files if is_there(file))
 
 
 def _has_surface(unit: Unit, sent: host.Arrays | None) -> bool:
@@ -129,7 +139,10 @@ def _generated(unit: Unit) -> host.Arrays | None:
     family = registry.surfaces.get(unit.mesh)
     if family is None or family.kept is not None:
         return None
-    made: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
+    try:
+        made: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
+    except CembenchError:  # its data, or a library, are not on this machine
+        return None
     return (made.V, made.F) if made.hash == unit.mesh_hash else None
 
 
@@ -172,32 +185,49 @@ class Measurer:
             self.lines.put(line)
         self.lines.put(None)
 
-    def measure(
-        self, key: str, tell: Callable[[Mapping[str, Any]], None], is_wanted: Callable[[], bool]
-    ) -> str:
-        """Measure a unit; return why it is refused, or nothing. Ends if the unit is cancelled."""
+    def measure(self, key: str, tell: Tell, is_wanted: Callable[[], bool]) -> str:
+        """Measure a unit; return why it is refused, or nothing. Ends if it is cancelled."""
         assert self.process.stdin is not None
-        self.process.stdin.write(key + "\n")
-        self.process.stdin.flush()
+        try:
+            self.process.stdin.write(key + "\n")
+            self.process.stdin.flush()
+        except OSError as error:
+            raise MeasurerGoneError(f"the process that measures ended before: {error}") from error
+        untold: list[Mapping[str, Any]] = []
+        told, looked = -inf, monotonic()
         while True:
-            try:
-                line = self.lines.get(timeout=LOOK_EVERY)
-            except Empty:
+            event = self._next(told + TELL_EVERY if untold else looked + LOOK_EVERY)
+            ended = event is not None and event["what"] in _ENDS
+            if event is not None and not ended:
+                untold.append(event)
+            now = monotonic()
+            if untold and (ended or now >= told + TELL_EVERY):
+                tell(untold)
+                untold, told = [], now
+            if event is not None and ended:
+                return self._why(event)
+            if now >= looked + LOOK_EVERY:
+                looked = now
                 if not is_wanted():
                     self.close()
-                    raise ClusterError("nobody waits for this unit any more.") from None
-                continue
-            if line is None:
-                code = self.process.wait()
-                raise MeasurerGoneError(f"the process that measures ended with code {code}")
-            event = json.loads(line)
-            if event["what"] == "done":
-                return ""
-            if event["what"] == "refused":
-                return str(event["why"])
-            if event["what"] == "failed":
-                raise ClusterError(event["why"])
-            tell(event)
+                    raise ClusterError("nobody waits for this unit any more.")
+
+    def _next(self, until: float) -> Mapping[str, Any] | None:
+        """Return what the process tells next; None where it tells nothing until then."""
+        try:
+            line = self.lines.get(timeout=max(0.0, until - monotonic()))
+        except Empty:
+            return None
+        return {"what": "gone"} if line is None else dict(json.loads(line))
+
+    def _why(self, event: Mapping[str, Any]) -> str:
+        """Return why a unit is refused, or nothing; raise where it could not be measured."""
+        if event["what"] == "gone":
+            code = self.process.wait()
+            raise MeasurerGoneError(f"the process that measures ended with code {code}")
+        if event["what"] == "failed":
+            raise ClusterError(event["why"])
+        return str(event.get("why", ""))
 
     def close(self) -> None:
         """End the process and everything it started."""

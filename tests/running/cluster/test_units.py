@@ -2,6 +2,7 @@
 
 import json
 import sys
+import tempfile
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -9,13 +10,13 @@ from pathlib import Path
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from cembench.commands.cluster import hours
+from cembench.commands.cluster import hours, show_hours
 from cembench.core.errors import ClusterError, ParameterError
 from cembench.registry import load_registry
 from cembench.results.machines import differences, software_of
 from cembench.results.store import Store
 from cembench.running.cluster import host
-from cembench.running.cluster.connect import parse_cluster
+from cembench.running.cluster.connect import parse_cluster, quiet_variables
 from cembench.running.cluster.measure import measure
 from cembench.running.cluster.state import ClusterState, MachineState, read_state, save_state
 from cembench.running.cluster.units import Unit, grouped, makespan, parcel
@@ -94,9 +95,21 @@ def test_hours_name_what_limits_them():
     cost = Estimate(1.0, 100.0, 1e6, "recorded", 100.0)
     found = hours(tasks, [cost, cost, replace(cost, seconds=700.0), cost], None)
     assert found["seconds"] == {1: 1000.0, 10: 800.0, 100: 800.0}
-    assert (found["longest"], found["units"]) == ("two", 2)
+    assert (found["longest"], found["units"], found["useful"]) == ("two", 2, 2)
     held = hours(tasks, [None, None, cost, cost], None)
     assert (held["units"], held["seconds"][10]) == (1, 200.0)
+
+
+def test_hours_are_told_in_eighty_columns_with_what_limits_them(capsys):
+    cost = Estimate(1.0, 100.0, 1e6, "recorded", 100.0)
+    costs = [cost, cost, replace(cost, seconds=700.0), cost]
+    show_hours(hours(two_surfaces("reuse"), costs, None))
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    assert "10 machines  about 13 min, as long as two takes" in told
+    assert "2 of them, the longest about 13 min: more than 2 machines gain nothing" in told
+    show_hours(hours([], [], None))
+    assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize(
@@ -238,3 +251,37 @@ def test_how_far_a_run_is_can_be_read_again(tmp_path):
     state = ClusterState(units=3, done=1, machines=[MachineState(machine="a", units=1, at="foot")])
     save_state(tmp_path, state)
     assert read_state(tmp_path) == state
+
+
+def test_what_is_kept_of_a_unit_counts_under_another_share_of_the_budget():
+    one = parcel(tasks_of("good"), NO_TOKEN, Options(budget=5.0)).unit
+    other = parcel(tasks_of("good"), NO_TOKEN, Options(budget=7.0)).unit
+    assert one.options != other.options
+    assert one.key == other.key
+    assert parcel(tasks_of("nan"), NO_TOKEN, Options(budget=5.0)).unit.key != one.key
+
+
+def test_whose_turn_it_is_hangs_on_one_file_of_the_machine(tmp_path, monkeypatch):
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    assert host.Turn().path == Path("/tmp/cembench-machine.lock")
+    path = tmp_path / "lock"
+    path.write_bytes(b"")
+    path.chmod(0o444)  # another user's: reading is enough to lock it
+    with host.Turn(path) as one:
+        one.alone()
+        with host.Turn(path) as other:
+            assert not other._lock(alone=True, at_once=True)
+    (tmp_path / "link").symlink_to(tmp_path / "none")
+    for cannot in (tmp_path / "none" / "lock", tmp_path / "link"):
+        with (
+            pytest.raises(ClusterError, match="by which the workers of a machine take turns"),
+            host.Turn(cannot),
+        ):
+            pass
+
+
+def test_the_page_names_how_dask_is_kept_quiet():
+    page = (Path(__file__).parents[3] / "docs" / "cluster.md").read_text()
+    for name, value in quiet_variables().items():
+        assert page.count(f"{name}={value}") == 2
