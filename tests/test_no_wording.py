@@ -12,7 +12,6 @@ LOOKS = ("startswith", "endswith", "find", "index", "count", "partition", "split
 ALLOWED = {
     ("cembench/core/notices.py", "Definition 1"): "records written before notices had kinds",
     ("cembench/running/environment.py", "model name"): "a key of /proc/cpuinfo",
-    ("cembench/running/memory.py", "VmHWM:"): "a key of /proc/self/status",
     ("cembench/report/pictures.py", "A"): "a band of an image",
 }
 #: Values of enumerations and of Literal types that are written with a space, or a capital.

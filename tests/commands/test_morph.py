@@ -12,6 +12,8 @@ from tests import gallery
 from tests.real_meshes import real_mesh
 from tests.workflows.morphing.reliefs import NEUTRAL, SMILE, relief, vertices_of
 
+FAULTY = str(Path(__file__).parents[1] / "running/faulty.py")
+
 
 @pytest.fixture
 def pair(cli):
@@ -71,9 +73,11 @@ def test_without_landmarks_curvature_aligns(pair):
 
 
 def test_a_map_that_fails_is_exit_code_1(pair):
-    code, out, err = pair.morph("--landmarks", "marks.csv", "--timeout", 0.1)
+    code, out, err = pair.morph(
+        "--landmarks", "marks.csv", "-a", "spins", "--plugin", FAULTY, "--timeout", 1
+    )
     assert (code, out) == (1, "")
-    assert "calm: timeout: not finished after 0.1 s" in err
+    assert "calm: timeout: not finished after 1 s" in err
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import exp, log
 
+from cembench.report.content.both_policies import BOTH, seconds_under
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.policies import BOTH, seconds_under
 from cembench.report.content.printed_beside_measured import POLICIES
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.records import LinearAlgebraWork

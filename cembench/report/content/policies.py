@@ -5,19 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cembench.report.content.averages import geometric_rate
-from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.printed_beside_measured import significant
+from cembench.report.content.both_policies import BOTH, seconds_under
+from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.table_2 import measured_rates
 from cembench.report.document import Column, Gap, Table, Value, count, missing, words
 from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.report.plots import PlotSeries as Bars
-
-BOTH = ("reuse", "backslash")
-
-
-def has_both_policies(evidence: Evidence) -> bool:
-    """Whether the run measured both policies."""
-    return all(policy in evidence.policies for policy in BOTH)
 
 
 def one_policy_gap(evidence: Evidence) -> Gap:
@@ -28,19 +21,6 @@ def one_policy_gap(evidence: Evidence) -> Gap:
         f"this run has only one linear-algebra policy: {', '.join(evidence.policies)}.",
         f"the same `cembench run` with --solves reuse,backslash (missing here: {other})",
     )
-
-
-def seconds_under(
-    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
-) -> tuple[Value, float | None]:
-    """Return a cell's seconds under a policy, as a value and as a number."""
-    record = evidence.find(surface, series, policy)
-    if record is None or record.outcome.status != "ok" or record.outcome.median_seconds is None:
-        key = record.cell.key if record else ""
-        text = record.outcome.status if record and record.outcome.status != "ok" else "-"
-        return Value(text, None, "", key, evidence.missing_reason(record)), None
-    seconds = record.outcome.median_seconds
-    return Value(significant(seconds), seconds, surface.origin, record.cell.key), seconds
 
 
 def policies_table(evidence: Evidence) -> Table:

@@ -10,6 +10,7 @@ from pathlib import Path
 from cembench import __version__
 from cembench.report.content import policies
 from cembench.report.content.beside_others import beside_others
+from cembench.report.content.both_policies import has_both_policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
@@ -261,7 +262,7 @@ def _beyond_the_paper(evidence: Evidence, folder: Path, *, by_surface: bool) -> 
     if not evidence.models:  # otherwise it is below Table 2
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
-    if policies.has_both_policies(evidence):
+    if has_both_policies(evidence):
         items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
         items += _drawn([policies.policies_plot(evidence)], folder)
     else:
