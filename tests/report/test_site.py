@@ -42,7 +42,7 @@ def test_ratios_are_never_formed_over_two_machines(tmp_path):
 
 
 def test_what_cannot_be_published_is_said(tmp_path):
-    with pytest.raises(ParameterError, match="each once"):
+    with pytest.raises(ParameterError, match="each run once"):
         publish([tmp_path, tmp_path / "."], tmp_path / "site")
     with pytest.raises(RecordError, match="holds no run"):
         publish([tmp_path / "nowhere"], tmp_path / "site")
