@@ -19,7 +19,7 @@ from time import monotonic
 from typing import Any
 
 import numpy as np
-from distributed import Client, Future, KilledWorker
+from distributed import Client, Future, KilledWorker, LocalCluster
 from pydantic import ValidationError
 
 from cembench.core.errors import ClusterError
@@ -44,6 +44,9 @@ LOOK_EVERY = 1.0
 STATE_EVERY = 5.0
 #: Seconds for which there may be no worker before that is said.
 _PATIENCE = 5.0
+#: Seconds for which workers that cembench started on this machine may all be gone: dask starts them
+#: again, but only so often. Elsewhere others can join at any time.
+LOCAL_PATIENCE = 120.0
 
 
 def run_on_cluster(
@@ -258,6 +261,14 @@ class _ClusterRun:
             self.watcher.machines(names)
         if found:
             self.since = self.looked
+        elif isinstance(self.client.cluster, LocalCluster) and (
+            self.looked - self.since > LOCAL_PATIENCE
+        ):
+            raise ClusterError(
+                f"all workers of this machine are gone, and none was started again within "
+                f"{LOCAL_PATIENCE:g} s; {len(self.records)} finished cells are in "
+                f"{self.store.folder}. See whether its memory suffices; the same command goes on."
+            )
         elif self.looked - self.since > _PATIENCE and not self.told_alone:
             self.told_alone = True
             self.watcher.shows("no worker is there yet; waiting for one")

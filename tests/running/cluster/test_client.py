@@ -127,6 +127,18 @@ def test_what_a_worker_cannot_measure_ends_the_run_and_says_where(client, tmp_pa
         run_on_cluster(tasks, Store(tmp_path), client, Options(), faces=200)
 
 
+def test_a_run_whose_own_workers_are_all_gone_ends_and_says_so(tmp_path, monkeypatch):
+    from distributed import Client, LocalCluster
+
+    monkeypatch.setattr(module, "LOCAL_PATIENCE", 0.5)
+    with (
+        LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as nobody,
+        Client(nobody, set_as_default=False) as alone,
+        pytest.raises(ClusterError, match="all workers of this machine are gone"),
+    ):
+        run_on_cluster(tasks_of("good", surfaces=SURFACES[:1]), Store(tmp_path), alone)
+
+
 def test_the_python_function_takes_a_client(client, tmp_path):
     run = benchmark(["flat-disk"], ["harmonic-circle"], rounds=1, out=tmp_path, cluster=client)
     (record,) = run.records()
