@@ -43,7 +43,6 @@ from cembench.commands.console import (
 from cembench.commands.ending import Verbs, ending, resumable
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
-    USUAL_MOST_ROUNDS,
     Backend,
     BackendOption,
     Budget,
@@ -69,6 +68,7 @@ from cembench.commands.options import (
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
+from cembench.results.looks import USUAL_MOST_ROUNDS
 from cembench.results.paper.profiles import Profile
 
 if TYPE_CHECKING:

@@ -13,16 +13,13 @@ from typing import Annotated
 import typer
 
 from cembench.core.errors import ParameterError
+from cembench.results.looks import LOOKS
 from cembench.results.paper.profiles import Profile
 
 #: A process needs more than a hundred MiB to load the libraries.
 LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
 LONGEST = 10_000_000.0
 MOST_FACES = 1_000_000_000
-#: Those of :mod:`cembench.results.looks`, which loads too much to be imported for a help text. A
-#: test holds that they are the same.
-SECOND_LOOK, LAST_LOOK = 10, 80
-USUAL_MOST_ROUNDS = 56
 
 
 def finite(value: float) -> float:
@@ -94,8 +91,8 @@ MostRounds = Annotated[
     int,
     typer.Option(
         "--max-rounds",
-        min=SECOND_LOOK,
-        max=LAST_LOOK,
+        min=LOOKS[1],
+        max=LOOKS[-1],
         help="Maximum number of rounds with --precision.",
     ),
 ]

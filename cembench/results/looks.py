@@ -10,9 +10,12 @@ later ones cost little, and none overshoots by much.
 from __future__ import annotations
 
 from bisect import bisect_left
+from typing import TYPE_CHECKING
 
 from cembench.results.intervals import ERROR
-from cembench.results.records import Cell
+
+if TYPE_CHECKING:
+    from cembench.results.records import Cell
 
 #: Numbers of rounds after which the precision is checked.
 LOOKS = (7, 10, 14, 20, 28, 40, 56, 80)

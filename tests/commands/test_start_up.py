@@ -5,9 +5,6 @@ import sys
 
 import pytest
 
-from cembench.commands import options
-from cembench.results import looks
-
 #: Each takes a tenth of a second to load, or more.
 SLOW = ("numpy", "scipy", "pydantic", "matplotlib", "igl", "shapely", "cvxopt", "PIL")
 PARTS_OF_SCIPY = ("scipy.sparse", "scipy.linalg", "scipy.spatial", "scipy.ndimage")
@@ -51,10 +48,3 @@ def test_the_modules_are_seen_where_they_are_loaded():
         "scipy.sparse",
         "cembench.running",
     }
-
-
-def test_the_bounds_of_rounds_are_those_of_the_looks():
-    """They stand in two places, because `looks` loads the records."""
-    assert looks.LOOKS[1] == options.SECOND_LOOK
-    assert looks.LOOKS[-1] == options.LAST_LOOK
-    assert looks.USUAL_MOST_ROUNDS == options.USUAL_MOST_ROUNDS
