@@ -29,6 +29,8 @@ def stability_words(records: Sequence[Record]) -> str:
         return ""
     unstable = [r for r in timed if is_unstable(r)]
     without = [r for r in timed if seconds_interval(r) is None]
+    if len(without) == len(timed):
+        return f"No time has an interval, with too few rounds for one: {_why(without)}."
     told = (
         f"{len(unstable) or 'None'} of {len(timed)} {'time' if len(timed) == 1 else 'times'} "
         f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "

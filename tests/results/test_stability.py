@@ -44,6 +44,12 @@ def test_what_ended_other_cells_is_said_too(record, why):
     assert stability_words([record]).endswith(f"of the figure): {why}.")
 
 
+def test_without_any_interval_nothing_is_called_stable():
+    assert stability_words([timed(FEW, precision=None)] * 3) == (
+        "No time has an interval, with too few rounds for one: their number of rounds was fixed."
+    )
+
+
 def test_nothing_is_said_of_what_was_not_timed():
     assert stability_words([record_of([])]) == ""
     assert stability_words([timed(STEADY, "precise")]).startswith("None of 1 time is unstable (")
