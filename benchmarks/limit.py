@@ -6,11 +6,12 @@ second figure is the same with the boundary kept last, which the methods here ne
 dearer: a floor that contains the design it should judge. Per surface one fresh process with one
 thread measures all in turns. Quote the ratios, medians of those within rounds::
 
-    python benchmarks/limit.py
-    python benchmarks/limit.py surface.ply surface.ply@2 --clock cpu --rounds 9
+    python -m benchmarks.limit
+    python -m benchmarks.limit surface.ply surface.ply@2 --clock cpu --rounds 9 --write-docs
 
 A number is a spherical cap with so many triangles; ``@2`` splits every triangle into four twice.
-``--clock cpu`` counts the process's CPU seconds instead of those of the wall.
+``--clock cpu`` counts the process's CPU seconds instead of those of the wall. ``--write-docs`` puts
+the tables into docs/algorithms.md.
 """
 
 from __future__ import annotations
@@ -24,11 +25,13 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from benchmarks.pages import ROOT, fill
 from cembench.running.environment import with_threads
 
 CAPS = ["20000", "190000", "1700000"]
 METHODS = ("cem, 2 iterations", "cem", "direct-cem", "direct-cem, own weights")
 FLOORS = ("limit", "boundary last")
+CLOCKS = {"wall": "seconds of the clock", "cpu": "CPU seconds"}
 #: Phases that take a smaller share of a call are left out.
 LEAST_SHARE = 0.02
 
@@ -39,6 +42,7 @@ def main() -> None:
     parser.add_argument("surfaces", nargs="*", default=CAPS, help="mesh files, FILE@SPLITS, faces")
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--clock", choices=["wall", "cpu"], default="wall")
+    parser.add_argument("--write-docs", action="store_true")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     arguments = parser.parse_args()
     if arguments.one:
@@ -46,14 +50,19 @@ def main() -> None:
         return
     found = []
     for surface in arguments.surfaces:
-        command = [sys.executable, __file__, "--one", surface]
+        where = surface if surface.isdigit() else str(Path(surface).absolute())
+        command = [sys.executable, "-m", "benchmarks.limit", "--one", where]
         command += ["--rounds", str(arguments.rounds), "--clock", arguments.clock]
-        run = subprocess.run(command, capture_output=True, text=True, env=with_threads(1))
+        run = subprocess.run(command, capture_output=True, text=True, env=with_threads(1), cwd=ROOT)
         if run.returncode:
             sys.exit(run.stderr)
         found.append(json.loads(run.stdout))
         print(f"{surface}: done", file=sys.stderr)
-    print("\n".join(tables(found)))
+    lines = tables(found)
+    print("\n".join(lines))
+    if arguments.write_docs:
+        how = f"Medians of {arguments.rounds} rounds, {CLOCKS[arguments.clock]}, one thread."
+        fill(ROOT / "docs/algorithms.md", "limit", "\n".join([*lines, "", how]))
 
 
 def tables(found: list[dict[str, Any]]) -> list[str]:
