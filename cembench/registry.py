@@ -789,7 +789,7 @@ def _import_file(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # so that annotations of its functions can be resolved
     try:
-        with _importing(str(path)):
+        with _importing(str(path)), _without_bytecode():
             spec.loader.exec_module(module)
     except RegistryError:
         sys.modules.pop(name, None)
@@ -819,6 +819,17 @@ def _importing(plugin: str) -> Iterator[None]:
             f"plug-in {plugin!r} cannot be imported: {describe_error(error)}. Repair it: importing "
             "a plug-in must only declare functions."
         ) from error
+
+
+@contextmanager
+def _without_bytecode() -> Iterator[None]:
+    """Leave no ``__pycache__`` in the folder of a plug-in's file: it is the user's."""
+    before = sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.dont_write_bytecode = before
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -341,7 +342,9 @@ def test_a_record_from_elsewhere_with_hostile_content_stays_inside(cli, run):
     assert {path.name for path in cli.folder.parent.iterdir()} == {cli.folder.name}
 
 
-def test_an_algorithm_of_any_name_is_measured_and_shown(cli):
+def test_an_algorithm_of_any_name_is_measured_and_shown(cli, monkeypatch):
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    monkeypatch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
     name = "../x/y"
     (cli.folder / "mine.py").write_text(PLUGIN.replace("NAME", name))
     write_mesh(cli.folder / f"{'m' * 240}.obj", flat_disk(60))
