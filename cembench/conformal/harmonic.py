@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -99,20 +100,25 @@ class HarmonicExtension:
         free = np.ones(L.shape[0], dtype=bool)
         free[fixed] = False
         self._free = np.flatnonzero(free)
-        self._factor: Cholesky | None = None
+
+    @cached_property
+    def _blocks(self) -> tuple[scipy.sparse.csr_array, scipy.sparse.csr_array]:
+        """Rows of L for the free vertices: the columns of free vertices, and of fixed ones."""
+        with phase("assembly"):
+            rows = by_rows(self._L)[self._free]
+            return rows[:, self._free], rows[:, self._fixed]
+
+    @cached_property
+    def _factor(self) -> Cholesky:
+        return Cholesky(self._blocks[0])
 
     def __call__(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return the harmonic map with these values at the fixed vertices."""
-        i, fixed = self._free, self._fixed
         f = np.zeros(self._L.shape[0], dtype=values.dtype)
-        f[fixed] = values
-        if len(i):
+        f[self._fixed] = values
+        if len(self._free):
+            to_fixed = self._blocks[1]
             with phase("assembly"):
-                rows = by_rows(self._L)[i]
-                right = -(rows[:, fixed] @ f[fixed])
-                block = rows[:, i] if self._factor is None else None
-            if block is not None:
-                self._factor = Cholesky(block)
-            assert self._factor is not None
-            f[i] = self._factor.solve(right)
+                right = -(to_fixed @ f[self._fixed])
+            f[self._free] = self._factor.solve(right)
         return f

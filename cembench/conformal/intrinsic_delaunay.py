@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.mesh.flips import Independence, area_of_sides, distance_across
-from cembench.mesh.gluing import partners
+from cembench.mesh.gluing import opposite_edge_ends, partners
 
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -72,7 +72,7 @@ class _Corners:
         self.vertex: Indices = F.flatten()
         self.length: Real = lengths.flatten()
         self.weight: Real = weights.flatten()
-        self.twin = partners(*(F.take(c, axis=1).ravel() for c in ((1, 2, 0), (2, 0, 1))))
+        self.twin = partners(*opposite_edge_ends(F))
         self._apart = Independence(len(F))
         self._moved_to = np.empty(F.size, dtype=np.int64)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
 from cembench.core.clock import phase
+from cembench.mesh.gluing import opposite_edge_ends
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
@@ -68,7 +69,7 @@ def laplacian_of_weights(
     The weights of the two triangles of an edge are added.
     """
     F = F.astype(np.int32 if n < 2**31 else np.int64)  # as SciPy will have them
-    i, j = (F.take(c, axis=1).ravel() for c in ((1, 2, 0), (2, 0, 1)))  # faster than F[:, c]
+    i, j = opposite_edge_ends(F)
     one_way = scipy.sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
     # Symmetric to the last bit, so its rows are its columns.
@@ -132,7 +133,7 @@ def by_rows(L: scipy.sparse.csc_array) -> scipy.sparse.csr_array:
 def non_delaunay_share(mesh: TriangleMesh) -> float:
     """Return the share of interior edges with opposite angles above 180 degrees in sum."""
     F, n = mesh.F, mesh.n
-    i, j = F[:, [1, 2, 0]].ravel(), F[:, [2, 0, 1]].ravel()
+    i, j = opposite_edge_ends(F)
     keys = np.minimum(i, j) * n + np.maximum(i, j)
     _, edge, faces = np.unique(keys, return_inverse=True, return_counts=True)
     weight = np.bincount(edge, weights=half_cotangents(mesh.V, F).ravel())

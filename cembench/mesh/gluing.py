@@ -43,6 +43,12 @@ def twins_of_half_edges(F: Indices) -> Indices:
     return partners(F.ravel(), F[:, [1, 2, 0]].ravel())
 
 
+def opposite_edge_ends(F: Indices) -> tuple[Indices, Indices]:
+    """Return the ends (3 m,) each of the edges opposite to the corners, in F's order."""
+    after, before = (F.take(c, axis=1).ravel() for c in ((1, 2, 0), (2, 0, 1)))  # beats F[:, c]
+    return after, before
+
+
 def partners(i: Indices, j: Indices) -> Indices:
     """Return which other edge has the ends of each edge ij, in either order; -1 where none has.
 

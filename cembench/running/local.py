@@ -353,11 +353,9 @@ class _Run:
         """
         last = number >= self.options.most_rounds
         open_ = {
-            task.cell.label: task
-            for task in pending
-            if task.cell.label not in self.records
-            and task.cell.precision is not None
-            and (last or len(self.rounds[task.cell.label]) == number)
+            label: task
+            for label, task in self._until_precise(pending).items()
+            if last or len(self.rounds[label]) == number
         }
         partners = _partners(open_.values(), self.options.reference)
         rounds = {label: list(self.rounds[label].values()) for label in open_}
@@ -381,11 +379,9 @@ class _Run:
         if isinf(left) or number >= next_look(0, self.options.most_rounds):
             return
         open_ = {
-            task.cell.label: task
-            for task in pending
-            if task.cell.label not in self.records
-            and task.cell.precision is not None
-            and len(self.rounds[task.cell.label]) == number
+            label: task
+            for label, task in self._until_precise(pending).items()
+            if len(self.rounds[label]) == number
         }
         partners = _partners(open_.values(), self.options.reference)
         more = next_look(number, self.options.most_rounds) - number
@@ -396,6 +392,14 @@ class _Run:
             return
         for label in sorted(open_.keys() - cheapest(costs, partners, left)):
             self._save_measured(open_[label], "budget")
+
+    def _until_precise(self, pending: Sequence[Task]) -> dict[str, Task]:
+        """Return the unfinished cells without a fixed number of rounds, by label."""
+        return {
+            task.cell.label: task
+            for task in pending
+            if task.cell.label not in self.records and task.cell.precision is not None
+        }
 
     def _price(self, label: str) -> float:
         """Return the expected seconds of another round of a cell."""
