@@ -7,7 +7,7 @@ mesh, so that a user can repair them in one go.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
+from cembench.mesh.fans import vertices_of_several_fans
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -213,18 +214,18 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
     ]
     turned = np.zeros(0, dtype=bool)
     if len(kept):
-        edges, faces = topology.undirected_edges(kept)
         facing, turned, contradictions = oriented(kept)
+        areas = np.ones(0) if scale else relative_areas(V, kept)
         found += [
-            None if scale else _degenerate(number[degenerate(V, kept)], F),
-            _edges(edges, faces),
-            _one_sided(contradictions, faces),
-            _vertices(kept),
+            _degenerate(number[np.flatnonzero(areas <= DEGENERATE_AREA)], F),
+            *_edges(kept, contradictions),
+            _vertices(facing, len(V), consistent=not len(contradictions)),
             components(kept, len(V)) if connected else None,
         ]
     problems = [p for p in found if p is not None]
     if not problems:
-        return Examination(facing, (*_slivers(V, F), *_turned(turned)), ())
+        slivers = np.flatnonzero(areas <= SLIVER_AREA)
+        return Examination(facing, (*_slivers(slivers), *_turned(turned)), ())
     if len(kept):
         one_sided = any(p.defect is Defect.one_sided for p in problems)
         more = [
@@ -239,7 +240,42 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
 
 def degenerate(V: Points, F: Indices) -> Mask:
     """Whether each triangle has no area, up to rounding."""
-    return _thinner_than(DEGENERATE_AREA, V, F)
+    flat: Mask = relative_areas(V, F) <= DEGENERATE_AREA
+    return flat
+
+
+def relative_areas(V: Points, F: Indices) -> Points:
+    """Return each triangle's area over its longest edge squared; 0 where all corners coincide."""
+    found = np.zeros(len(F))
+    for block, corners in _corners(V, F):
+        (ax, bx, cx), (ay, by, cy), (az, bz, cz) = corners[:, [1, 2, 0]] - corners
+        double_area = np.sqrt(
+            (ay * bz - az * by) ** 2 + (az * bx - ax * bz) ** 2 + (ax * by - ay * bx) ** 2
+        )
+        longest = np.maximum(
+            np.maximum(ax**2 + ay**2 + az**2, bx**2 + by**2 + bz**2), cx**2 + cy**2 + cz**2
+        )
+        np.divide(double_area, 2 * longest, out=found[block], where=longest > 0)
+    return found
+
+
+def _extents(V: Points, F: Indices) -> Points:
+    """Return the largest side of each triangle's bounding box."""
+    found = np.empty(len(F))
+    for block, corners in _corners(V, F):
+        found[block] = np.ptp(corners, axis=1).max(axis=0)
+    return found
+
+
+def _corners(V: Points, F: Indices) -> Iterator[tuple[slice, Points]]:
+    """Yield blocks of triangles (k), and their corners (3, 3, k): x, y, z of the three of each.
+
+    A block stays in the processor's cache, and no array of all corners is made.
+    """
+    coordinates = np.ascontiguousarray(V.T)
+    for start in range(0, len(F), 1 << 14):
+        block = slice(start, start + (1 << 14))
+        yield block, coordinates[:, np.ascontiguousarray(F[block].T)]
 
 
 def out_of_scale(V: Points, F: Indices) -> Problem | None:
@@ -252,7 +288,7 @@ def out_of_scale(V: Points, F: Indices) -> Problem | None:
             int((finite > LARGEST_LENGTH).any(axis=1).sum()),
             f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}",
         )
-    spans = np.abs(V[F[:, [1, 2, 0]]] - V[F]).max(axis=(1, 2))
+    spans = _extents(V, F)
     tiny = np.flatnonzero((spans > 0) & (spans < SMALLEST_LENGTH))
     if not len(tiny):
         return None
@@ -359,19 +395,8 @@ def some(indices: NDArray[np.int64], most: int = 5) -> str:
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
 
 
-def _thinner_than(share: float, V: Points, F: Indices) -> Mask:
-    """Whether each triangle's area is at most this share of its longest edge squared."""
-    corners = V[F]
-    edges = corners[:, [1, 2, 0]] - corners
-    double_area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
-    longest = (edges**2).sum(axis=2).max(axis=1)
-    thin: Mask = double_area <= 2 * share * longest
-    return thin
-
-
-def _slivers(V: Points, F: Indices) -> tuple[Notice, ...]:
+def _slivers(thin: Indices) -> tuple[Notice, ...]:
     """Return a notice if some triangles are slivers."""
-    thin = np.flatnonzero(_thinner_than(SLIVER_AREA, V, F))
     if not len(thin):
         return ()
     told = (
@@ -451,24 +476,27 @@ def _duplicates(F: Indices, number: Indices) -> Problem | None:
     )
 
 
-def _edges(edges: Indices, faces: Indices) -> Problem | None:
-    """Return the problem that edges have more than two triangles, or None."""
+def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
+    """Return the problem that edges have more than two triangles, or that one side is all there is.
+
+    Where no contradiction of orientations is left, edges have at most two triangles.
+    """
+    if not len(contradictions):
+        return []
+    edges, faces = topology.undirected_edges(F)
     bad = np.flatnonzero(faces > 2)
     if not len(bad):
-        return None
+        return [_one_sided(contradictions)]
     i, j = edges[bad[0]].tolist()
-    return Problem(
-        Defect.edges,
-        len(bad),
+    told = (
         f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
-        f"{i}-{j} with {faces[bad[0]]}",
+        f"{i}-{j} with {faces[bad[0]]}"
     )
+    return [Problem(Defect.edges, len(bad), told)]
 
 
-def _one_sided(contradictions: Indices, faces: Indices) -> Problem | None:
-    """Return the problem that a surface with manifold edges is one-sided, or None."""
-    if not len(contradictions) or faces.max() > 2:
-        return None
+def _one_sided(contradictions: Indices) -> Problem:
+    """Return the problem that a surface with manifold edges is one-sided."""
     i, j = contradictions[0].tolist()
     return Problem(
         Defect.one_sided,
@@ -490,16 +518,25 @@ def _orientation(bad: Indices, F: Indices) -> Problem | None:
     )
 
 
-def _vertices(F: Indices) -> Problem | None:
-    """Return the problem that triangles at a vertex form several fans, or None."""
-    import igl
+def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:
+    """Return the problem that triangles at a vertex form several fans, or None.
 
-    # Triangles with one or two vertices are another defect; libigl is slow with many of them.
-    proper = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
+    Edges with more than two triangles, or orientations that contradict each other, take libigl's
+    general and slower test.
+    """
+    proper = F
+    if not consistent or (np.roll(F, 1, axis=1) == F).any():
+        # Triangles with one or two vertices are another defect.
+        proper = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
     if not len(proper):
         return None
-    manifold = igl.is_vertex_manifold(proper)  # also false for vertices in no triangle
-    bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
+    if consistent:
+        bad = vertices_of_several_fans(proper, n)
+    else:
+        import igl
+
+        manifold = igl.is_vertex_manifold(proper)  # also false for vertices in no triangle
+        bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
     if not len(bad):
         return None
     return Problem(

@@ -375,10 +375,10 @@ def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
 
 def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
     """Return the problem that a surface has handles, if it has."""
-    euler = topology.euler_characteristic(F, n)
     genus = topology.genus(F, n, loops)
     if not genus:
         return []
+    euler = 2 - 2 * genus - loops
     text = (
         f"the surface has genus {genus} (Euler characteristic {euler} with {loops} boundary "
         f"loop(s); allowed is {2 - loops}, genus 0): it has {genus} handle(s) like a torus"
@@ -400,10 +400,19 @@ def _breaks_of_definition_1(
     """Yield a text for each condition of Definition 1 that the mesh breaks."""
     inside = np.ones(n, dtype=bool)
     inside[np.concatenate(loops)] = False
-    graph = topology.vertex_graph(F, n)
     if not inside.any():
         yield "(ii), (iv) broken: the mesh has no interior vertex"
         return
+    boundary = ~inside
+    both_ends = sum(
+        np.count_nonzero(boundary[F[:, c]] & boundary[F[:, (c + 1) % 3]]) for c in range(3)
+    )
+    if both_ends == np.count_nonzero(boundary):
+        # No edge but those of the boundary joins two boundary vertices. So triangles with a common
+        # edge have interior vertices that are the same or neighbours: all of them form one piece;
+        # and a boundary vertex without an interior neighbour would have such an edge.
+        return
+    graph = topology.vertex_graph(F, n)
     interior = np.flatnonzero(inside)
     pieces, _ = scipy.sparse.csgraph.connected_components(
         graph[interior][:, interior], directed=False

@@ -3,11 +3,13 @@ import pytest
 from cembench.algorithms.harmonic_circle import harmonic_circle
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from scipy.sparse.csgraph import connected_components
 
 from cembench import DiskMesh, HoledMesh, MeshError, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import ParameterError
 from cembench.core.notices import NoticeKind
+from cembench.mesh import topology
 from tests import gallery
 
 
@@ -73,6 +75,31 @@ def test_definition_1_is_reported_where_it_fails():
     notices = DiskMesh.from_arrays(V, F).notices
     assert any("(iv) broken" in notice.text for notice in notices)
     assert flat_disk(600).notices == ()
+
+
+def test_definition_1_of_ragged_disks_as_by_its_words():
+    """Where no chord joins two boundary vertices the graph is not searched; the answer is equal."""
+    whole = flat_disk(400)
+    centres = whole.V[whole.F].mean(axis=1)
+    rng = np.random.default_rng(4)
+    seen = []
+    for _ in range(60):
+        away = np.linalg.norm(centres - rng.uniform(-0.8, 0.8, 3) * [1, 1, 0], axis=1)
+        F = whole.F[away < rng.uniform(0.2, 0.6)]
+        used, F = np.unique(F, return_inverse=True)
+        try:
+            disk = DiskMesh.from_arrays(whole.V[used], F.reshape(-1, 3))
+        except MeshError:
+            continue
+        inside = np.zeros(disk.n, dtype=bool)
+        inside[disk.interior] = True
+        graph = topology.vertex_graph(disk.F, disk.n)
+        pieces, _ = connected_components(graph[inside][:, inside])
+        ears = (graph[~inside][:, inside].sum(axis=1) == 0).any()
+        seen.append((pieces > 1, bool(ears)))
+        told = " ".join(notice.text for notice in disk.notices)
+        assert ("pieces, not one" in told, "(iv) broken" in told) == seen[-1]
+    assert {(False, False), (False, True)} <= set(seen)
 
 
 V, F = gallery.flat_rectangle()
