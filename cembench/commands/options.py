@@ -262,9 +262,10 @@ class Solves(StrEnum):
 
 
 class Backend(StrEnum):
-    """The libraries that factor matrices."""
+    """The libraries that factor matrices, and for CHOLMOD how its rows are ordered."""
 
     cvxopt = "cvxopt"
+    cvxopt_metis = "cvxopt-metis"
     superlu = "superlu"
     pardiso = "pardiso"
 
@@ -272,7 +273,10 @@ class Backend(StrEnum):
 SolvesOption = Annotated[
     Solves, typer.Option(help="Reuse factorisations, or factor at every solve.")
 ]
-BackendOption = Annotated[Backend, typer.Option(help="The library that factors matrices.")]
+BackendOption = Annotated[
+    Backend,
+    typer.Option(help="The library that factors matrices. cvxopt-metis suits large meshes."),
+]
 
 
 def installed_backend(backend: Backend) -> str:

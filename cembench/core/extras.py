@@ -20,6 +20,7 @@ class Extra(StrEnum):
     CLUSTER = "cluster"
     FETCH = "fetch"
     FORMATS = "formats"
+    METIS = "metis"
     PARDISO = "pardiso"
     PARQUET = "parquet"
     REPORT = "report"
@@ -35,6 +36,7 @@ MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.CLUSTER: ("dask", "distributed", "dask_jobqueue"),
     Extra.FETCH: ("pooch", "requests"),
     Extra.FORMATS: ("OpenEXR", "meshio", "nibabel", "trimesh"),
+    Extra.METIS: ("pymetis",),
     Extra.PARDISO: ("pypardiso",),
     Extra.PARQUET: ("pyarrow",),
     Extra.REPORT: ("jinja2", "markupsafe", "plotly"),

@@ -5,13 +5,27 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import Literal, get_args
 
-Backend = Literal["cvxopt", "superlu", "pardiso"]
-_MODULES: dict[Backend, str] = {"cvxopt": "cvxopt", "superlu": "scipy", "pardiso": "pypardiso"}
+from cembench.core.extras import Extra
+
+Backend = Literal["cvxopt", "cvxopt-metis", "superlu", "pardiso"]
+_MODULES: dict[Backend, tuple[str, ...]] = {
+    "cvxopt": ("cvxopt",),
+    "cvxopt-metis": ("cvxopt", "pymetis"),
+    "superlu": ("scipy",),
+    "pardiso": ("pypardiso",),
+}
+#: The extras that bring back ends.
+EXTRAS: dict[str, Extra] = {"cvxopt-metis": Extra.METIS, "pardiso": Extra.PARDISO}
 
 
 def available_backends() -> list[Backend]:
     """Return the back ends whose libraries are installed."""
-    return [name for name in get_args(Backend) if find_spec(_MODULES[name])]
+    return [name for name in get_args(Backend) if all(map(find_spec, _MODULES[name]))]
+
+
+def uses_cholmod(backend: Backend) -> bool:
+    """Whether a back end factors by CHOLMOD, with one order of the rows or the other."""
+    return "cvxopt" in _MODULES[backend]
 
 
 def default_backend() -> Backend:

@@ -19,8 +19,14 @@ from numpy.typing import NDArray
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite, ParameterError
-from cembench.core.extras import Extra, command
-from cembench.linear_algebra.backends import Backend, available_backends, default_backend
+from cembench.core.extras import command
+from cembench.linear_algebra.backends import (
+    EXTRAS,
+    Backend,
+    available_backends,
+    default_backend,
+    uses_cholmod,
+)
 from cembench.linear_algebra.lower_triangle import both_triangles
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.work import count_columns
@@ -65,8 +71,9 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
     ----------
     solves : {"reuse", "backslash"}
         Whether to reuse a factorisation or to factor for every solve.
-    backend : {"cvxopt", "superlu", "pardiso"}, optional
-        The library that factors (default: cvxopt, or superlu if cvxopt is missing).
+    backend : {"cvxopt", "cvxopt-metis", "superlu", "pardiso"}, optional
+        The library that factors (default: cvxopt, or superlu if cvxopt is missing); cvxopt-metis
+        orders the rows by nested dissection instead of minimum degree.
 
     Yields
     ------
@@ -94,7 +101,7 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
     if backend not in get_args(Backend):
         raise ParameterError(f"backend={backend!r} is unknown; allowed: {_names(Backend)}.")
     if backend not in available_backends():
-        brings = command(Extra.PARDISO) if backend == Extra.PARDISO else f"pip install {backend}"
+        brings = command(EXTRAS[backend]) if backend in EXTRAS else f"pip install {backend}"
         raise ParameterError(
             f"backend={backend!r} is not installed; install it with `{brings}`, or use one of: "
             f"{', '.join(available_backends())}."
@@ -121,7 +128,7 @@ def keeps_factors() -> bool:
 def shows_trailing_block() -> bool:
     """Whether factors show their trailing block here, so that solves can be halved."""
     how = _current.get()
-    return how.solves == "reuse" and how.backend == "cvxopt"
+    return how.solves == "reuse" and uses_cholmod(how.backend)
 
 
 Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -182,7 +189,7 @@ class Cholesky:
     @property
     def _read(self) -> scipy.sparse.csc_array:
         """What the library is given: CHOLMOD reads no more than the lower triangle."""
-        return self._given if self._how.backend == "cvxopt" else self._A
+        return self._given if uses_cholmod(self._how.backend) else self._A
 
     @cached_property
     def _A(self) -> scipy.sparse.csc_array:
@@ -319,20 +326,21 @@ def _count(b: NDArray[Any], share: float = 1.0) -> None:
 
 def _factor(backend: Backend, A: scipy.sparse.csc_array, leading: int | None) -> _Factor:
     """Factor a matrix with a back end."""
-    if backend == "cvxopt" and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
-        from cembench.linear_algebra.cholmod import cholmod_solver
-
-        return _SeparateFactors(cholmod_solver, A, leading)
-    return _factor_class(backend)(A, leading)
+    of_class = _factor_class(backend)
+    if uses_cholmod(backend) and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
+        return _SeparateFactors(lambda block: of_class(block, None).solve, A, leading)
+    return of_class(A, leading)
 
 
 def _factor_class(backend: Backend) -> Callable[[scipy.sparse.csc_array, int | None], _Factor]:
     """Return the constructor of a back end's factors."""
     # Imported on demand: an extra may be missing, and start-up should not load a solver.
-    if backend == "cvxopt":
+    if uses_cholmod(backend):
         from cembench.linear_algebra.cholmod import CholmodFactor
+        from cembench.linear_algebra.orderings import minimum_degree, nested_dissection
 
-        return CholmodFactor
+        order = nested_dissection if backend == "cvxopt-metis" else minimum_degree
+        return partial(CholmodFactor, order=order)
     if backend == "superlu":
         from cembench.linear_algebra.superlu import superlu_solver
 

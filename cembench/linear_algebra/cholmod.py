@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from cvxopt import amd, cholmod, matrix, spmatrix
+from cvxopt import cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
-from cembench.linear_algebra.supernodes import factor_entries, trailing_block
+from cembench.linear_algebra.orderings import as_permutation, minimum_degree, nested_dissection
+from cembench.linear_algebra.supernodes import factor_entries, order_of, trailing_block
 from cembench.linear_algebra.triangular import triangle_solved, triangle_times
 from cembench.linear_algebra.work import count_analysis, count_factorisation
 
@@ -25,18 +26,24 @@ from cembench.linear_algebra.work import count_analysis, count_factorisation
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
 
 
+#: From a lower triangle to the order of its rows.
+Order = Callable[[spmatrix], NDArray[np.int64]]
+
+
 class CholmodFactor:
     """A factor of a symmetric positive definite matrix A; only its lower triangle is read.
 
     `leading` is the order of the block to keep first. Its factor is then the leading block of this
-    factor, which :meth:`solve_leading` uses.
+    factor, which :meth:`solve_leading` uses. `order` orders rows and columns.
     """
 
-    def __init__(self, A: sparse.csc_array, leading: int | None) -> None:
+    def __init__(
+        self, A: sparse.csc_array, leading: int | None, *, order: Order = minimum_degree
+    ) -> None:
         self._leading = leading
         with phase("ordering"):
             self._lower, self._below = _lower_triangle(A)
-            self._permutation = _fill_reducing_order(self._lower, leading)
+            self._permutation = _permutation(self._lower, leading, order)
         self._analyse()
         self._factor()
 
@@ -125,11 +132,6 @@ class CholmodFactor:
         return np.array(x)[: self._leading]
 
 
-def cholmod_solver(A: sparse.csc_array) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
-    """Factor A and return a function that solves with it."""
-    return CholmodFactor(A, None).solve
-
-
 def _set_options() -> None:
     """Set the options of CHOLMOD, which are global."""
     cholmod.options["supernodal"] = 2
@@ -154,11 +156,25 @@ def _in_order(A: sparse.csc_array) -> sparse.csc_array:
     return A if A.has_sorted_indices else A.sorted_indices()
 
 
-def _fill_reducing_order(lower: spmatrix, leading: int | None) -> matrix:
-    """Return the approximate minimum degree ordering, of the leading block alone if given."""
+def _permutation(lower: spmatrix, leading: int | None, order: Order) -> matrix:
+    """Return the order of all rows, or that of the leading block with the others after it."""
     if leading is None:
-        return amd.order(lower)
-    n = lower.size[0]
-    first = amd.order(lower[:leading, :leading]) if leading else matrix(0, (0, 1))
-    order = np.concatenate([np.array(first).ravel(), np.arange(leading, n)])
-    return matrix(order, (n, 1), "i")
+        return as_permutation(order(lower))
+    first = np.zeros(0, dtype=np.int64)
+    if leading:
+        block = lower[:leading, :leading]
+        first = order(block)
+        if order is nested_dissection:
+            first = _postordered(block, first)
+    return as_permutation(np.concatenate([first, np.arange(leading, lower.size[0])]))
+
+
+def _postordered(lower: spmatrix, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return an equivalent order by the postorder of the elimination tree, as AMD's already is.
+
+    Otherwise columns of one supernode would not be neighbours.
+    """
+    _set_options()
+    cholmod.options["postorder"] = True
+    found = order_of(cholmod.symbolic(lower, as_permutation(order)), len(order))
+    return order if found is None else found

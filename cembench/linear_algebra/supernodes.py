@@ -1,4 +1,4 @@
-"""The trailing block of CHOLMOD's supernodal factor, for which cvxopt has no function.
+"""Trailing block and order of CHOLMOD's supernodal factor, for which cvxopt has no functions.
 
 cvxopt returns a factor as a capsule around CHOLMOD's ``cholmod_factor``, a structure whose layout
 is the same in versions 2 to 5 (SuiteSparse 4 to 7). It is only read, and only after its plain
@@ -83,6 +83,14 @@ def factor_entries(factor: Any) -> int:
     return int(held.xsize) if held is not None and _as_expected(held, held.n) else 0
 
 
+def order_of(factor: Any, n: int) -> NDArray[np.int64] | None:
+    """Return the order of rows (n,) of a symbolic supernodal factor; None if it is unexpected."""
+    held = _held(factor)
+    if held is None or not _as_expected(held, n, numeric=False):
+        return None
+    return np.array(_array(held.Perm, ctypes.c_int64, n))
+
+
 def _held(factor: Any) -> _CholmodFactor | None:
     """Return the structure in a capsule; None if the capsule is not as expected."""
     api = ctypes.pythonapi
@@ -95,11 +103,14 @@ def _held(factor: Any) -> _CholmodFactor | None:
     return ctypes.cast(pointer_of(factor, name), ctypes.POINTER(_CholmodFactor)).contents
 
 
-def _as_expected(held: _CholmodFactor, n: int) -> bool:
-    """Whether this is a finished real supernodal factor L L^T of order n with 64-bit indices."""
+def _as_expected(held: _CholmodFactor, n: int, *, numeric: bool = True) -> bool:
+    """Whether this is a real supernodal factor L L^T of order n with 64-bit indices.
+
+    A symbolic factor has no numbers yet.
+    """
     flags = (held.is_ll, held.is_super, held.itype, held.xtype, held.dtype)
     sizes = 0 < held.nsuper <= n <= held.xsize and held.nsuper <= held.ssize
-    return flags == (1, 1, 2, 1, 0) and held.n == held.minor == n and sizes
+    return flags == (1, 1, 2, int(numeric), 0) and held.n == held.minor == n and sizes
 
 
 def _array(address: int, kind: Any, length: int) -> NDArray[Any]:

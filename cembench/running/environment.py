@@ -23,7 +23,7 @@ THREAD_VARIABLES = (
 )
 #: Names the machine in records; set it where the system's name changes, as in containers.
 MACHINE_VARIABLE = "CEMBENCH_MACHINE"
-_LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pypardiso", "pydantic")
+_LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pymetis", "pypardiso", "pydantic")
 
 
 def with_threads(count: int) -> dict[str, str]:

@@ -32,6 +32,8 @@ Complex = NDArray[np.complex128]
 
 #: A map with a mean angle error above this multiple of the yardstick's is far from conformal.
 FAR = 2.0
+#: Below this mean angle error, in degrees, none is, so a large smooth surface needs no yardstick.
+CLOSE = 0.1
 #: So is a map above this share of the mean angle error of collapsed triangles; the yardstick may be
 #: as bad there.
 COLLAPSED = 0.25
@@ -51,10 +53,13 @@ def quality_notes(
             "of least energy"
         )
         notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, told))
-    known = yardstick(target, mesh, uv)
+    error = float(angle_errors(mesh, uv).mean())
+    known = yardstick(target, mesh, uv) if error > CLOSE else None
     if known is None:
         return notes
-    error, reachable = (float(angle_errors(mesh, z).mean()) for z in (uv, known))
+    reachable = float(angle_errors(mesh, known).mean())
+    if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh)):
+        return notes
     causes = likely_causes(mesh, uv, extras)
     if error > FAR * reachable:
         told = (
@@ -63,7 +68,7 @@ def quality_notes(
             f"{'; '.join(causes) or 'the method, not the mesh'}"
         )
         notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
-    elif error > COLLAPSED * collapsed_error(mesh):
+    else:
         told = (
             f"far from conformal: the mean angle error is {error:.2f} degrees, and a harmonic map "
             f"of this mesh by harmonic measure is no better ({reachable:.2f}). "

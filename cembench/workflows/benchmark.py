@@ -226,8 +226,8 @@ def benchmark(
         The linear-algebra policies: reuse a factorisation while its matrix is unchanged, or
         factor at every solve.
     backend : str
-        The library that factors matrices: cvxopt, superlu or pardiso; default: cvxopt if it is
-        installed, else superlu.
+        The library that factors matrices: cvxopt, cvxopt-metis, superlu or pardiso; default:
+        cvxopt if it is installed, else superlu.
     threads : int
         Threads of the numerical libraries.
     timeout : float

@@ -1,0 +1,42 @@
+"""Fill-reducing orderings of sparse symmetric matrices for CHOLMOD.
+
+Approximate minimum degree (AMD) is cheap. Nested dissection (METIS) takes several times as long; on
+large irregular meshes its factors are smaller, so it pays for many factorisations of one pattern,
+or where memory is short.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from cvxopt import amd, matrix, spmatrix
+from numpy.typing import NDArray
+from scipy import sparse
+
+
+def minimum_degree(lower: spmatrix) -> NDArray[np.int64]:
+    """Return the AMD ordering (n,) of the matrix with this lower triangle."""
+    return np.array(amd.order(lower)).ravel()
+
+
+def nested_dissection(lower: spmatrix) -> NDArray[np.int64]:
+    """Return the METIS ordering (n,) of the matrix with this lower triangle."""
+    import pymetis  # an extra
+
+    starts, rows, _ = (np.array(part).ravel() for part in lower.CCS)
+    ones = np.ones(len(rows), dtype=np.int8)
+    below = sparse.csc_array((ones, rows, starts), shape=lower.size)
+    strictly = sparse.tril(below, -1, format="csc")
+    if not strictly.nnz:
+        return np.arange(lower.size[0])
+    graph = sparse.csr_array(strictly + strictly.T)
+    whole = pymetis.CSRAdjacency(
+        adj_starts=graph.indptr.astype(np.int32), adjacent=graph.indices.astype(np.int32)
+    )
+    order = np.empty(lower.size[0], dtype=np.int64)
+    order[:] = pymetis.nested_dissection(whole)[0]  # of a type that cvxopt does not know
+    return order
+
+
+def as_permutation(order: NDArray[np.int64]) -> matrix:
+    """Return an ordering as cvxopt's functions take it."""
+    return matrix(order, (len(order), 1), "i")
