@@ -1,8 +1,8 @@
 """Estimate the seconds and the memory of a run before it starts.
 
 The seconds of a call are taken from an earlier record of the same cell, or else from a power law in
-the number of triangles through the algorithm's records. Without records, the usual seconds of
-built-in algorithms are used (:mod:`cembench.running.usual_seconds`), and for other algorithms those
+the number of triangles through the algorithm's records. Without records, the usual costs of
+built-in algorithms are used (:mod:`cembench.running.usual_costs`), and for other algorithms those
 of the paper's slowest one, which they seldom exceed.
 """
 
@@ -17,7 +17,7 @@ from typing import Literal
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
-from cembench.running.usual_seconds import FACES, USUAL
+from cembench.running.usual_costs import FACES, USUAL, USUAL_BYTES
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
@@ -33,6 +33,8 @@ CHECK_SECONDS_A_FACE = 2e-6
 #: Bytes of an empty process, and per triangle, if nothing is recorded.
 ROUGH_BYTES = 150e6
 ROUGH_BYTES_A_FACE = 2500.0
+#: From this number of triangles on, memory is estimated before a call is tried.
+LARGE = 500_000
 #: Typical rounds until a cell is precise, on a quiet machine.
 USUAL_ROUNDS = 20
 #: Substitute for an unknown algorithm.
@@ -83,7 +85,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     memory = (
         max(_bytes_at(faces, size, peak) for size, peak in peaks)
         if peaks
-        else ROUGH_BYTES + ROUGH_BYTES_A_FACE * faces
+        else ROUGH_BYTES + USUAL_BYTES.get(cell.algorithm, ROUGH_BYTES_A_FACE) * faces
     )
     check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
     start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
@@ -92,6 +94,16 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     least = (cell.repeats or 1) * round_
     rounds = (cell.repeats or USUAL_ROUNDS) * round_
     return Estimate(call, check + rounds, memory, basis, check + least)
+
+
+def expected_bytes(algorithm: str, faces: int) -> float | None:
+    """Return the memory of a built-in algorithm's call on a large surface; None if not known.
+
+    Below :data:`LARGE` triangles memory depends on more than their number, and is seldom short.
+    """
+    if faces < LARGE or algorithm not in USUAL_BYTES:
+        return None
+    return ROUGH_BYTES + USUAL_BYTES[algorithm] * faces
 
 
 def planned_seconds(costs: Sequence[Estimate], budget: float | None) -> float:

@@ -59,6 +59,7 @@ from cembench.results.samples import Samples
 from cembench.results.store import Store
 from cembench.running.comparable import impossible, incomparable, is_cold
 from cembench.running.environment import describe_environment, with_threads
+from cembench.running.estimate import expected_bytes
 from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.judge import Promise
@@ -306,18 +307,27 @@ class _Run:
             if task.cell.label in self.checks:
                 self._resume_after_check(task)
         if self.options.jobs < 2 or len(new) < 2:
-            for task in new:
-                with self._checking(task):
-                    outcome, uv = self.launcher.check(task)
-                self._keep_check(task, outcome, uv)
+            self._check_alone(new)
             return
+        short = []
         with ExitStack() as stack:
             launchers = self.launcher.for_checks(self.options.jobs)
             for launcher in launchers:
                 stack.callback(launcher.close)
             for task, (outcome, uv), launcher in check_side_by_side(new, launchers, self._checking):
+                if outcome.status == "out_of_memory":
+                    short.append(task)  # it had a share only
+                    continue
                 self.launcher.take_over(launcher, task)
                 self._keep_check(task, outcome, uv)
+        self._check_alone(short)
+
+    def _check_alone(self, tasks: Sequence[Task]) -> None:
+        """Check one cell after the other, each with all the memory."""
+        for task in tasks:
+            with self._checking(task):
+                outcome, uv = self.launcher.check(task)
+            self._keep_check(task, outcome, uv)
 
     def _checking(self, task: Task) -> _Process:
         return _Process(self.watcher, task, self._step(task, None))
@@ -612,7 +622,14 @@ class Launcher:
             self._server = None
 
     def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
-        """Return the outcome of one call, and its map if it is finite and of the right shape."""
+        """Return the outcome of one call, and its map if it is finite and of the right shape.
+
+        A large surface that needs more than the memory limit by estimate is not tried.
+        """
+        limit = self.options.memory_bytes
+        expected = expected_bytes(task.cell.algorithm, task.mesh.m)
+        if limit is not None and expected is not None and expected > limit:
+            return not_ok("out_of_memory", _too_large(task.mesh.m, expected, limit)), None
         answer = self._run(task, "check", self.options.timeout)
         if answer.outcome is None:
             return _unreadable("it holds no outcome"), None
@@ -924,7 +941,16 @@ def _outcome_of(ending: ProcessEnd, seconds: float, memory_bytes: int | None) ->
     return not_ok("failed", _fault(FaultKind.PROCESS_ENDED, told), **seen)
 
 
-def _mib(size: int) -> str:
+def _too_large(faces: int, expected: float, limit: int) -> Fault:
+    """Return the fault that a call was not started, since its memory would not suffice."""
+    told = (
+        f"not started: {faces:,} triangles need about {_mib(expected)} by estimate, the limit is "
+        f"{_mib(limit)}; --memory sets another one"
+    )
+    return _fault(FaultKind.OUT_OF_MEMORY, told)
+
+
+def _mib(size: float) -> str:
     return f"{size / 2**20:,.0f} MiB"
 
 

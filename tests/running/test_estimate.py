@@ -1,8 +1,14 @@
 import pytest
 
 from cembench.registry import load_registry
-from cembench.running.estimate import FORK_SECONDS, estimate, fit_power_law
-from cembench.running.usual_seconds import USUAL
+from cembench.running.estimate import (
+    FORK_SECONDS,
+    LARGE,
+    estimate,
+    expected_bytes,
+    fit_power_law,
+)
+from cembench.running.usual_costs import USUAL, USUAL_BYTES
 from tests.results.test_comparison import record_of
 
 
@@ -73,6 +79,13 @@ def test_before_anything_is_recorded_it_is_within_a_factor_of_two(
     assert 0.5 < estimate(cell, faces, []).call_seconds / seconds < 2
 
 
-def test_every_built_in_algorithm_has_its_usual_seconds():
+def test_every_built_in_algorithm_has_its_usual_costs():
     own = [a.name for a in load_registry().algorithms.values() if a.origin == "cembench"]
-    assert not set(own) - set(USUAL)
+    assert set(own) <= set(USUAL)
+    assert set(own) <= set(USUAL_BYTES)
+
+
+def test_memory_is_expected_of_large_surfaces_and_known_algorithms_only():
+    assert expected_bytes("direct-cem", LARGE - 1) is None
+    assert expected_bytes("somebody's", 10**8) is None
+    assert 5e9 < expected_bytes("direct-cem", 10_000_000) < 15e9

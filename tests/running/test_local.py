@@ -69,6 +69,23 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause):
     assert (uv is None) == (name not in kept)
 
 
+def test_a_large_surface_that_memory_cannot_take_is_not_tried(monkeypatch):
+    monkeypatch.setattr("cembench.running.local.expected_bytes", lambda *_: 2.0 * MEMORY)
+    (task,) = tasks_of("good")
+    record, uv = map_once(task, Options(memory_bytes=MEMORY))
+    assert (record.outcome.status, uv) == ("out_of_memory", None)
+    assert "need about 1,000 MiB by estimate, the limit is 500 MiB" in record.outcome.cause
+    assert "--memory" in record.outcome.cause
+    assert map_once(task, Options(memory_bytes=3 * MEMORY))[0].outcome.status == "ok"
+
+
+def test_what_is_short_of_memory_beside_others_is_checked_alone(monkeypatch, tmp_path):
+    monkeypatch.setattr("cembench.running.local.expected_bytes", lambda *_: 0.75 * MEMORY)
+    options = Options(memory_bytes=MEMORY, jobs=2)
+    found = run_tasks(tasks_of("good", "harmonic-circle"), Store(tmp_path), options)
+    assert [record.outcome.status for record in found] == ["ok", "ok"]
+
+
 def test_what_does_not_end_is_ended(tmp_path):
     options = Options(timeout=1, memory_bytes=MEMORY)
     for record in run_tasks(tasks_of("sleeps", "spins"), Store(tmp_path), options):
