@@ -1,4 +1,4 @@
-"""What nested dissection and a second thread give on large surfaces: a table for docs/algorithms.md.
+"""What METIS and a second thread give on large surfaces: a table for docs/algorithms.md.
 
 Every line is a fresh process that calls one algorithm once, after a small surface has warmed up the
 libraries. Seconds are those of the clock, since CPU seconds would add the threads up::
