@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -107,7 +107,7 @@ def _by_factor(
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
     S = bordered.dirichlet_to_neumann()
     seen, weights = bordered.swept_to_boundary(measures).T
-    start, begun = _start(mesh, S, seen, weights)
+    start, begun = _start(S, _starts(mesh, seen), weights)
     held = weights if own_gauge else start.outer_measure
     found = minimise(S, start, held, **until)
     return start, begun, found, bordered.harmonic_extension
@@ -121,18 +121,26 @@ def _by_solves(
         return None
     interior = InteriorLaplacian(mesh, L, mesh.boundary)
     seen, weights = interior.swept_to_boundary(measures).T
-    lengths = edge_lengths(mesh, mesh.boundary)
-    start = in_gauge(CircleDomain.of_arcs(arcs_of_measure(seen, lengths)), weights)
-    held = weights if own_gauge else start.outer_measure
+    arcs, begun = _starts(mesh, seen), "harmonic measure"
+    start = in_gauge(CircleDomain.of_arcs(arcs[begun]), weights)
     S = interior.dirichlet_to_neumann(start.arcs)
-    here = EnergyModel(S, in_gauge(start, held), held)
-    otherwise = in_gauge(CircleDomain.of_arcs(lengths), weights)
+    here = _at_start(S, start, weights, own_gauge)
+    otherwise = in_gauge(CircleDomain.of_arcs(arcs["arc length"]), weights)
     if estimated_energy(otherwise.points, start.arcs) < SURELY_MORE * here.energy:
-        return None  # arc length may be the better start
+        start, begun = _start(S, arcs, weights)
+        here = _at_start(S, start, weights, own_gauge)
     found = quasi_newton_minimum(here, **until)
     if found is None:
         return None
-    return start, "harmonic measure", found, interior.harmonic_extension
+    return start, begun, found, interior.harmonic_extension
+
+
+def _at_start(
+    S: DirichletToNeumann, start: CircleDomain, weights: Real, own_gauge: bool
+) -> EnergyModel:
+    """Return the energy at the start, in the gauge that the minimisation holds."""
+    held = weights if own_gauge else start.outer_measure
+    return EnergyModel(S, in_gauge(start, held), held)
 
 
 def _share(cost: float, energies: tuple[float, ...]) -> float:
@@ -141,15 +149,16 @@ def _share(cost: float, energies: tuple[float, ...]) -> float:
     return min(1.0, (cost * energies[-1] / fallen) ** 0.5) if fallen > 0 else 0.0
 
 
-def _start(
-    mesh: DiskMesh, S: DirichletToNeumann, seen: Real, weights: Real
-) -> tuple[CircleDomain, str]:
-    """Return the start of lower energy in the gauge, harmonic measure or arc length, and its name.
-
-    `seen` is the harmonic measure from the middle triangle.
-    """
+def _starts(mesh: DiskMesh, seen: Real) -> dict[str, Real]:
+    """Return the arcs (B,) of both starts; `seen` is the measure from the middle triangle."""
     lengths = edge_lengths(mesh, mesh.boundary)
-    arcs = {"harmonic measure": arcs_of_measure(seen, lengths), "arc length": lengths}
+    return {"harmonic measure": arcs_of_measure(seen, lengths), "arc length": lengths}
+
+
+def _start(
+    S: DirichletToNeumann, arcs: Mapping[str, Real], weights: Real
+) -> tuple[CircleDomain, str]:
+    """Return the start of lower energy in the gauge, and its name."""
     models = {}
     for name in arcs:
         domain = in_gauge(CircleDomain.of_arcs(arcs[name]), weights)

@@ -145,13 +145,18 @@ def test_what_it_gives_up_is_mapped_the_usual_way_to_the_bit(way, monkeypatch, n
     assert other.extras == usual.extras
 
 
-def test_where_arc_length_may_be_the_better_start_the_usual_way_decides(way):
+def test_arc_length_is_compared_where_it_may_be_the_better_start_without_another_factor(way):
     mesh = spherical_cap(4000)
     usual, _ = way(mesh, False)
     assert usual.extras["start"] == "arc length"
-    other, taken = way(mesh, True, surely_more=USUAL)
-    assert not taken
-    np.testing.assert_array_equal(other.uv, usual.uv)
+    with counting() as work:
+        other, taken = way(mesh, True, surely_more=USUAL)
+    assert taken
+    assert work.order == len(mesh.interior)
+    assert work.numeric == 2  # and L_bb
+    assert other.extras["start"] == "arc length"
+    assert other.energy_history[-1] == pytest.approx(usual.energy_history[-1], rel=AFTER_WAY_BACK)
+    assert abs(other.uv - usual.uv).max() < 1e-5
 
 
 def test_a_boundary_crowded_far_below_rounding_is_mapped_all_the_same(way):
