@@ -11,6 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
+from cembench.core.blocks import blocks
 from cembench.core.clock import phase
 from cembench.mesh.gluing import opposite_edge_ends, twins_of_half_edges
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -23,7 +24,10 @@ def corner_products(
 
     V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is at vertex ``F[t, c]``. Areas are unsigned.
     """
-    return _products(*_opposite_edges(V, F))
+    dots, double_area = np.empty((len(F), 3)), np.empty(len(F))
+    for block in blocks(len(F)):
+        dots[block], double_area[block] = _products(*_opposite_edges(V, F[block]))
+    return dots, double_area
 
 
 def _opposite_edges(
@@ -58,7 +62,8 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
     V and corners as for :func:`corner_products`.
     """
     dots, double_area = corner_products(V, F)
-    return dots / (2 * double_area[:, None])
+    dots /= 2 * double_area[:, None]
+    return dots
 
 
 def laplacian_of_weights(
@@ -118,10 +123,14 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc
     with phase("laplacian"):
         if not delaunay:
             return cotangent_laplacian(mesh.V, mesh.F)
-        edges = _opposite_edges(mesh.V, mesh.F)
-        dots, double_area = _products(*edges)
-        lengths = np.stack([np.sqrt(sum(x * x for x in e.T)) for e in edges], axis=1)
-        F, _, weights = intrinsic_delaunay(mesh.F, lengths, dots / (2 * double_area[:, None]))
+        lengths, weights = np.empty((mesh.m, 3)), np.empty((mesh.m, 3))
+        for block in blocks(mesh.m):
+            edges = _opposite_edges(mesh.V, mesh.F[block])
+            dots, double_area = _products(*edges)
+            weights[block] = dots / (2 * double_area[:, None])
+            for k, e in enumerate(edges):
+                lengths[block, k] = np.sqrt(sum(x * x for x in e.T))
+        F, _, weights = intrinsic_delaunay(mesh.F, lengths, weights)
         return laplacian_of_weights(F, weights, mesh.n)
 
 

@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
@@ -270,11 +271,10 @@ def _extents(V: Points, F: Indices) -> Points:
 def _corners(V: Points, F: Indices) -> Iterator[tuple[slice, Points]]:
     """Yield blocks of triangles (k), and their corners (3, 3, k): x, y, z of the three of each.
 
-    A block stays in the processor's cache, and no array of all corners is made.
+    No array of all corners is made.
     """
     coordinates = np.ascontiguousarray(V.T)
-    for start in range(0, len(F), 1 << 14):
-        block = slice(start, start + (1 << 14))
+    for block in blocks(len(F)):
         yield block, coordinates[:, np.ascontiguousarray(F[block].T)]
 
 
