@@ -1,7 +1,7 @@
-"""How much faster is CEM? Fills README's table from the tables of a kept report.
+"""How much faster is CEM? Fills README's table from the tables of kept reports.
 
 python -m benchmarks.readme_speedups
-python -m benchmarks.readme_speedups --report reports/standard --print
+python -m benchmarks.readme_speedups --report reports/paper --print
 
 Averages have a 95 % interval over surfaces and rounds (hierarchical bootstrap, as in the report's
 table of certainty) where most cells have the rounds for one.
@@ -23,11 +23,10 @@ from numpy.typing import NDArray
 from benchmarks.pages import ROOT, fill
 from cembench.results.many import average_interval
 
-REPORT = ROOT / "reports/paper"
-TABLES = REPORT / "tables"
 README = ROOT / "README.md"
-#: A policy of solving and the table of its averages.
+#: A policy of solving, the table of its averages, and the kept report that README quotes.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
+REPORTS = {"reuse": ROOT / "reports/standard", "backslash": ROOT / "reports/paper"}
 #: The readings that are shown, by the beginning of their rows.
 MEAN, GEOMETRIC = "mean rate (as the paper)", "geometric mean of ratios - 1"
 #: The same of ratios t / t_CEM, along the last axis.
@@ -76,13 +75,16 @@ def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
     return f" ({found.low:.1f} to {found.high:.1f})" if found else ""
 
 
-def table(folder: Path = TABLES) -> str:
-    """Return README's table in Markdown, from the tables of a report and its records."""
-    records = folder.parent / "records.csv"
-    there = {policy: folder / file for policy, file in POLICIES.items()}
+def table(report: Path | None = None) -> str:
+    """Return README's table in Markdown, from the tables of kept reports and their records.
+
+    Without a report each policy has the one that README quotes.
+    """
+    folders = {policy: report or kept for policy, kept in REPORTS.items()}
+    there = {policy: folders[policy] / "tables" / file for policy, file in POLICIES.items()}
     found = {policy: averages(file) for policy, file in there.items() if file.exists()}
     if not found:
-        raise SystemExit(f"{folder} holds no {' or '.join(POLICIES.values())}.")
+        raise SystemExit(f"{report}/tables holds no {' or '.join(POLICIES.values())}.")
     heads = [f"`{policy}`: mean | geometric" for policy in found]
     lines = [
         f"| CEM against | printed: mean | geometric | {' | '.join(heads)} |",
@@ -94,6 +96,7 @@ def table(folder: Path = TABLES) -> str:
         for policy, rows in found.items():
             for reading in (MEAN, GEOMETRIC):
                 told = f"{float(rows[reading][f'{name} here']):.1f}"
+                records = folders[policy] / "records.csv"
                 cells.append(told + interval(records, name.lower(), policy, reading))
         lines.append(f"| {name} | {' | '.join(cells)} |")
     return "\n".join(lines)
@@ -108,10 +111,10 @@ def _rows(file: Path) -> list[dict[str, str]]:
 def main() -> None:
     """Fill the page, or print its table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--report", type=Path, default=REPORT, help="a kept report")
+    parser.add_argument("--report", type=Path, help="one report instead of those of README")
     parser.add_argument("--print", action="store_true", help="print the table, change nothing")
     chosen = parser.parse_args()
-    text = table(chosen.report / "tables")
+    text = table(chosen.report)
     if chosen.print:
         print(text)
     else:

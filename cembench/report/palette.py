@@ -27,17 +27,31 @@ _KNOWN = {
     "harmonic-circle": SeriesStyle("#E69F00", ("v", "triangle-down"), ("--", "longdash")),
     "lscm": SeriesStyle("#56B4E9", ("P", "cross"), ("-.", "longdashdot")),
 }
-_MORE = tuple(
-    SeriesStyle(colour, marker, dash)
-    for colour, marker, dash in (
-        ("#7f5f00", ("X", "x"), ("-", "solid")),
-        ("#4d4d4d", ("<", "triangle-left"), ("--", "dash")),
-        ("#8c564b", (">", "triangle-right"), (":", "dot")),
-        ("#5f6b9a", ("p", "pentagon"), ("-.", "dashdot")),
-        ("#3b7d7d", ("h", "hexagon"), ("--", "longdash")),
-        ("#a0405f", ("*", "star"), ("-", "solid")),
-    )
+_COLOURS = ("#7f5f00", "#4d4d4d", "#8c564b", "#5f6b9a", "#3b7d7d", "#a0405f")
+_MARKERS = (
+    ("X", "x"),
+    ("<", "triangle-left"),
+    (">", "triangle-right"),
+    ("p", "pentagon"),
+    ("h", "hexagon"),
+    ("*", "star"),
 )
+_DASHES = (("-", "solid"), ("--", "dash"), (":", "dot"), ("-.", "dashdot"))
+
+
+def _another(k: int) -> SeriesStyle:
+    """Return the style of the k-th algorithm that has none of its own.
+
+    After every six the markers and dashes move on by one, so 24 styles are different.
+    """
+    turn = k // len(_COLOURS)
+    return SeriesStyle(
+        _COLOURS[k % len(_COLOURS)],
+        _MARKERS[(k + turn) % len(_MARKERS)],
+        _DASHES[(k % len(_COLOURS) + turn) % len(_DASHES)],
+    )
+
+
 #: Style of series that are not algorithms: bounds, fits, the paper's own figures.
 PLAIN = SeriesStyle("#6b7683", ("o", "circle"), (":", "dot"))
 #: Colours for the phases of a call and for the remainder: paler than those of algorithms and
@@ -62,4 +76,4 @@ REST = "#b3b9c0"
 def series_styles(names: Sequence[str]) -> dict[str, SeriesStyle]:
     """Return a style for each name: fixed for known algorithms, others in turn."""
     others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
-    return _KNOWN | {name: _MORE[k % len(_MORE)] for k, name in enumerate(others)}
+    return _KNOWN | {name: _another(k) for k, name in enumerate(others)}

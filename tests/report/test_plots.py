@@ -68,6 +68,21 @@ def test_algorithms_look_different_from_one_another_and_the_same_everywhere():
     assert series_styles(["zebra", "cem"])["cem"] == found["cem"]
 
 
+def test_thirty_algorithms_have_styles_of_their_own():
+    names = [
+        "cem",
+        "qiem",
+        "fdm",
+        "ldm",
+        "harmonic-circle",
+        "lscm",
+        *(f"other {k}" for k in range(24)),
+    ]
+    found = series_styles(names)
+    assert len({(found[name].colour, found[name].marker) for name in names}) == len(names)
+    assert len({(found[name].colour, found[name].dash) for name in names}) == len(names)
+
+
 def test_a_fitted_exponent_is_that_of_a_power_law():
     points = [Point(n, 1e-6 * n**1.25) for n in (100, 1_000, 50_000, 10**6)]
     law = fit(points)

@@ -23,7 +23,7 @@ def accuracy_against_time(evidence: Evidence) -> Plot | None:
         "Accuracy against time, relative to the best on each surface",
         panels,
         "Horizontal: time relative to the fastest algorithm on the same surface. Vertical: mean "
-        "angular distortion relative to the smallest there. At (1, 1) an algorithm is best in "
+        "angle error relative to the smallest there. At (1, 1) an algorithm is best in "
         "both. Joined points are the geometric means of the algorithms that no other algorithm "
         "beats in both. Maps to the disk only.",
         "A cloud of points for each algorithm; closer to the lower left corner is better.",
@@ -51,7 +51,7 @@ def _panel(evidence: Evidence, policy: str) -> PlotPanel | None:
     front = sorted(m for m in middles if not any(_beats(other, m) for other in middles))
     return PlotPanel(
         Axis("time, times the fastest", log=True),
-        Axis("mean angular distortion, times the smallest", log=True),
+        Axis("mean angle error, times the smallest", log=True),
         (*drawn, through("not beaten on average", front, "both")),
         f"solves: {policy}",
     )

@@ -1,0 +1,75 @@
+"""Shorten a report to what the repository keeps: its page in Markdown, plots, tables and records.
+
+    cembench run ... -o results/real
+    cembench report results/real -o results/real-report
+    python -m benchmarks.kept_report results/real-report reports/real
+
+Pages and pictures of every surface, and every figure in three forms, make a clone heavy; `cembench
+report` makes them again from a run. Records are kept without their histories and phases.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import re
+import shutil
+from pathlib import Path
+
+from benchmarks.pages import ROOT
+from cembench.core.atomic import write_text
+
+#: Columns of records that a kept report leaves out: long ones that nothing of it shows.
+LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
+#: Links to what is left out, and the forms of a figure besides its picture and data.
+LINKS = re.compile(r"\[([^\]]*)\]\((?:records\.md#|pages/)[^)]*\)")
+FORMS = re.compile(r"\[(?:SVG|PDF)\]\([^)]*\),? ?")
+FILES = re.compile(r"\]\(((?:figures|tables)/[^)#]*)")
+
+
+def shortened(page: str, report: str) -> str:
+    """Return a report's page without links to what is not kept; `report` is its kept folder."""
+    page = FORMS.sub("", LINKS.sub(r"\1", page))
+    return re.sub(r"(Made by `cembench report \S+ -o )\S+`", rf"\1{report}`", page)
+
+
+def short_records(text: str) -> str:
+    """Return records in CSV without the columns that are left out."""
+    csv.field_size_limit(2**31 - 1)
+    rows = list(csv.DictReader(io.StringIO(text)))
+    kept = [name for name in rows[0] if name not in LEFT_OUT]
+    lines = io.StringIO()
+    writer = csv.DictWriter(lines, kept, extrasaction="ignore", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return lines.getvalue()
+
+
+def keep(report: Path, folder: Path) -> None:
+    """Write the short form of a report to a folder that is replaced."""
+    name = folder.relative_to(ROOT) if folder.is_relative_to(ROOT) else folder
+    page = shortened((report / "report.md").read_text(encoding="utf-8"), name.as_posix())
+    records = short_records((report / "records.csv").read_text(encoding="utf-8"))
+    if folder.exists():
+        if not (folder / "report.md").exists():
+            raise SystemExit(f"{folder} is there, but holds no report to replace.")
+        shutil.rmtree(folder)
+    for file in set(FILES.findall(page)):
+        (folder / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(report / file, folder / file)
+    write_text(folder / "report.md", page)
+    write_text(folder / "records.csv", records)
+
+
+def main() -> None:
+    """Shorten the report that is named."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("report", type=Path, help="a folder made by `cembench report`")
+    parser.add_argument("folder", type=Path, help="where its short form goes, in reports/")
+    asked = parser.parse_args()
+    keep(asked.report, asked.folder.absolute())
+
+
+if __name__ == "__main__":
+    main()

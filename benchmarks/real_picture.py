@@ -1,0 +1,91 @@
+"""Draw docs/real.png: how often, how well and how fast algorithms map the real disks.
+
+python -m benchmarks.real_picture [REPORT]
+
+Everything is taken from the records of a kept report (default: reports/real).
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from collections import defaultdict
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from scipy.stats import binomtest
+
+from benchmarks.pages import ROOT
+from cembench.core.atomic import write
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+PICTURE = ROOT / "docs/real.png"
+TARGETS = {"disk": "#0072B2", "free boundary": "#D55E00"}
+#: Ranges are drawn between these shares of the surfaces.
+SHARES = (10, 50, 90)
+
+
+def by_algorithm(records: Path) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of maps to the disk or with a free boundary, by the algorithm's title."""
+    csv.field_size_limit(2**31 - 1)
+    found = defaultdict(list)
+    with records.open(encoding="utf-8", newline="") as lines:
+        for row in csv.DictReader(lines):
+            if row["target"] in TARGETS:
+                found[row["title"]].append(row)
+    return dict(found)
+
+
+def over_best(rows: dict[str, list[dict[str, str]]], column: str) -> dict[str, list[float]]:
+    """Return each valid map's figure over the smallest on its surface, by algorithm."""
+    valid = {name: {r["mesh_hash"]: float(r[column]) for r in some if r["status"] == "ok"}
+             for name, some in rows.items()}  # fmt: skip
+    best: dict[str, float] = {}
+    for figures in valid.values():
+        for surface, figure in figures.items():
+            best[surface] = min(figure, best.get(surface, np.inf))
+    return {name: [f / best[s] for s, f in figures.items()] for name, figures in valid.items()}
+
+
+def main() -> None:
+    """Draw the three panels."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
+    parser.add_argument("report", nargs="?", type=Path, default=ROOT / "reports/real")
+    rows = by_algorithm(parser.parse_args().report / "records.csv")
+    errors = over_best(rows, "angle_error_mean_deg")
+    seconds = over_best(rows, "seconds")
+    names = sorted(rows, key=lambda name: -float(np.median(errors[name])))
+    colours = [TARGETS[rows[name][0]["target"]] for name in names]
+    figure, axes = plt.subplots(1, 3, figsize=(9, 4.6), sharey=True, layout="constrained")
+    for y, (name, colour) in enumerate(zip(names, colours, strict=True)):
+        ok, n = sum(r["status"] == "ok" for r in rows[name]), len(rows[name])
+        likely = binomtest(ok, n).proportion_ci(method="wilson")
+        axes[0].plot([100 * likely.low, 100 * likely.high], [y, y], color=colour, lw=1.2)
+        axes[0].plot(100 * ok / n, y, "o", color=colour, ms=5)
+        for axis, found in ((axes[1], errors), (axes[2], seconds)):
+            least, middle, most = np.percentile(found[name], SHARES)
+            axis.plot([least, most], [y, y], color=colour, lw=1.2)
+            axis.plot(middle, y, "o", color=colour, ms=5)
+    axes[0].set_yticks(range(len(names)), names, fontsize=8)
+    titles = ("valid maps, % (95 % interval)", "mean angle error, times the best",
+              "seconds, times the fastest")  # fmt: skip
+    for axis, title in zip(axes, titles, strict=True):
+        axis.set_title(title, fontsize=9)
+        axis.grid(axis="x", alpha=0.3)
+        axis.tick_params(axis="x", labelsize=8)
+        axis.spines[["top", "right"]].set_visible(False)
+    for axis in axes[1:]:
+        axis.set_xscale("log")
+        axis.xaxis.set_major_formatter("{x:g}")
+    for target, colour in TARGETS.items():
+        axes[0].plot([], [], "o", color=colour, ms=5, label=target)
+    axes[0].legend(fontsize=8, loc="lower left")
+    picture = {"format": "png", "dpi": 110, "metadata": {"Software": ""}}
+    write(PICTURE, lambda file: figure.savefig(file, **picture))
+
+
+if __name__ == "__main__":
+    main()

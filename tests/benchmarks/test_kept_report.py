@@ -1,0 +1,52 @@
+"""A kept report holds what its page shows, and links to nothing that was left out."""
+
+import csv
+import re
+
+import pytest
+
+from benchmarks.kept_report import LEFT_OUT, keep, short_records, shortened
+from benchmarks.pages import ROOT
+
+
+def test_links_to_what_is_left_out_become_plain_text():
+    page = "| [1.91](records.md#ab12) | [turtle](pages/surface-turtle.md) |\n"
+    assert shortened(page, "reports/x") == "| 1.91 | turtle |\n"
+    forms = "([SVG](figures/a.svg), [PDF](figures/a.pdf), [data](figures/a.csv))"
+    assert shortened(forms, "reports/x") == "([data](figures/a.csv))"
+    made = "Made by `cembench report results/x -o elsewhere`."
+    assert shortened(made, "reports/x") == "Made by `cembench report results/x -o reports/x`."
+
+
+def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
+    report, kept = tmp_path / "report", tmp_path / "kept"
+    for name in ("figures/a.png", "figures/a.svg", "tables/t.csv", "pages/surface-a.md"):
+        (report / name).parent.mkdir(parents=True, exist_ok=True)
+        (report / name).write_text(name)
+    page = "![A](figures/a.png) ([SVG](figures/a.svg)) [CSV](tables/t.csv) [a](pages/surface-a.md)"
+    (report / "report.md").write_text(page)
+    (report / "records.csv").write_text("mesh,phases,seconds\na,{},1.5\n")
+    kept.mkdir()
+    (kept / "old.png").write_text("old")
+    with pytest.raises(SystemExit, match="holds no report to replace"):
+        keep(report, kept)
+    (kept / "report.md").write_text("old")
+    keep(report, kept)
+    files = {file.relative_to(kept).as_posix() for file in kept.rglob("*") if file.is_file()}
+    assert files == {"report.md", "records.csv", "figures/a.png", "tables/t.csv"}
+    assert (kept / "records.csv").read_text() == "mesh,seconds\na,1.5\n"
+
+
+@pytest.mark.parametrize("report", ["paper", "standard", "real"])
+def test_every_link_of_a_kept_report_leads_somewhere(report):
+    folder = ROOT / "reports" / report
+    for link in re.findall(r"\]\(([^)#]+)", (folder / "report.md").read_text(encoding="utf-8")):
+        assert link.startswith("http") or (folder / link).exists(), link
+
+
+def test_records_of_the_real_surfaces_are_kept_in_short():
+    text = (ROOT / "reports/real/records.csv").read_text(encoding="utf-8")
+    assert short_records(text) == text
+    rows = list(csv.DictReader(text.splitlines()))
+    assert not set(LEFT_OUT) & set(rows[0])
+    assert len(rows) > 2000
