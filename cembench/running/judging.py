@@ -188,7 +188,8 @@ def _judged(
         metrics = all_metrics(mesh, uv)
         told = [] if problems else [*remarks(promise, mesh, uv), *lost_in_rounding(metrics)]
         if not problems:
-            told += quality_notes(promise.target, mesh, uv, extras)
+            error = float(metrics["angle_error_mean_deg"])
+            told += quality_notes(promise.target, mesh, uv, extras, error)
         about = {
             "metrics": {name: _finite(v) for name, v in metrics.items()},
             "boundaries": _boundaries(mesh, uv),

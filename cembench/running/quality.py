@@ -43,9 +43,12 @@ CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
 
 
 def quality_notes(
-    target: str, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]
+    target: str, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any], error: float
 ) -> list[Notice]:
-    """Return remarks on a valid map that is far from conformal; empty for others."""
+    """Return remarks on a valid map that is far from conformal; empty for others.
+
+    `error` is its mean angle error in degrees.
+    """
     notes = []
     if extras.get("stopped") == "crowded":
         told = (
@@ -53,7 +56,6 @@ def quality_notes(
             "of least energy"
         )
         notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, told))
-    error = float(angle_errors(mesh, uv).mean())
     known = yardstick(target, mesh, uv) if error > CLOSE else None
     if known is None:
         return notes

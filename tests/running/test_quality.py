@@ -42,22 +42,26 @@ def test_the_yardstick_is_nearly_as_good_as_the_best_method(mesh):
     assert angle_errors(mesh, yardstick("disk", mesh, direct_cem(mesh).uv)).mean() < 1.5 * best
 
 
+def notes_on(target, mesh, uv, extras):
+    return quality_notes(target, mesh, uv, extras, angle_errors(mesh, uv).mean())
+
+
 @pytest.mark.parametrize("algorithm", [cem, direct_cem])
 def test_conformal_maps_get_no_note(algorithm):
     mesh = hemi_ellipsoid(800, x=2.0)
     found = algorithm(mesh)
-    assert quality_notes("disk", mesh, found.uv, found.extras) == []
+    assert notes_on("disk", mesh, found.uv, found.extras) == []
 
 
 def test_a_map_with_hardly_any_angle_error_is_not_compared(monkeypatch):
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: pytest.fail("compared"))
     mesh = flat_disk(600)
-    assert quality_notes("disk", mesh, mesh.V[:, 0] + 1j * mesh.V[:, 1], {}) == []
+    assert notes_on("disk", mesh, mesh.V[:, 0] + 1j * mesh.V[:, 1], {}) == []
 
 
 def test_a_map_by_arc_length_of_a_long_surface_is_far_from_conformal():
     mesh = flat_disk(600, stretch=4.0)
-    (note,) = quality_notes("disk", mesh, harmonic_circle(mesh).uv, {})
+    (note,) = notes_on("disk", mesh, harmonic_circle(mesh).uv, {})
     assert note.kind is NoticeKind.FAR_FROM_CONFORMAL
     assert "the method, not the mesh" in note.text
 
@@ -65,7 +69,7 @@ def test_a_map_by_arc_length_of_a_long_surface_is_far_from_conformal():
 def test_with_holes_the_yardstick_has_the_same_boundary_outside():
     mesh = warped()
     found = direct_cem_holes(mesh)
-    assert quality_notes("circular holes", mesh, found.uv, found.extras) == []
+    assert notes_on("circular holes", mesh, found.uv, found.extras) == []
     hole = mesh.outer_and_holes()[1][0]
     turned = harmonic_filled(mesh, outer=int(hole[0])).uv
     known = yardstick("circular holes", mesh, turned)
@@ -75,7 +79,7 @@ def test_with_holes_the_yardstick_has_the_same_boundary_outside():
 def test_a_crowded_end_is_never_passed_over():
     mesh = spherical_cap(300)
     uv = direct_cem(mesh).uv
-    note = quality_notes("disk", mesh, uv, {"stopped": "crowded"})[0]
+    note = notes_on("disk", mesh, uv, {"stopped": "crowded"})[0]
     assert note.kind is NoticeKind.CROWDED_BOUNDARY
 
 
@@ -93,7 +97,7 @@ def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_b
     flat = mesh.V[:, 0] + 1e-3j * mesh.V[:, 1]
     assert angle_errors(mesh, flat).mean() == pytest.approx(collapsed_error(mesh), rel=0.3)
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
-    (note,) = quality_notes("disk", mesh, flat, {})
+    (note,) = notes_on("disk", mesh, flat, {})
     assert "no better" in note.text
     assert "too coarse" in note.text
 
