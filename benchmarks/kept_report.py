@@ -2,10 +2,11 @@
 
     cembench run ... -o results/real
     cembench report results/real -o results/real-report
-    python -m benchmarks.kept_report results/real-report reports/real
+    python -m benchmarks.kept_report results/real-report reports/real --hide /home/me/meshes
 
 Pages and pictures of every surface, and every figure in three forms, make a clone heavy; `cembench
-report` makes them again from a run. Records are kept without their histories and phases.
+report` makes them again from a run. Records are kept without their histories and phases, and a
+folder that others do not have is named by its last part.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import csv
 import io
 import re
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.pages import ROOT
@@ -46,8 +48,8 @@ def short_records(text: str) -> str:
     return lines.getvalue()
 
 
-def keep(report: Path, folder: Path) -> None:
-    """Write the short form of a report to a folder that is replaced."""
+def keep(report: Path, folder: Path, hidden: Sequence[Path] = ()) -> None:
+    """Write the short form of a report to a folder that is replaced; `hidden` are not named."""
     name = folder.relative_to(ROOT) if folder.is_relative_to(ROOT) else folder
     page = shortened((report / "report.md").read_text(encoding="utf-8"), name.as_posix())
     records = short_records((report / "records.csv").read_text(encoding="utf-8"))
@@ -60,6 +62,13 @@ def keep(report: Path, folder: Path) -> None:
         shutil.copy(report / file, folder / file)
     write_text(folder / "report.md", page)
     write_text(folder / "records.csv", records)
+    for file in folder.rglob("*"):
+        if file.suffix in (".md", ".csv"):
+            text = told = file.read_text(encoding="utf-8")
+            for path in hidden:
+                told = told.replace(str(path), path.name)
+            if told != text:
+                write_text(file, told)
 
 
 def main() -> None:
@@ -67,8 +76,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("report", type=Path, help="a folder made by `cembench report`")
     parser.add_argument("folder", type=Path, help="where its short form goes, in reports/")
+    parser.add_argument(
+        "--hide", type=Path, action="append", default=[], help="a folder whose path is not shown"
+    )
     asked = parser.parse_args()
-    keep(asked.report, asked.folder.absolute())
+    keep(asked.report, asked.folder.absolute(), asked.hide)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 import csv
 import re
+from pathlib import Path
 
 import pytest
 
@@ -31,7 +32,9 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     with pytest.raises(SystemExit, match="holds no report to replace"):
         keep(report, kept)
     (kept / "report.md").write_text("old")
-    keep(report, kept)
+    (report / "tables/t.csv").write_text("/home/me/meshes/a.obj")
+    keep(report, kept, [Path("/home/me/meshes")])
+    assert (kept / "tables/t.csv").read_text() == "meshes/a.obj"
     files = {file.relative_to(kept).as_posix() for file in kept.rglob("*") if file.is_file()}
     assert files == {"report.md", "records.csv", "figures/a.png", "tables/t.csv"}
     assert (kept / "records.csv").read_text() == "mesh,seconds\na,1.5\n"
