@@ -65,10 +65,20 @@ def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict
                 kept = list(tried)
     finally:
         vars(rules)["_centred"] = centred
-    return list(_finished(mesh, L, kept)), ends
+    L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
+    return list(_finished(mesh, L, _accepted(L_double, kept))), ends
 
 
-def _finished(mesh: DiskMesh, L: Any, kept: list[Any]) -> Iterator[float]:
+def _accepted(L_double: Any, tried: list[Any]) -> Iterator[Any]:
+    """Yield each trial that lowered the sphere's energy, None for the others."""
+    least = math.inf
+    for S in tried:
+        found = math.inf if S is None else float((S * (L_double @ S)).sum())
+        yield S if found <= least else None
+        least = min(least, found)
+
+
+def _finished(mesh: DiskMesh, L: Any, kept: Iterator[Any]) -> Iterator[float]:
     for S in kept:
         if S is None:
             yield math.nan
