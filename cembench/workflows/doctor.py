@@ -29,6 +29,7 @@ _FOR = {
     Extra.CLUSTER: "measures on several machines",
     Extra.FETCH: "fetches public surfaces",
     Extra.FORMATS: "reads VTK, glTF and GIFTI files, writes geometry images as EXR",
+    Extra.METIS: "orders rows by nested dissection: less memory",
     Extra.PARDISO: "adds another linear-algebra back end",
     Extra.PARQUET: "exports runs as Parquet",
     Extra.REPORT: "writes reports",

@@ -19,8 +19,10 @@ def npz_bytes(surface: Textured) -> bytes:
         arrays["F_uv"] = surface.corners
     buffer = io.BytesIO()
     # numpy.savez_compressed takes several times as long for a slightly smaller file.
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+    with zipfile.ZipFile(buffer, "w") as archive:
         for name, array in arrays.items():
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asarray(array), allow_pickle=False)
+            undated = zipfile.ZipInfo(f"{name}.npy")
+            archive.writestr(undated, member.getbuffer(), zipfile.ZIP_DEFLATED, compresslevel=1)
     return buffer.getvalue()
