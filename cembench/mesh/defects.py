@@ -477,7 +477,7 @@ def _duplicates(F: Indices, number: Indices) -> Problem | None:
 
 
 def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
-    """Return the problem that edges have more than two triangles, or that one side is all there is.
+    """Return the problem that edges have more than two triangles, or that a surface is one-sided.
 
     Where no contradiction of orientations is left, edges have at most two triangles.
     """
@@ -524,10 +524,9 @@ def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:
     Edges with more than two triangles, or orientations that contradict each other, take libigl's
     general and slower test.
     """
-    proper = F
-    if not consistent or (np.roll(F, 1, axis=1) == F).any():
-        # Triangles with one or two vertices are another defect.
-        proper = F[(np.roll(F, 1, axis=1) != F).all(axis=1)]
+    distinct = (np.roll(F, 1, axis=1) != F).all(axis=1)
+    # Triangles with one or two vertices are another defect.
+    proper = F if distinct.all() else F[distinct]
     if not len(proper):
         return None
     if consistent:
