@@ -2,10 +2,11 @@
 
 First every cell is checked: one call in a process of its own, whose map is verified and whose
 memory is measured. What ends ok is then timed in rounds. A round has a fresh process for every
-cell, in a random order, so a machine that slows down slows them all. A cell has a fixed number of
-rounds, or is measured until its intervals are narrow (:mod:`cembench.running.until_precise`), as
-long as time is left; where that does not last for the first look of all, the dearest end early.
-Where that is possible the processes are forked from one that has loaded the libraries
+cell: surfaces in random order, the cells of a surface one after the other, in random order too, so
+a machine that slows down slows all that are compared. A cell has a fixed number of rounds, or is
+measured until its intervals are narrow (:mod:`cembench.running.until_precise`), as long as time is
+left; where that does not last for the first look of all, the dearest end early. Where that is
+possible the processes are forked from one that has loaded the libraries
 (:mod:`cembench.running.fork_server`), one for the checks and another one each round: what differs
 from one interpreter to the next (addresses, hash seeds) is the same for all cells of a round, and
 averaged over.
@@ -218,8 +219,17 @@ def map_once(
 
 
 def in_random_order(tasks: Sequence[Task], seed: int, number: int) -> list[Task]:
-    """Return the order of a round, which depends only on the seed and the round."""
-    return random.Random(f"{seed} {number}").sample(list(tasks), len(tasks))
+    """Return the order of a round, which depends only on the seed and the round.
+
+    The surfaces come in random order, and for each surface its cells: these are compared with each
+    other, so little time should pass between them.
+    """
+    chance = random.Random(f"{seed} {number}")
+    of_surface: dict[str, list[Task]] = {}
+    for task in tasks:
+        of_surface.setdefault(task.cell.mesh_hash, []).append(task)
+    blocks = chance.sample(list(of_surface.values()), len(of_surface))
+    return [task for block in blocks for task in chance.sample(block, len(block))]
 
 
 def kept_record(

@@ -1,6 +1,8 @@
 import dataclasses
 import re
+from collections import Counter
 from contextlib import closing
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.core.notices import NoticeKind
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.results.records import FaultKind
 from cembench.results.store import Store
@@ -242,15 +245,41 @@ def test_rounds_go_over_all_cells_in_turn(tmp_path):
     assert steps == ["check"] * 2 + ["round 1 of 2"] * 2 + ["round 2 of 2"] * 2
 
 
+def _cells_of_three_surfaces():
+    registry = load_registry([FAULTY])
+    chosen = [registry.algorithm(name) for name in ("good", "nan", "raises")]
+    disks = {faces: flat_disk(faces) for faces in (150, 600, 2400)}
+    surfaces = [
+        DiskMesh.from_arrays(disk.V, disk.F, name=f"disk-{faces}") for faces, disk in disks.items()
+    ]
+    tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), [FAULTY])
+    assert len({task.cell.mesh_hash for task in tasks}) == 3
+    return tasks
+
+
 def test_the_order_within_a_round_is_random_and_set_by_the_seed():
-    cells = list(range(10))
+    tasks = _cells_of_three_surfaces()
     first, again, next_round, other = (
-        in_random_order(cells, seed, number) for seed, number in ((0, 0), (0, 0), (0, 1), (1, 0))
+        [task.cell.label for task in in_random_order(tasks, seed, number)]
+        for seed, number in ((0, 0), (0, 0), (0, 1), (1, 0))
     )
-    assert sorted(first) == cells
+    assert sorted(first) == sorted(task.cell.label for task in tasks)
     assert first == again
     assert first != next_round
     assert first != other
+
+
+def test_the_cells_of_a_surface_are_measured_one_after_the_other_in_any_order():
+    tasks = _cells_of_three_surfaces()
+    rounds = [in_random_order(tasks, 0, number) for number in range(400)]
+    for order in rounds:
+        surfaces = [task.cell.mesh_hash for task in order]
+        assert len(list(groupby(surfaces))) == 3
+    places = Counter(
+        (task.cell.label, place) for order in rounds for place, task in enumerate(order)
+    )
+    assert len(places) == 9 * 9  # every cell was at every place, and each about as often
+    assert min(places.values()) > 400 / 9 / 2
 
 
 def test_samples_of_a_killed_run_are_gone_on_with(tmp_path):
