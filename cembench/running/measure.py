@@ -51,8 +51,8 @@ from cembench.running.returned import (
 )
 
 #: A process times further calls up to this total of seconds, or this number of calls.
-ENOUGH_SECONDS = 0.1
-ENOUGH_CALLS = 5
+ENOUGH_SECONDS = 0.3
+ENOUGH_CALLS = 20
 #: A first call longer than this, in seconds, is not repeated: a warm-up saves only tenths of one.
 LONG_CALL = 5.0
 #: Name of a first call that only warms up.
