@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import corner_products, half_cotangents, laplacian_of_weights
 from cembench.conformal.planar import signed_areas
+from cembench.core.blocks import in_blocks
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 
@@ -47,6 +48,10 @@ def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> ND
     ``(1 + |mu|)^2 / (1 - |mu|^2)`` with the ratio of the areas as the root. No nearly equal numbers
     are subtracted, so slivers cost no digits.
     """
+    return in_blocks(lambda some: _dilatations(uv, some, V), F)
+
+
+def _dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -66,9 +71,11 @@ def _first_fundamental_form(
     dy = np.zeros_like(dx)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         for c in range(3):
-            gradient = 1j * (uv[F[:, (c + 2) % 3]] - uv[F[:, (c + 1) % 3]]) / (2 * area)
-            dx += gradient.real[:, None] * V[F[:, c]]
-            dy += gradient.imag[:, None] * V[F[:, c]]
+            ahead, behind = (uv.take(F[:, (c + k) % 3]) for k in (1, 2))
+            gradient = 1j * (behind - ahead) / (2 * area)
+            corner = V.take(F[:, c], axis=0)
+            dx += gradient.real[:, None] * corner
+            dy += gradient.imag[:, None] * corner
         E, G = np.einsum("td,td->t", dx, dx), np.einsum("td,td->t", dy, dy)
         mixed = np.einsum("td,td->t", dx, dy)
     return E, G, mixed

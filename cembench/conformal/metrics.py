@@ -24,6 +24,7 @@ from cembench.conformal.planar import (
     polygon_area,
     signed_areas,
 )
+from cembench.core.blocks import blocks, in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -41,11 +42,16 @@ NEAR_CIRCLE = 1e-3
 
 def dirichlet_energy(mesh: TriangleMesh, uv: Complex) -> float:
     """Return E_D (Eq. 5): half the sum over edges of cotangent weight times squared length."""
-    F = mesh.F
-    weights = half_cotangents(mesh.V, F)
-    squared = np.stack(
-        [np.abs(uv[F[:, (c + 1) % 3]] - uv[F[:, (c + 2) % 3]]) ** 2 for c in range(3)]
-    )
+    return _energy_of_weights(half_cotangents(mesh.V, mesh.F), mesh.F, uv)
+
+
+def _energy_of_weights(weights: Real, F: NDArray[np.int64], uv: Complex) -> float:
+    """Return E_D for half the cotangents (m, 3) of the corners."""
+    squared = np.empty((3, len(F)))
+    for block in blocks(len(F)):
+        corners = [uv.take(F[block, c]) for c in range(3)]
+        for c in range(3):
+            squared[c, block] = np.abs(corners[(c + 1) % 3] - corners[(c + 2) % 3]) ** 2
     return 0.5 * float((weights.T * squared).sum())
 
 
@@ -76,15 +82,25 @@ def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
     array([[90., 45., 45.]])
 
     """
-    planar = np.iscomplexobj(points)
-    V = np.stack([points.real, points.imag], axis=1) if planar else np.asarray(points, np.float64)
+    V = _coordinates(points)
+    return in_blocks(lambda some: _angles(V, some), F)
+
+
+def _coordinates(points: Real | Complex) -> Real:
+    if np.iscomplexobj(points):
+        return np.stack([points.real, points.imag], axis=1)
+    return np.asarray(points, np.float64)
+
+
+def _angles(V: Real, F: NDArray[np.int64]) -> Real:
     dots, double_area = corner_products(V, F)
-    return np.rad2deg(np.arctan2(double_area[:, None], dots))
+    return np.asarray(np.rad2deg(np.arctan2(double_area[:, None], dots)))
 
 
 def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:
     """Return the absolute change of each corner's angle in degrees (Table 4), shape (m, 3)."""
-    return np.abs(corner_angles(mesh.V, mesh.F) - corner_angles(uv, mesh.F))
+    image = _coordinates(uv)
+    return in_blocks(lambda some: np.abs(_angles(mesh.V, some) - _angles(image, some)), mesh.F)
 
 
 class SampledAngleError:
@@ -206,11 +222,15 @@ def area_distortion(mesh: TriangleMesh, uv: Complex) -> tuple[float, float]:
     first value is the mean of the absolute values, the second the standard deviation. Folded
     triangles count with the size of their area; infinite if a triangle collapsed.
     """
-    areas = surface_areas(mesh)
+    return _distortion_of_areas(surface_areas(mesh), signed_areas(uv, mesh.F))
+
+
+def _distortion_of_areas(areas: Real, images: Real) -> tuple[float, float]:
     held = areas > 0
-    weights = areas[held] / areas[held].sum()
+    areas, images = areas[held], images[held]
+    weights = areas / areas.sum()
     with np.errstate(divide="ignore", invalid="ignore"):
-        off = np.log(np.abs(signed_areas(uv, mesh.F[held]))) - np.log(areas[held])
+        off = np.log(np.abs(images)) - np.log(areas)
     if not np.isfinite(off).all():
         return float("inf"), float("inf")
     off -= weights @ off
@@ -224,9 +244,23 @@ class MapFigures:
         self.mesh, self.uv = mesh, uv
 
     @cached_property
+    def products(self) -> tuple[Real, Real]:
+        """Dot products of the edges at each corner of the surface, and twice its areas."""
+        return corner_products(self.mesh.V, self.mesh.F)
+
+    @cached_property
+    def areas(self) -> Real:
+        """Areas of the triangles of the surface, (m,)."""
+        return self.products[1] / 2
+
+    def _energy(self, uv: Complex) -> float:
+        dots, double_area = self.products
+        return _energy_of_weights(dots / (2 * double_area[:, None]), self.mesh.F, uv)
+
+    @cached_property
     def energy(self) -> float:
         """E_D (Eq. 5)."""
-        return dirichlet_energy(self.mesh, self.uv)
+        return self._energy(self.uv)
 
     @cached_property
     def area(self) -> float:
@@ -254,8 +288,7 @@ class MapFigures:
     @cached_property
     def beltrami_mean(self) -> float:
         """Mean of the modulus of mu over the surface's area."""
-        areas = surface_areas(self.mesh)
-        return float(areas @ self.beltrami / areas.sum())
+        return float(self.areas @ self.beltrami / self.areas.sum())
 
     @cached_property
     def is_disk_map(self) -> bool:
@@ -279,14 +312,14 @@ class MapFigures:
             return None
         if self.centred is None:
             return float("inf")
-        return dirichlet_energy(self.mesh, self.centred) - image_area(self.mesh, self.centred)
+        return self._energy(self.centred) - image_area(self.mesh, self.centred)
 
     @cached_property
     def area_distortion(self) -> tuple[float, float]:
         """Mean and standard deviation; for a disk map in the common gauge."""
         if self.centred is None:
             return float("inf"), float("inf")
-        return area_distortion(self.mesh, self.centred)
+        return _distortion_of_areas(self.areas, signed_areas(self.centred, self.mesh.F))
 
     @cached_property
     def overlap(self) -> float:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.blocks import in_blocks
+
 Complex = NDArray[np.complex128]
 
 #: The sign of an area computed in doubles is certain if it exceeds this share of its terms
@@ -27,8 +29,12 @@ def polygon_area(z: Complex) -> float:
 
 def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
     """Return the area of each triangle's image, shape (m,); positive if counter-clockwise."""
-    a, b, c = (uv[F[:, k]] for k in range(3))
-    return 0.5 * np.imag(np.conj(b - a) * (c - a))
+
+    def of_triangles(F: NDArray[np.int64]) -> NDArray[np.float64]:
+        a, b, c = (uv.take(F[:, k]) for k in range(3))
+        return 0.5 * np.imag(np.conj(b - a) * (c - a))
+
+    return in_blocks(of_triangles, F)
 
 
 def folded_triangles(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -42,7 +48,11 @@ def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
     Exact for the given doubles: if rounding could hide the sign, integer arithmetic decides. A
     corner that is NaN or infinite gives 0.
     """
-    a, b, c = (uv[F[:, k]] for k in range(3))
+    return in_blocks(lambda some: _orientations(uv, some), F)
+
+
+def _orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
+    a, b, c = (uv.take(F[:, k]) for k in range(3))
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         p, q = b - a, c - a
         left, right = p.real * q.imag, p.imag * q.real
@@ -51,7 +61,8 @@ def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
     signs = np.sign(np.where(certain, area, 0)).astype(np.int8)
     # A difference of doubles is zero only if they are equal: such products are exact.
     flat = ((p.real == 0) | (q.imag == 0)) & ((p.imag == 0) | (q.real == 0))
-    open_ = np.flatnonzero(~certain & ~flat & np.isfinite(uv)[F].all(axis=1))
+    open_ = np.flatnonzero(~certain & ~flat)
+    open_ = open_[np.isfinite(a[open_]) & np.isfinite(b[open_]) & np.isfinite(c[open_])]
     signs[open_] = _exact_orientations(a[open_], b[open_], c[open_])
     return signs
 
