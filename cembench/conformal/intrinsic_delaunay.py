@@ -25,6 +25,8 @@ ROUNDING = 1e-10
 NEXT = np.array([1, 2, 0, 1])
 #: Maximal rounds of flips; a real surface takes about ten.
 MOST_ROUNDS = 1000
+#: Up to this share of obtuse angles, whether all edges are Delaunay is found out beforehand.
+FEW = 0.02
 
 
 def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indices, Real, Real]:
@@ -32,7 +34,7 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
 
     Parameters
     ----------
-    F : int64 (m, 3)
+    F : int (m, 3)
         Triangles of an oriented manifold, counter-clockwise.
     lengths : float (m, 3)
         Length of the edge opposite to each corner.
@@ -52,6 +54,8 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
            Computing 81, 2007.
 
     """
+    if _is_delaunay(F, lengths, weights):
+        return F, lengths, weights
     corners = _Corners(F, lengths, weights)
     waiting = np.flatnonzero(corners.weight < 0)
     for _ in range(MOST_ROUNDS):
@@ -63,6 +67,21 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
         waiting = np.concatenate([wrong[~flipped], touched])
     found = corners.vertex.reshape(-1, 3), corners.length.reshape(-1, 3)
     return *found, corners.weight.reshape(-1, 3)
+
+
+def _is_delaunay(F: Indices, lengths: Real, weights: Real) -> bool:
+    """Whether all edges are found to be Delaunay by those opposite to obtuse angles, if few."""
+    obtuse = np.flatnonzero(weights < 0)
+    if not len(obtuse) or len(obtuse) > FEW * weights.size:
+        return not len(obtuse)
+    of_edge = np.zeros(int(F.max()) + 1, dtype=bool)
+    _, *others = _following(obtuse)
+    for corner in others:
+        of_edge[F.ravel()[corner]] = True
+    # A triangle at such an edge has both of its ends.
+    near = np.count_nonzero(of_edge[F], axis=1) >= 2
+    part = _Corners(F[near], lengths[near], weights[near])
+    return not len(part.not_delaunay(np.flatnonzero(part.weight < 0)))
 
 
 class _Corners:

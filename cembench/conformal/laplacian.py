@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
 from cembench.core.blocks import blocks
 from cembench.core.clock import phase
-from cembench.mesh.gluing import opposite_edge_ends, twins_of_half_edges
+from cembench.mesh.gluing import SLOTS, opposite_edge_ends, twins_of_half_edges
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
@@ -73,7 +73,7 @@ def laplacian_of_weights(
 
     The weights of the two triangles of an edge are added.
     """
-    F = F.astype(np.int32 if n < 2**31 else np.int64)  # as SciPy will have them
+    F = F.astype(np.int32 if n < 2**31 else np.int64, copy=False)  # as SciPy will have them
     i, j = opposite_edge_ends(F)
     one_way = scipy.sparse.coo_array((weights.ravel(), (i, j)), shape=(n, n)).tocsr()
     W = one_way + one_way.T
@@ -130,7 +130,10 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc
             weights[block] = dots / (2 * double_area[:, None])
             for k, e in enumerate(edges):
                 lengths[block, k] = np.sqrt(sum(x * x for x in e.T))
-        F, _, weights = intrinsic_delaunay(mesh.F, lengths, weights)
+        small = mesh.n * SLOTS < 2**31
+        F, _, weights = intrinsic_delaunay(
+            mesh.F.astype(np.int32 if small else np.int64), lengths, weights
+        )
         return laplacian_of_weights(F, weights, mesh.n)
 
 

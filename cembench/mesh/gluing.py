@@ -52,13 +52,14 @@ def opposite_edge_ends(F: Indices) -> tuple[Indices, Indices]:
 def partners(i: Indices, j: Indices) -> Indices:
     """Return which other edge has the ends of each edge ij, in either order; -1 where none has.
 
-    No more than two edges have the same ends.
+    i and j are integers of one type (k,), which must hold :data:`SLOTS` times their values. No more
+    than two edges have the same ends.
     """
     found = np.full(len(i), -1)
     _pair_opposite(i, j, found)
     # What runs the same way, lost its place in the table, or has no partner.
     rest = np.flatnonzero(found < 0)
-    i, j = i[rest], j[rest]
+    i, j = i.take(rest).astype(np.int64), j.take(rest).astype(np.int64)
     keys = np.minimum(i, j) * (max(i.max(initial=0), j.max(initial=0)) + 1) + np.maximum(i, j)
     order = np.argsort(keys, kind="stable")
     keys, rest = keys[order], rest[order]
@@ -77,14 +78,14 @@ def _pair_opposite(i: Indices, j: Indices, found: Indices) -> None:
     up, down = np.flatnonzero(i < j), np.flatnonzero(i > j)
     if not len(up):
         return
-    low, high = i[up], j[up]
+    low, high = i.take(up), j.take(up)
     table = np.zeros((int(low.max()) + 1) * SLOTS, dtype=np.int32)
     table[low * SLOTS + high % SLOTS] = np.arange(len(up), dtype=np.int32)
-    low_down, high_down = j[down], i[down]
+    low_down, high_down = j.take(down), i.take(down)
     at = low_down * SLOTS + high_down % SLOTS
-    match = table[np.minimum(at, len(table) - 1)]
-    equal = (low[match] == low_down) & (high[match] == high_down)
-    match, down = up[match[equal]], down[equal]
+    match = table.take(np.minimum(at, len(table) - 1))
+    equal = np.flatnonzero((low.take(match) == low_down) & (high.take(match) == high_down))
+    match, down = up.take(match.take(equal)), down.take(equal)
     found[match], found[down] = down, match
 
 

@@ -105,6 +105,29 @@ def test_a_mesh_that_is_delaunay_stays_as_it_is():
         np.testing.assert_array_equal(before, after)
 
 
+def _with_one_thin_pair(mesh, wrong):
+    """Move a vertex towards a neighbour's edge, so that the edge is Delaunay or not."""
+    V = mesh.V.copy()
+    obtuse = half_cotangents(V, mesh.F) < 0
+    assert not obtuse.any()
+    inside = np.flatnonzero(~np.isin(mesh.F, mesh.boundary).any(axis=1))[0]
+    tip, one, other = mesh.F[inside]
+    V[tip] += (0.9 if wrong else 0.55) * ((V[one] + V[other]) / 2 - V[tip])
+    return DiskMesh(V, mesh.F)
+
+
+@pytest.mark.parametrize("wrong", [False, True])
+def test_few_obtuse_angles_are_looked_at_alone(monkeypatch, wrong):
+    mesh = _with_one_thin_pair(flat_disk(1500), wrong)
+    obtuse = (half_cotangents(mesh.V, mesh.F) < 0).mean()
+    assert 0 < obtuse < own.FEW
+    found = of(mesh.V, mesh.F)
+    assert (found[0] is mesh.F) == (not wrong)
+    monkeypatch.setattr(own, "FEW", 0.0)
+    for short, long in zip(found, of(mesh.V, mesh.F), strict=True):
+        np.testing.assert_array_equal(short, long)
+
+
 def test_edges_are_flipped_at_once_only_where_they_share_no_triangle():
     apart = Independence(6)
     left, right = np.array([3, 0, 4, 3]), np.array([1, 1, 5, 1])
