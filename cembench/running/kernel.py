@@ -14,8 +14,11 @@ from typing import Any
 import scipy.sparse as sparse
 from scipy.sparse.linalg import splu
 
-#: Points along a side of the grid, and number of factorisations per measurement.
-SIDE, TIMES = 70, 3
+#: Points along a side of the grid.
+SIDE = 70
+#: Factorisations for each process of the round that is timed, and at most: what disturbs a few of
+#: them must not decide the figure of a whole round, and one of a single process must cost little.
+FOR_EACH, AT_MOST = 3, 45
 
 
 @lru_cache(maxsize=1)
@@ -25,10 +28,13 @@ def _laplacian() -> Any:
     return (sparse.kron(line, one) + sparse.kron(one, line)).tocsc()
 
 
-def kernel_seconds() -> float:
-    """Return the wall-clock seconds of a factorisation in this process, the median of a few."""
+def kernel_seconds(processes: int = 1) -> float:
+    """Return the wall-clock seconds of a factorisation in this process.
+
+    It is the median of more factorisations if the round has more processes.
+    """
     matrix = _laplacian()
-    return median(_timed(matrix) for _ in range(TIMES))
+    return median(_timed(matrix) for _ in range(min(FOR_EACH * processes, AT_MOST)))
 
 
 def _timed(matrix: Any) -> float:

@@ -285,7 +285,7 @@ class _Run:
             if not open_:
                 continue
             self.launcher.close()
-            kernel = kernel_seconds()
+            kernel = kernel_seconds(len(open_))
             for task in in_random_order(open_, self.options.seed, number):
                 self._time(task, number, kernel)
 

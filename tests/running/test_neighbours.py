@@ -1,6 +1,7 @@
 import pytest
 
 from cembench.results.records import Neighbours
+from cembench.running import kernel
 from cembench.running.kernel import kernel_seconds
 from cembench.running.neighbours import Counters, _sum, counters, neighbours
 
@@ -42,3 +43,12 @@ def test_counts_of_heat_are_added_where_they_can_be_read(tmp_path):
 
 def test_the_kernel_takes_time():
     assert kernel_seconds() > 0
+
+
+def test_the_kernel_is_repeated_for_rounds_of_many_processes(monkeypatch):
+    seconds = iter([9.0, 1.0, 2.0] + 12 * [3.0, 9.0] + 100 * [3.0])
+    monkeypatch.setattr(kernel, "_timed", lambda _: next(seconds))
+    assert kernel_seconds() == 2.0
+    assert kernel_seconds(8) == 6.0
+    assert kernel_seconds(1000) == 3.0
+    assert len(list(seconds)) == 100 - kernel.AT_MOST

@@ -20,7 +20,7 @@ from cembench.running.until_precise import affordable, cheapest, cost, lack
 @pytest.fixture(autouse=True)
 def _a_quick_kernel(monkeypatch):
     ticks = count(1)
-    monkeypatch.setattr(local, "kernel_seconds", lambda: next(ticks) / 1000)
+    monkeypatch.setattr(local, "kernel_seconds", lambda _: next(ticks) / 1000)
 
 
 def cells(names=("cem", "lscm", "fdm"), precision=0.05, **how):
