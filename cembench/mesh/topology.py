@@ -47,7 +47,8 @@ def vertex_graph(F: Faces, n: int) -> scipy.sparse.csr_array:
 
 def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
     """Return the number of connected components, and the component of each vertex."""
-    i, j = half_edges(F).T
+    # Two sides connect the corners of a triangle.
+    i, j = np.repeat(F[:, 0], 2), F[:, 1:].ravel()
     graph = scipy.sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
     count, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)
