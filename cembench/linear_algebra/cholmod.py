@@ -1,10 +1,4 @@
-"""Sparse Cholesky by cvxopt's CHOLMOD, the default: the fastest library that installs as a wheel.
-
-cvxopt keeps its options in one dictionary per process, so they are set before each use:
-``supernodal = 2`` (which also makes an indefinite matrix an error), ``nmethods = 1`` (otherwise a
-given permutation may be ignored), and ``postorder``, which would mix a disconnected leading block
-with the rows after it.
-"""
+"""Sparse Cholesky by cvxopt's CHOLMOD, the default: the fastest that installs as a wheel."""
 
 from __future__ import annotations
 
@@ -17,8 +11,9 @@ from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
-from cembench.linear_algebra.orderings import as_permutation, minimum_degree, nested_dissection
-from cembench.linear_algebra.supernodes import factor_entries, order_of, trailing_block
+from cembench.linear_algebra.cholmod_options import set_options
+from cembench.linear_algebra.orderings import as_permutation, minimum_degree
+from cembench.linear_algebra.supernodes import factor_entries, trailing_block
 from cembench.linear_algebra.triangular import triangle_solved, triangle_times
 from cembench.linear_algebra.work import count_analysis, count_factorisation
 
@@ -26,7 +21,8 @@ from cembench.linear_algebra.work import count_analysis, count_factorisation
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
 
 
-#: From a lower triangle to the order of its rows.
+#: From a lower triangle to the order of its rows, by the postorder of the elimination tree:
+#: otherwise columns of one supernode would not be neighbours.
 Order = Callable[[spmatrix], NDArray[np.int64]]
 
 
@@ -49,15 +45,14 @@ class CholmodFactor:
 
     def _analyse(self) -> None:
         with phase("symbolic"):
-            _set_options()
-            cholmod.options["postorder"] = self._leading is None
+            set_options(postorder=self._leading is None)
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
             count_analysis()
 
     def _factor(self) -> None:
         self._trailing: NDArray[np.float64] | None = None
         with phase("factorisation"):
-            _set_options()
+            set_options(postorder=self._leading is None)
             try:
                 cholmod.numeric(self._lower, self._symbolic)
             except ArithmeticError as error:
@@ -132,13 +127,6 @@ class CholmodFactor:
         return np.array(x)[: self._leading]
 
 
-def _set_options() -> None:
-    """Set the options of CHOLMOD, which are global."""
-    cholmod.options["supernodal"] = 2
-    cholmod.options["nmethods"] = 1
-    cholmod.options["print"] = 0
-
-
 def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:
     """Return the lower triangle of A, and which entries of A it has."""
     A = _in_order(A)
@@ -160,21 +148,5 @@ def _permutation(lower: spmatrix, leading: int | None, order: Order) -> matrix:
     """Return the order of all rows, or that of the leading block with the others after it."""
     if leading is None:
         return as_permutation(order(lower))
-    first = np.zeros(0, dtype=np.int64)
-    if leading:
-        block = lower[:leading, :leading]
-        first = order(block)
-        if order is nested_dissection:
-            first = _postordered(block, first)
+    first = order(lower[:leading, :leading]) if leading else np.zeros(0, dtype=np.int64)
     return as_permutation(np.concatenate([first, np.arange(leading, lower.size[0])]))
-
-
-def _postordered(lower: spmatrix, order: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return an equivalent order by the postorder of the elimination tree, as AMD's already is.
-
-    Otherwise columns of one supernode would not be neighbours.
-    """
-    _set_options()
-    cholmod.options["postorder"] = True
-    found = order_of(cholmod.symbolic(lower, as_permutation(order)), len(order))
-    return order if found is None else found

@@ -8,18 +8,21 @@ or where memory is short.
 from __future__ import annotations
 
 import numpy as np
-from cvxopt import amd, matrix, spmatrix
+from cvxopt import amd, cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.linear_algebra.cholmod_options import set_options
+from cembench.linear_algebra.supernodes import order_of
+
 
 def minimum_degree(lower: spmatrix) -> NDArray[np.int64]:
-    """Return the AMD ordering (n,) of the matrix with this lower triangle."""
+    """Return the AMD ordering (n,) of the matrix with this lower triangle; it is a postorder."""
     return np.array(amd.order(lower)).ravel()
 
 
 def nested_dissection(lower: spmatrix) -> NDArray[np.int64]:
-    """Return the METIS ordering (n,) of the matrix with this lower triangle."""
+    """Return the METIS ordering (n,) of the matrix with this lower triangle, postordered."""
     import pymetis  # an extra
 
     starts, rows, _ = (np.array(part).ravel() for part in lower.CCS)
@@ -34,7 +37,14 @@ def nested_dissection(lower: spmatrix) -> NDArray[np.int64]:
     )
     order = np.empty(lower.size[0], dtype=np.int64)
     order[:] = pymetis.nested_dissection(whole)[0]  # of a type that cvxopt does not know
-    return order
+    return _postordered(lower, order)
+
+
+def _postordered(lower: spmatrix, order: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the equivalent order by the postorder of the elimination tree."""
+    set_options(postorder=True)
+    found = order_of(cholmod.symbolic(lower, as_permutation(order)), len(order))
+    return order if found is None else np.asarray(found, dtype=np.int64)
 
 
 def as_permutation(order: NDArray[np.int64]) -> matrix:
