@@ -142,4 +142,4 @@ def show_hours(found: dict[str, Any]) -> None:
         out.print(f"{machines:>6} {name}  about {duration(seconds)}{limit}", soft_wrap=True)
     longest, useful = duration(found["longest_seconds"]), f"{found['useful']:,}"
     most = f"more than {useful} machines gain nothing" if found["useful"] > 1 else "one is enough"
-    out.print(f"{found['units']:>6,} of them, the longest about {longest}: {most}", soft_wrap=True)
+    out.print(f"The longest of {found['units']:,} takes about {longest}: {most}", soft_wrap=True)

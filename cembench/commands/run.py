@@ -189,8 +189,9 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
     from dataclasses import asdict
 
     from cembench.report.render.terminal import changes_table
+    from cembench.results.machines import COMPARED, differences
     from cembench.results.many import corrected
-    from cembench.results.runs_compared import compare_runs, machine_differences
+    from cembench.results.runs_compared import compare_runs
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
 
@@ -204,8 +205,8 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
         )
     earlier, later = old.environments(), new.environments()
     pairs = {(c.before.environment, c.after.environment) for c in changes}
-    differences = sorted(
-        {d for b, a in pairs for d in machine_differences(earlier.get(b, {}), later.get(a, {}))}
+    differing = sorted(
+        {d for b, a in pairs for d in differences(earlier.get(b, {}), later.get(a, {}), COMPARED)}
     )
     if as_json:
         together = corrected([c.comparison for c in changes])
@@ -222,12 +223,12 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
             }
             for c, both in zip(changes, together, strict=True)
         ]
-        print_json({"differences": differences, "cells": rows})
+        print_json({"differences": differing, "cells": rows})
     else:
         out.print(changes_table(changes))
-    if differences:
+    if differing:
         warn("the runs were measured under different conditions; their seconds are not comparable")
-        for difference in differences:
+        for difference in differing:
             warn(difference)
 
 

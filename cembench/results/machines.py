@@ -103,6 +103,8 @@ def software_differences(records: Sequence[Record], environments: Environments) 
 #: The facts of an environment that are the software's. What BLAS was loaded is not among them: a
 #: process that has planned a run has loaded more than one that measures.
 SOFTWARE = ("cembench", "git", "python", "libraries")
+#: The facts that must agree for the seconds of two runs to be compared, of whatever commits.
+COMPARED = ("machine", "cpu", "cores", "memory_bytes", "platform", "python", "libraries", "blas")
 
 
 def software_of(environment: Mapping[str, Any]) -> dict[str, Any]:
@@ -110,14 +112,16 @@ def software_of(environment: Mapping[str, Any]) -> dict[str, Any]:
     return {name: environment.get(name) for name in SOFTWARE}
 
 
-def differences(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> list[str]:
-    """Return which versions differ, ours first.
+def differences(
+    ours: Mapping[str, Any], theirs: Mapping[str, Any], facts: Sequence[str] = SOFTWARE
+) -> list[str]:
+    """Return which of these facts of two environments differ, ours first.
 
     >>> differences({"python": "3.11.2"}, {"python": "3.12.1"})
     ['python: 3.11.2 / 3.12.1']
     """
     found = []
-    for name in SOFTWARE:
+    for name in facts:
         mine, other = ours.get(name), theirs.get(name)
         if isinstance(mine, Mapping) and isinstance(other, Mapping):
             found += [

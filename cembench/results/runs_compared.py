@@ -82,21 +82,3 @@ def _drift(before: Sequence[Round], after: Sequence[Round]) -> float | None:
 def _same(record: Record) -> str:
     cell = record.cell
     return f"{cell.algorithm} {sorted(cell.parameters.items())} {circumstances(cell)}"
-
-
-def machine_differences(before: Mapping[str, object], after: Mapping[str, object]) -> list[str]:
-    """Return the differences between two environments that make their seconds incomparable."""
-    return [
-        f"{name}: {before.get(name)} / {after.get(name)}"
-        for name in (
-            "machine",
-            "cpu",
-            "cores",
-            "memory_bytes",
-            "platform",
-            "python",
-            "libraries",
-            "blas",
-        )
-        if before.get(name) != after.get(name)
-    ]

@@ -16,7 +16,8 @@ from cembench.results.records import (
     Record,
     Round,
 )
-from cembench.results.runs_compared import compare_runs, machine_differences
+from cembench.results.machines import COMPARED, differences
+from cembench.results.runs_compared import compare_runs
 
 
 def record_of(seconds, sittings=None, **cell):
@@ -131,8 +132,11 @@ def test_two_runs_compare_cell_by_cell():
 
 def test_machines_differ_in_what_changes_seconds():
     one = {"cpu": "x", "cores": 2, "git": "a"}
-    assert machine_differences(one, one | {"git": "b"}) == []
-    assert machine_differences(one, one | {"cpu": "y"}) == ["cpu: x / y"]
+    assert differences(one, one | {"git": "b"}, COMPARED) == []
+    assert differences(one, one | {"cpu": "y"}, COMPARED) == ["cpu: x / y"]
+    libraries = {"libraries": {"numpy": "2.4", "scipy": "1.16"}}
+    other = {"libraries": {"numpy": "2.5", "scipy": "1.16"}}
+    assert differences(libraries, other, COMPARED) == ["numpy: 2.4 / 2.5"]
 
 
 def with_cpu(record, seconds):

@@ -107,7 +107,7 @@ def test_hours_are_told_in_eighty_columns_with_what_limits_them(capsys):
     told = capsys.readouterr().out
     assert max(map(len, told.splitlines())) <= 80
     assert "10 machines  about 13 min, as long as two takes" in told
-    assert "2 of them, the longest about 13 min: more than 2 machines gain nothing" in told
+    assert "The longest of 2 takes about 13 min: more than 2 machines gain nothing" in told
     show_hours(hours([], [], None))
     assert capsys.readouterr().out == ""
 
