@@ -8,7 +8,7 @@ level. If a run has no kernel times, plain seconds are compared; the interval th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log
 from statistics import median

@@ -7,6 +7,7 @@ from cembench.results.comparison import (
     compare_ratios,
     is_unstable,
 )
+from cembench.results.machines import COMPARED, differences
 from cembench.results.records import (
     DEFAULT_ROUNDS,
     Cell,
@@ -16,7 +17,6 @@ from cembench.results.records import (
     Record,
     Round,
 )
-from cembench.results.machines import COMPARED, differences
 from cembench.results.runs_compared import compare_runs
 
 
