@@ -25,7 +25,7 @@ ROUNDING = 1e-10
 NEXT = np.array([1, 2, 0, 1])
 #: Maximal rounds of flips; a real surface takes about ten.
 MOST_ROUNDS = 1000
-#: Up to this share of obtuse angles, whether all edges are Delaunay is found out beforehand.
+#: Up to this share of obtuse angles, the edges opposite to them are examined alone first.
 FEW = 0.02
 
 
@@ -70,7 +70,7 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
 
 
 def _is_delaunay(F: Indices, lengths: Real, weights: Real) -> bool:
-    """Whether all edges are found to be Delaunay by those opposite to obtuse angles, if few."""
+    """Whether all edges are known to be Delaunay: few angles are obtuse, their edges all right."""
     obtuse = np.flatnonzero(weights < 0)
     if not len(obtuse) or len(obtuse) > FEW * weights.size:
         return not len(obtuse)

@@ -214,18 +214,15 @@ def in_common_gauge(mesh: TriangleMesh, uv: Complex) -> Complex:
     return moved_to_gauge(uv, gauge_measure(mesh, "area", mesh.loops[0]))
 
 
-def area_distortion(mesh: TriangleMesh, uv: Complex) -> tuple[float, float]:
+def area_distortion(areas: Real, images: Real) -> tuple[float, float]:
     """Return mean and standard deviation of the area distortion, weighted by surface area.
 
     The distortion of a triangle is the logarithm of its area in the image over that on the surface,
     at the scale of the image that is best in least squares, so that the weighted mean is 0. The
     first value is the mean of the absolute values, the second the standard deviation. Folded
-    triangles count with the size of their area; infinite if a triangle collapsed.
+    triangles count with the size of their area; infinite if a triangle collapsed. `areas` (m,) are
+    those on the surface, `images` (m,) the signed areas in the image.
     """
-    return _distortion_of_areas(surface_areas(mesh), signed_areas(uv, mesh.F))
-
-
-def _distortion_of_areas(areas: Real, images: Real) -> tuple[float, float]:
     held = areas > 0
     areas, images = areas[held], images[held]
     weights = areas / areas.sum()
@@ -319,7 +316,7 @@ class MapFigures:
         """Mean and standard deviation; for a disk map in the common gauge."""
         if self.centred is None:
             return float("inf"), float("inf")
-        return _distortion_of_areas(self.areas, signed_areas(self.centred, self.mesh.F))
+        return area_distortion(self.areas, signed_areas(self.centred, self.mesh.F))
 
     @cached_property
     def overlap(self) -> float:
