@@ -18,7 +18,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 
 ROUNDS = 5
 
@@ -43,7 +43,7 @@ def main() -> None:
     )
     for job in jobs:
         command = [sys.executable, __file__, "--one", json.dumps(job)]
-        run = subprocess.run(command, capture_output=True, text=True, env=with_threads(1))
+        run = subprocess.run(command, capture_output=True, text=True, env=for_measuring(1))
         if run.returncode:
             sys.exit(run.stderr)
         found = json.loads(run.stdout)

@@ -19,7 +19,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 
 FACES = [20_000, 60_000, 190_000, 580_000, 1_700_000]
 #: A size is measured so long at least, or in so many rounds: short calls need more of them.
@@ -44,7 +44,7 @@ def main() -> None:
     for job in jobs:
         given = json.dumps({"surface": job, "rounds": arguments.rounds})
         command = [sys.executable, __file__, "--one", given]
-        run = subprocess.run(command, capture_output=True, text=True, env=with_threads(1))
+        run = subprocess.run(command, capture_output=True, text=True, env=for_measuring(1))
         if run.returncode:
             sys.exit(run.stderr)
         one = json.loads(run.stdout)

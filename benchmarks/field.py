@@ -29,7 +29,7 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.reading import is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm, load_registry
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 from cembench.running.judge import faults
 
 PAGE = Path(__file__).parents[1] / "docs/algorithms.md"
@@ -54,8 +54,9 @@ def main() -> None:
     parser.add_argument("--longest", type=float, default=60, help="CPU seconds; longer: one call")
     chosen = parser.parse_args()
     # Libraries read them when they are loaded: this program starts anew with them.
-    if os.environ.get("OMP_NUM_THREADS") != "1":
-        os.execve(sys.executable, [sys.executable, *sys.argv], with_threads(1))
+    environment = for_measuring(1)
+    if dict(os.environ) != environment:
+        os.execve(sys.executable, [sys.executable, *sys.argv], environment)
     warnings.simplefilter("ignore")
     kept: dict[str, Any] = {}
     if chosen.results and chosen.results.is_file():

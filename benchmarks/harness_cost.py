@@ -32,7 +32,7 @@ from cembench.registry import load_registry
 from cembench.results.comparison import compare_ratios
 from cembench.results.records import Outcome, Round
 from cembench.results.store import Store
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 from cembench.running.judging import Checked
 from cembench.running.local import Launcher, Options, run_tasks
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
@@ -101,7 +101,7 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
 
         def bare() -> float:
             command = [sys.executable, "-c", BARE, str(faces)]
-            run = subprocess.run(command, capture_output=True, env=with_threads(1), check=True)
+            run = subprocess.run(command, capture_output=True, env=for_measuring(1), check=True)
             return float(run.stdout)
 
         ways = {

@@ -21,7 +21,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 
 #: The phases that condensation is to save.
 FACTORING = (
@@ -54,7 +54,7 @@ def main() -> None:
     for job in jobs:
         job["rounds"] = arguments.rounds
         command = [sys.executable, __file__, "--one", json.dumps(job)]
-        run = subprocess.run(command, capture_output=True, text=True, env=with_threads(1))
+        run = subprocess.run(command, capture_output=True, text=True, env=for_measuring(1))
         if run.returncode:
             sys.exit(run.stderr)
         row = json.loads(run.stdout)

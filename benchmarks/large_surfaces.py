@@ -20,10 +20,10 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from benchmarks.limit import read_surface
+from benchmarks.limit import from_anywhere, read_surface
 from benchmarks.pages import ROOT, fill
 from cembench.linear_algebra.backends import available_backends
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 
 BACKENDS = ("cvxopt", "cvxopt-metis")
 THREADS = (1, 2)
@@ -77,10 +77,16 @@ def line(surface: str, backend: str, threads: int, runs: list[dict[str, Any]]) -
 
 def in_fresh_process(surface: str, algorithm: str, backend: str, threads: int) -> dict[str, Any]:
     """Return what one call costs, in a process of its own."""
-    where = surface if surface.isdigit() else str(Path(surface).absolute())
-    command = [sys.executable, "-m", "benchmarks.large_surfaces", "--one", where, backend]
+    command = [
+        sys.executable,
+        "-m",
+        "benchmarks.large_surfaces",
+        "--one",
+        from_anywhere(surface),
+        backend,
+    ]
     command += ["--algorithm", algorithm]
-    environment = with_threads(threads)
+    environment = for_measuring(threads)
     run = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=ROOT)
     if run.returncode:
         sys.exit(run.stderr)

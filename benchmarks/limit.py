@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.pages import ROOT, fill
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 
 CAPS = ["20000", "190000", "1700000"]
 METHODS = ("cem, 2 iterations", "cem", "direct-cem", "direct-cem, own weights")
@@ -50,10 +50,11 @@ def main() -> None:
         return
     found = []
     for surface in arguments.surfaces:
-        where = surface if surface.isdigit() else str(Path(surface).absolute())
-        command = [sys.executable, "-m", "benchmarks.limit", "--one", where]
+        command = [sys.executable, "-m", "benchmarks.limit", "--one", from_anywhere(surface)]
         command += ["--rounds", str(arguments.rounds), "--clock", arguments.clock]
-        run = subprocess.run(command, capture_output=True, text=True, env=with_threads(1), cwd=ROOT)
+        run = subprocess.run(
+            command, capture_output=True, text=True, env=for_measuring(1), cwd=ROOT
+        )
         if run.returncode:
             sys.exit(run.stderr)
         found.append(json.loads(run.stdout))
@@ -158,6 +159,11 @@ def measure_one(name: str, rounds: int, clock: str) -> dict[str, Any]:
         "phases": phases,
         "iterations": iterations,
     }
+
+
+def from_anywhere(name: str) -> str:
+    """Return what :func:`read_surface` is to be given in a process in another folder."""
+    return name if name.isdigit() else str(Path(name).absolute())
 
 
 def read_surface(name: str) -> Any:

@@ -17,7 +17,7 @@ import subprocess
 import sys
 from time import perf_counter
 
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 
 ROUNDS, FRAMES = 5, 48
 
@@ -35,7 +35,7 @@ def main() -> None:
         return
     job = {"names": arguments.surfaces, "faces": arguments.faces}
     command = [sys.executable, __file__, "--one", json.dumps(job)]
-    environment = with_threads(arguments.threads)
+    environment = for_measuring(arguments.threads)
     run = subprocess.run(command, capture_output=True, text=True, env=environment)
     if run.returncode:
         sys.exit(run.stderr)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.local import Launcher
 from cembench.running.process import run_limited
@@ -50,7 +50,7 @@ def one_server(_servers, monkeypatch):
         if self.number or not can_fork(job.cell.threads):  # several at a time need several servers
             return started(self, job, limits, log)
         try:
-            server = _servers.of(with_threads(job.cell.threads), job.cell.backend)
+            server = _servers.of(for_measuring(job.cell.threads), job.cell.backend)
             path = self._write(job.model_copy(update={"parent": server.pid}))
             return run_limited(server.forking(path), limits, log, stopped=self._stopped.is_set)
         except ServerGoneError:

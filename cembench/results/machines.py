@@ -104,7 +104,10 @@ def software_differences(records: Sequence[Record], environments: Environments) 
 #: process that has planned a run has loaded more than one that measures.
 SOFTWARE = ("cembench", "git", "python", "libraries")
 #: The facts that must agree for the seconds of two runs to be compared, of whatever commits.
-COMPARED = ("machine", "cpu", "cores", "memory_bytes", "platform", "python", "libraries", "blas")
+COMPARED = (
+    *("machine", "cpu", "cores", "memory_bytes", "allocator"),
+    *("platform", "python", "libraries", "blas"),
+)
 
 
 def software_of(environment: Mapping[str, Any]) -> dict[str, Any]:
@@ -123,7 +126,8 @@ def differences(
     found = []
     for name in facts:
         mine, other = ours.get(name), theirs.get(name)
-        if isinstance(mine, Mapping) and isinstance(other, Mapping):
+        if isinstance(mine, Mapping) or isinstance(other, Mapping):
+            mine, other = mine or {}, other or {}  # older records lack some facts
             found += [
                 f"{part}: {mine.get(part)} / {other.get(part)}"
                 for part in sorted({*mine, *other})

@@ -21,14 +21,39 @@ THREAD_VARIABLES = (
     "IGL_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
+#: Settings of glibc's allocator, which it reads when a process starts; others ignore them.
+ALLOCATOR_VARIABLE = "GLIBC_TUNABLES"
+#: Memory comes in huge pages where Linux offers them on request, and what is freed stays with the
+#: process for its next call. Otherwise a call pays for its memory again, or not, by the addresses
+#: that a process happens to have: some are slower by a fifth from the first call to the last.
+ALLOCATOR = {
+    "glibc.malloc.hugetlb": "1",
+    "glibc.malloc.mmap_max": "0",
+    "glibc.malloc.trim_threshold": str(2**40),
+}
+_OFFERED = Path("/sys/kernel/mm/transparent_hugepage/enabled")
 #: Names the machine in records; set it where the system's name changes, as in containers.
 MACHINE_VARIABLE = "CEMBENCH_MACHINE"
 _LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pymetis", "pypardiso", "pydantic")
 
 
-def with_threads(count: int) -> dict[str, str]:
-    """Return an environment in which numerical libraries use this many threads."""
-    return os.environ | dict.fromkeys(THREAD_VARIABLES, str(count))
+def for_measuring(threads: int) -> dict[str, str]:
+    """Return the environment of processes whose calls are timed.
+
+    Numerical libraries use `threads` threads, and memory is handled as :data:`ALLOCATOR` says,
+    unless the user's own settings of the allocator say otherwise.
+
+    Examples
+    --------
+    >>> for_measuring(1)["OMP_NUM_THREADS"]
+    '1'
+
+    """
+    own = [one for one in os.environ.get(ALLOCATOR_VARIABLE, "").split(":") if one]
+    named = {one.partition("=")[0] for one in own}
+    ours = [f"{name}={value}" for name, value in ALLOCATOR.items() if name not in named]
+    allocator = {ALLOCATOR_VARIABLE: ":".join(own + ours)}
+    return os.environ | dict.fromkeys(THREAD_VARIABLES, str(threads)) | allocator
 
 
 def usable_cores() -> int:
@@ -56,6 +81,7 @@ def describe_environment() -> dict[str, Any]:
         "cores": psutil.cpu_count(logical=False),
         "hardware_threads": psutil.cpu_count(),
         "memory_bytes": psutil.virtual_memory().total,
+        "allocator": _allocator(),
         "libraries": {name: _version(name) for name in _LIBRARIES},
         "blas": sorted(
             f"{pool['internal_api']} {pool.get('version') or '?'} "
@@ -66,6 +92,16 @@ def describe_environment() -> dict[str, Any]:
     }
     content = json.dumps(about, sort_keys=True).encode()
     return about | {"id": hashlib.sha256(content).hexdigest()[:12]}
+
+
+def _allocator() -> dict[str, str | None]:
+    """Return the allocator's settings in timed processes, and when Linux gives huge pages."""
+    offered = _OFFERED.read_text() if _OFFERED.exists() else ""
+    chosen = offered.partition("[")[2].partition("]")[0]
+    return {
+        "settings": for_measuring(1)[ALLOCATOR_VARIABLE],
+        "huge_pages": chosen or None,
+    }
 
 
 def _version(package: str) -> str | None:

@@ -59,7 +59,7 @@ from cembench.results.records import (
 from cembench.results.samples import Samples
 from cembench.results.store import Store
 from cembench.running.comparable import impossible, incomparable, is_cold
-from cembench.running.environment import describe_environment, with_threads
+from cembench.running.environment import describe_environment, for_measuring
 from cembench.running.estimate import expected_bytes
 from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
@@ -811,7 +811,7 @@ class Launcher:
 
     def _started(self, job: Job, limits: Limits, log: Path) -> ProcessEnd:
         command = [sys.executable, "-m", "cembench.running.worker", str(self._write(job))]
-        start = spawning(command, with_threads(job.cell.threads))
+        start = spawning(command, for_measuring(job.cell.threads))
         return run_limited(start, limits, log, stopped=self._stopped.is_set)
 
     def _forked(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
@@ -821,7 +821,7 @@ class Launcher:
         if self._server is None or self._server.backend != job.cell.backend:
             self.close()
             try:
-                self._server = ForkServer(with_threads(job.cell.threads), job.cell.backend)
+                self._server = ForkServer(for_measuring(job.cell.threads), job.cell.backend)
             except ServerGoneError:
                 self.forks = False
                 return None
@@ -871,7 +871,7 @@ def _judges(number: int) -> ForkServer | None:
     if not can_fork(1):
         return None
     try:
-        server = ForkServer(with_threads(1), default_backend())
+        server = ForkServer(for_measuring(1), default_backend())
     except ServerGoneError:
         return None
     atexit.register(server.close)

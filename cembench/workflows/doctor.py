@@ -147,8 +147,11 @@ def _extra(extra: Extra) -> InstallationFinding:
 
 def _machine() -> InstallationFinding:
     about = describe_environment()
+    pages = about["allocator"]["huge_pages"]
     detail = (
         f"{about['cpu']}, {about['hardware_threads']} hardware threads, "
-        f"{about['memory_bytes'] / 2**30:.0f} GiB; {'; '.join(about['blas']) or 'BLAS unknown'}"
+        f"{about['memory_bytes'] / 2**30:.0f} GiB"
+        f"{f' (huge pages: {pages})' if pages else ''}; "
+        f"{'; '.join(about['blas']) or 'BLAS unknown'}"
     )
     return InstallationFinding("machine", True, detail, required=False)

@@ -137,6 +137,8 @@ def test_machines_differ_in_what_changes_seconds():
     libraries = {"libraries": {"numpy": "2.4", "scipy": "1.16"}}
     other = {"libraries": {"numpy": "2.5", "scipy": "1.16"}}
     assert differences(libraries, other, COMPARED) == ["numpy: 2.4 / 2.5"]
+    pages = {"allocator": {"huge_pages": "madvise"}}
+    assert differences({}, pages, COMPARED) == ["huge_pages: None / madvise"]
 
 
 def with_cpu(record, seconds):

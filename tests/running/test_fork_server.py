@@ -8,7 +8,7 @@ import psutil
 import pytest
 
 from cembench.results.records import Outcome, Round
-from cembench.running.environment import with_threads
+from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.local import Launcher, Options
 from cembench.running.measure import Checked
@@ -45,6 +45,8 @@ def test_a_forked_process_finds_pinned_threads_its_own_group_and_no_algorithm_lo
     assert forked.endswith("fork_server.py 1 True [] 0")
     threaded = timed(launcher, "tells-where", threads=2).cause
     assert threaded.endswith("worker.py 2 True [] 0")
+    for told in (forked, threaded):
+        assert "glibc.malloc.hugetlb=" in told
 
 
 @pytest.mark.parametrize(
@@ -104,14 +106,14 @@ def test_without_a_server_processes_are_started(launcher, monkeypatch):
     monkeypatch.undo()
     monkeypatch.setattr("cembench.running.fork_server.sys.executable", "/bin/false")
     with pytest.raises(ServerGoneError):
-        ForkServer(with_threads(1), "cvxopt")
+        ForkServer(for_measuring(1), "cvxopt")
 
 
 def test_the_server_ends_with_the_one_that_started_it():
     script = (
-        "import os, time; from cembench.running.environment import with_threads;"
+        "import os, time; from cembench.running.environment import for_measuring;"
         "from cembench.running.fork_server import ForkServer;"
-        "print(ForkServer(with_threads(1), 'cvxopt').pid, flush=True); time.sleep(600)"
+        "print(ForkServer(for_measuring(1), 'cvxopt').pid, flush=True); time.sleep(600)"
     )
     run = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
     server = psutil.Process(int(run.stdout.readline()))

@@ -15,7 +15,7 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.results.records import FaultKind
 from cembench.results.store import Store
-from cembench.running.environment import describe_environment, with_threads
+from cembench.running.environment import ALLOCATOR, describe_environment, for_measuring
 from cembench.running.fork_server import can_fork
 from cembench.running.local import (
     Launcher,
@@ -320,8 +320,20 @@ def test_an_edited_plugin_is_a_new_cell(tmp_path):
 
 
 def test_threads_are_pinned_for_the_cell_s_process():
-    pinned = with_threads(3)
+    pinned = for_measuring(3)
     assert {pinned[k] for k in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")} == {"3"}
+
+
+@pytest.mark.parametrize(
+    "own", ["", "glibc.malloc.arena_max=1", "glibc.malloc.hugetlb=0:glibc.malloc.arena_max=1"]
+)
+def test_timed_processes_keep_their_memory_unless_the_user_decides(monkeypatch, own):
+    monkeypatch.setenv("GLIBC_TUNABLES", own)
+    settings = for_measuring(1)["GLIBC_TUNABLES"]
+    found = dict(one.split("=") for one in settings.split(":"))
+    assert found == ALLOCATOR | dict(one.split("=") for one in own.split(":") if one)
+    assert len(found) == settings.count("=")
+    assert describe_environment()["allocator"]["settings"] == settings
 
 
 def test_the_environment_says_what_a_figure_depends_on():
