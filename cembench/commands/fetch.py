@@ -163,28 +163,18 @@ class _Bar:
     line: TaskID
     total: int = 0
     whole: TaskID | None = None
-    seen: int = 0
 
     def update(self, count: int) -> None:
         """Add bytes that have arrived."""
         self.bars.update(self.line, advance=count, total=self.total or None)
-        self._advance_whole(count)
-
-    def reset(self) -> None:
-        """Set the bar to zero; the download loop ends with this and one update for all bytes."""
-        self.bars.reset(self.line)
-        self._advance_whole(-self.seen)
+        if self.whole is not None:
+            self.bars.update(self.whole, advance=count)
 
     def close(self) -> None:
         """Hide the bar of this file if there are others."""
         self.bars.stop_task(self.line)
         if self.whole is not None:
             self.bars.update(self.line, visible=False)
-
-    def _advance_whole(self, count: int) -> None:
-        self.seen += count
-        if self.whole is not None:
-            self.bars.update(self.whole, advance=count)
 
 
 @contextmanager

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, Protocol, cast
+from typing import TYPE_CHECKING, BinaryIO, Protocol, cast
 from urllib.parse import quote
 
 from platformdirs import user_cache_dir
@@ -27,6 +27,9 @@ from cembench.core.atomic import is_draft, write, write_bytes
 from cembench.core.errors import CembenchError, DatasetError, MeshError, RecordError
 from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
+
+if TYPE_CHECKING:
+    from requests import Response
 
 #: Environment variable for the cache folder.
 CACHE_VARIABLE = "CEMBENCH_CACHE"
@@ -46,9 +49,6 @@ class Progress(Protocol):
 
     def update(self, count: int) -> None:
         """Receive the number of bytes that have arrived since the last call."""
-
-    def reset(self) -> None:
-        """Start again from zero bytes."""
 
     def close(self) -> None:
         """End the display."""
@@ -339,20 +339,34 @@ def surface_file(dataset: Dataset) -> Path:
 
 def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progress | None) -> None:
     """Download a dataset's file; :class:`DatasetError` if that fails."""
-    import pooch
     import requests
 
-    download = pooch.HTTPDownloader(timeout=timeout, progressbar=progress or False)
     try:
-        download(dataset.url, file, None)
+        with requests.get(dataset.url, timeout=timeout, stream=True) as answer:
+            answer.raise_for_status()
+            _receive(answer, file, progress)
     except requests.RequestException as error:
-        if error.response is not None:  # refused: nobody has read it to its end
-            error.response.close()
         raise DatasetError(
             f"cannot fetch {dataset.file} from {dataset.url}: {type(error).__name__}: {error}. "
             f"Check the network, set {MIRROR_VARIABLE} to a mirror, or put the file at "
             f"{dataset.path}."
         ) from error
+
+
+def _receive(answer: Response, file: BinaryIO, progress: Progress | None) -> None:
+    """Write a server's answer to a file; progress counts the bytes that are sent."""
+    if progress is None:
+        for chunk in answer.iter_content(2**16):
+            file.write(chunk)
+        return
+    progress.total = int(answer.headers.get("Content-Length", 0))
+    told = 0
+    for chunk in answer.iter_content(2**16):
+        file.write(chunk)
+        arrived = answer.raw.tell()
+        progress.update(arrived - told)
+        told = arrived
+    progress.close()
 
 
 def _check_whole(dataset: Dataset, path: Path) -> None:

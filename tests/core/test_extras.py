@@ -102,7 +102,7 @@ def a_film(folder):
 @pytest.mark.parametrize(
     ("use", "module", "extra"),
     [
-        (fetching, "pooch", Extra.FETCH),
+        (fetching, "requests", Extra.FETCH),
         (a_report, "plotly", Extra.REPORT),
         (a_validation, "jinja2", Extra.REPORT),
         (parquet, "pyarrow", Extra.PARQUET),
