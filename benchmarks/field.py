@@ -64,9 +64,13 @@ def main() -> None:
     known = [a for a in load_registry().algorithms.values() if a.mesh_type is DiskMesh]
     if chosen.seconds:
         costs = timed(chosen.meshes, known, chosen.longest)
+        if not costs:
+            sys.exit(f"{chosen.meshes} has none of {', '.join(TIMED)}: {PAGE.name} stays as it is.")
         fill(SECONDS_BEGIN, SECONDS_END, seconds_table(costs, known))
         return
     found = dict(disks(chosen.meshes))
+    if not found:
+        sys.exit(f"{chosen.meshes} has no disk: {PAGE.name} stays as it is.")
     for name, mesh in sorted(found.items(), key=lambda item: item[1].m):
         if mesh.m > chosen.most_faces:
             continue

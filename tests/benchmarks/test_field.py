@@ -1,7 +1,11 @@
+import subprocess
+import sys
+
 import numpy as np
+import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from benchmarks.field import cell, disks, figures, seconds_table, tables, timed
+from benchmarks.field import PAGE, cell, disks, figures, seconds_table, tables, timed
 from cembench import DiskMesh
 from cembench.mesh.files import write_mesh
 from cembench.registry import load_registry
@@ -49,3 +53,13 @@ def test_the_cost_is_told_beside_direct_cem_s_and_a_refusal_is_a_dash(tmp_path):
     lines = seconds_table(costs, known).splitlines()
     assert lines[0] == "| algorithm | target | chinese_lion.obj, s | / direct-cem |"
     assert lines[3:] == ["| `harmonic-circle` | disk | 0.123 | 0.50 |", "| `cetm` | disk | - | - |"]
+
+
+@pytest.mark.parametrize("more", [[], ["--seconds"]])
+def test_without_a_surface_the_page_stays_as_it_is(more, tmp_path):
+    before = PAGE.read_bytes()
+    command = [sys.executable, "-m", "benchmarks.field", str(tmp_path), *more]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1
+    assert "stays as it is" in ended.stderr
+    assert PAGE.read_bytes() == before
