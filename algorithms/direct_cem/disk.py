@@ -54,9 +54,10 @@ def direct_cem(
     z^* S z / 2 - A(z), with S = L_bb - L_bi L_ii^-1 L_ib. One factorisation, interior first and
     boundary last, serves the start, the last Dirichlet solve and S, which is its trailing block.
     Newton steps (trust region, preconditioned by S^-1) involve only the boundary. Where that block
-    would be dearer than a few solves, on boundaries of more than 2,000 vertices, the interior alone
-    is factored and the steps are quasi-Newton ones, a solve each (`hessian_products` is then 0);
-    the choice is an estimate of operations (`interior_laplacian.py`).
+    would be dearer than a few solves, on boundaries of more than 500 vertices, the interior alone
+    is factored and the steps are quasi-Newton ones, each a solve from the boundary's neighbours to
+    these, which passes a third of the factor (`hessian_products` is then 0); the choice is an
+    estimate of operations (`interior_laplacian.py`).
 
     Decided here: the weights are those of the intrinsic Delaunay triangulation, none of which is
     negative; with `delaunay` off they are the cotangents of the mesh's own edges, as in CEM. The
@@ -119,8 +120,8 @@ def _by_solves(
     """Minimise with the interior factored alone; None where that is dearer or does not do."""
     if not solves_pay(len(mesh.interior), len(mesh.boundary)):
         return None
-    interior = InteriorLaplacian(mesh, L, mesh.boundary)
-    seen, weights = interior.swept_to_boundary(measures).T
+    interior = InteriorLaplacian(mesh, L, mesh.boundary, measures)
+    seen, weights = interior.swept.T
     arcs, begun = _starts(mesh, seen), "harmonic measure"
     start = in_gauge(CircleDomain.of_arcs(arcs[begun]), weights)
     S = interior.dirichlet_to_neumann(start.arcs)

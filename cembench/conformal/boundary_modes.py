@@ -20,8 +20,9 @@ Complex = NDArray[np.complex128]
 
 #: A vertex stands for the piece of boundary between its second neighbours.
 NEIGHBOURS = 2
-#: Grid points of the circle for the shortest arc, and at most.
-POINTS_AN_ARC, MOST_POINTS = 2, 2**18
+#: Grid points of the circle for each vertex, at least. A finer grid, for the shortest arcs, gives
+#: the same number of steps: vertices that share its cells are told apart by L_bb.
+POINTS_A_VERTEX = 4
 
 
 class InverseByModes:
@@ -42,8 +43,7 @@ class InverseByModes:
     """
 
     def __init__(self, arcs: Real, L_bb: scipy.sparse.sparray) -> None:
-        points = min(POINTS_AN_ARC * 2 * math.pi / arcs.min(), MOST_POINTS)
-        self._size = 2 ** math.ceil(math.log2(max(points, 4 * len(arcs))))
+        self._size = 2 ** math.ceil(math.log2(POINTS_A_VERTEX * len(arcs)))
         self._ends = _interval_ends(arcs, self._size)
         k = np.arange(self._size // 2 + 1.0)
         k[0] = np.inf  # constants are not seen

@@ -2,7 +2,8 @@
 
 With the boundary last in the order, as in :mod:`cembench.conformal.bordered`, a factor ends in a
 dense triangle, and before it the boundary's rows fill. On long boundaries that costs more than the
-interior's own factor and the few solves that replace it.
+interior's own factor and the few solves that replace it, from the boundary's neighbours to the
+boundary's neighbours: they pass a third of the factor (:mod:`cembench.linear_algebra.factor_part`).
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Shorter boundaries are always kept last: their dense triangle is small, and serves any step.
-LEAST_BOUNDARY = 2_000
+LEAST_BOUNDARY = 500
 #: The boundary's rows of a factor take so many operations, times B^2 sqrt(n): the separators that
 #: they meet have about sqrt(n) vertices.
 ROWS = 4.7
-#: Triangles of the factor passed with two columns, more than with the boundary last: 1 for harmonic
-#: measure, 2 for the start, 6 for three steps, where the boundary's order needs 2 in all.
-PASSES = 7
-#: What is spared must be worth so many times what is added: an estimate can fail.
-MARGIN = 1.5
+#: What is spared must be worth so many passes of the factor with two columns. Harmonic measure, the
+#: start and each of up to eight steps pass a third of it, the map little over half, where the
+#: boundary's order needs two in all; at two the ways cost about the same on real surfaces, and the
+#: rest is for those that have to be mapped the other way after all.
+PASSES = 3
 #: Boundaries that are multiples of each other, up to this relative deviation, have one solve.
 ALIKE = 1e-11
 #: How many harmonic maps are kept.
@@ -46,8 +47,8 @@ def solves_pay(interior: int, boundary: int) -> bool:
     """Return whether solves with L_ii are cheaper than a factor with the boundary last.
 
     That factor takes about B^3 / 3 + 4.7 B^2 sqrt(n) operations more for n interior and B boundary
-    vertices. The solves pass :data:`PASSES` triangles more, of 4.5 n log2(n) entries each, and an
-    entry is worth :data:`OPERATIONS_AN_ENTRY` operations.
+    vertices. The solves cost less than :data:`PASSES` passes of a factor of 4.5 n log2(n) entries,
+    each of which is worth :data:`OPERATIONS_AN_ENTRY` operations.
 
     Parameters
     ----------
@@ -58,15 +59,15 @@ def solves_pay(interior: int, boundary: int) -> bool:
     --------
     >>> solves_pay(550_053, 2_976)
     True
-    >>> solves_pay(1_100_000, 1_960)
+    >>> solves_pay(17_089, 245)
     False
 
     """
     if boundary <= LEAST_BOUNDARY or interior < 2 or not keeps_factors():
         return False
     spared = boundary**3 / 3 + ROWS * boundary**2 * math.sqrt(interior)
-    added = PASSES * ENTRIES * interior * math.log2(interior) * OPERATIONS_AN_ENTRY
-    return spared > MARGIN * added
+    one_pass = ENTRIES * interior * math.log2(interior) * OPERATIONS_AN_ENTRY
+    return spared > PASSES * one_pass
 
 
 class InteriorLaplacian:
@@ -80,6 +81,15 @@ class InteriorLaplacian:
         Its Laplacian.
     boundary : int64 (B,)
         Its boundary, in the order wanted.
+    measure : float (n, k)
+        What :attr:`swept` is the harmonic measure of.
+
+    Attributes
+    ----------
+    swept : float (B, k)
+        Boundary weights that give every harmonic function the same mean as `measure`.
+    L_bb : sparse (B, B)
+        The boundary's rows and columns of L.
 
     Raises
     ------
@@ -89,7 +99,11 @@ class InteriorLaplacian:
     """
 
     def __init__(
-        self, mesh: TriangleMesh, L: scipy.sparse.csc_array, boundary: NDArray[np.int64]
+        self,
+        mesh: TriangleMesh,
+        L: scipy.sparse.csc_array,
+        boundary: NDArray[np.int64],
+        measure: Real,
     ) -> None:
         self.interior, self.boundary = mesh.interior, boundary
         with phase("assembly"):
@@ -97,21 +111,22 @@ class InteriorLaplacian:
             own = permuted_lower(rows, self.interior)
             of_boundary = rows[boundary]
             self.L_bb = scipy.sparse.csc_array(of_boundary[:, boundary])
-            self._L_bi = of_boundary[:, self.interior]
-            self._L_ib = scipy.sparse.csr_array(self._L_bi.T)
-        self._factor = Cholesky(own, lower=True)
+            L_bi = of_boundary[:, self.interior]
+            inside = measure[self.interior]
+            some, few, near = _sparse_columns(inside, L_bi)
+            self._L_bn = L_bi[:, near]
+            self._L_nb = scipy.sparse.csr_array(self._L_bn.T)
+        factor = Cholesky(own, lower=True)
+        self._near = factor.among(near)
         self._maps: list[tuple[Complex, Complex]] = []
-
-    def swept_to_boundary(self, measure: Real) -> Real:
-        """Return the harmonic measure (B, k) of `measure` (n, k), by a solve for its inside."""
-        found, inside = measure[self.boundary], measure[self.interior]
-        some = inside.any(axis=0)
+        self.swept = measure[boundary]
+        if few.any():
+            self.swept[:, few] -= self._L_bn @ self._near.solve(inside[np.ix_(near, few)])
         if some.any():
-            found[:, some] -= self._L_bi @ self._factor.solve(inside[:, some])
-        return found
+            self.swept[:, some] -= L_bi @ factor.solve(inside[:, some])
 
-    def harmonic(self, f_b: Complex) -> Complex:
-        """Return the interior values with L_ii f_i = -L_ib f_b (Eq. 22).
+    def harmonic_near(self, f_b: Complex) -> Complex:
+        """Return the values next to the boundary of f with L_ii f_i = -L_ib f_b (Eq. 22).
 
         A boundary that is a complex multiple of an earlier one takes no solve.
         """
@@ -120,15 +135,16 @@ class InteriorLaplacian:
             if np.abs(f_b - turn * known).max() <= ALIKE * np.abs(f_b).max():
                 return np.asarray(turn * inside)
         with phase("assembly"):
-            right = -(self._L_ib @ f_b)
-        found: Complex = self._factor.solve(right)
+            right = -(self._L_nb @ f_b)
+        found: Complex = self._near.solve(right)
         self._maps = [(f_b, found), *self._maps[: KEPT - 1]]
         return found
 
     def harmonic_extension(self, f_b: Complex) -> Complex:
-        """Return the harmonic map (n,) with these boundary values."""
+        """Return the harmonic map (n,) with these boundary values, by little over half a solve."""
         f = np.empty(len(self.interior) + len(self.boundary), dtype=np.complex128)
-        f[self.boundary], f[self.interior] = f_b, self.harmonic(f_b)
+        f[self.boundary] = f_b
+        f[self.interior] = self._near.solve_everywhere(-(self._L_nb @ f_b))
         return f
 
     def dirichlet_to_neumann(self, arcs: Real) -> DirichletToNeumann:
@@ -140,7 +156,23 @@ class InteriorLaplacian:
 
     def product(self, f: Complex) -> Complex:
         """Return S f for f (B,)."""
-        return np.asarray(self.L_bb @ f + self._L_bi @ self.harmonic(f))
+        return np.asarray(self.L_bb @ f + self._L_bn @ self.harmonic_near(f))
+
+
+def _sparse_columns(
+    inside: Real, L_bi: scipy.sparse.csr_array
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+    """Return which columns (n_i, k) have many entries, which have few, and the rows of interest.
+
+    These rows are the boundary's neighbours and those of the columns with few entries, fewer than
+    there are neighbours.
+    """
+    wanted = np.zeros(len(inside), dtype=bool)
+    wanted[L_bi.indices] = True
+    entries = np.count_nonzero(inside, axis=0)
+    few = (entries > 0) & (entries <= np.count_nonzero(wanted))
+    wanted |= inside[:, few].any(axis=1)
+    return (entries > 0) & ~few, few, np.flatnonzero(wanted)
 
 
 class _BySolves(DirichletToNeumann):

@@ -145,6 +145,16 @@ class _Factor(Protocol):
     def solve_trailing(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
     def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
     def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None: ...
+    def part(self, rows: NDArray[np.int64]) -> _Part | None: ...
+
+
+class _Part(Protocol):
+    """The part of a factor that substitutions between some rows pass."""
+
+    share: float
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def solve_everywhere(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
 
 class Cholesky:
@@ -212,6 +222,14 @@ class Cholesky:
         _count(b)
         with phase("solves"):
             return by_real_columns(factor.solve, b)
+
+    def among(self, rows: NDArray[np.int64]) -> Among:
+        """Return what solves systems with right-hand sides that are zero outside these rows."""
+        if self._leading is not None:
+            raise ValueError("among needs a matrix without a leading block")
+        with phase("symbolic"):
+            part = None if self._kept is None else self._kept.part(rows)
+        return Among(self, rows, self._given.shape[0], part)
 
     def solve_leading(self, b: NDArray[Any]) -> NDArray[Any]:
         """Return x with A[:leading, :leading] x = b; shapes as for :meth:`solve`."""
@@ -318,6 +336,51 @@ class Cholesky:
         return _factor(self._how.backend, block, None)
 
 
+class Among:
+    """Solve systems whose right-hand sides are zero outside some rows; made by `Cholesky.among`.
+
+    If the factor shows its supernodes, only the columns that lead from these rows to the root of
+    the elimination tree are passed; else these are usual solves.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scipy import sparse
+    >>> A = sparse.diags_array([-1, 4, -1], offsets=[-1, 0, 1], shape=(9, 9))
+    >>> ends = Cholesky(A).among(np.array([0, 8]))
+    >>> ends.solve(np.array([1.0, 0.0]))
+    array([2.67949193e-01, 1.90734863e-06])
+
+    """
+
+    def __init__(
+        self, whole: Cholesky, rows: NDArray[np.int64], n: int, part: _Part | None
+    ) -> None:
+        self._whole, self._rows, self._n, self._part = whole, rows, n, part
+
+    def solve(self, b: NDArray[Any]) -> NDArray[Any]:
+        """Return the entries at the rows of x with A x = b, for b at the rows and 0 elsewhere.
+
+        b is (rows,) or (rows, k), real or complex, and so is x. Counted as the share of a solve
+        that is passed.
+        """
+        if self._part is None:
+            return self.solve_everywhere(b)[self._rows]
+        _count(b, self._part.share)
+        with phase("solves"):
+            return by_real_columns(self._part.solve, b)
+
+    def solve_everywhere(self, b: NDArray[Any]) -> NDArray[Any]:
+        """Return all entries of x, (n,) or (n, k); half a solve is the same share of one."""
+        if self._part is None:
+            padded = np.zeros((self._n, *b.shape[1:]), dtype=b.dtype)
+            padded[self._rows] = b
+            return self._whole.solve(padded)
+        _count(b, (1 + self._part.share) / 2)
+        with phase("solves"):
+            return by_real_columns(self._part.solve_everywhere, b)
+
+
 def _count(b: NDArray[Any], share: float = 1.0) -> None:
     """Count the real columns of right-hand sides (n,) or (n, k)."""
     columns = b.size // max(1, len(b))
@@ -385,3 +448,6 @@ class _SeparateFactors:
 
     def extended(self, B: NDArray[np.float64]) -> None:
         """Return None: the library has no half solves."""
+
+    def part(self, rows: NDArray[np.int64]) -> None:
+        """Return None: the library does not expose its factor."""

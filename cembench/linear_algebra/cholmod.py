@@ -12,6 +12,7 @@ from scipy import sparse
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.cholmod_options import set_options
+from cembench.linear_algebra.factor_part import FactorPart
 from cembench.linear_algebra.orderings import as_permutation, minimum_degree
 from cembench.linear_algebra.supernodes import factor_entries, trailing_block
 from cembench.linear_algebra.triangular import triangle_solved, triangle_times
@@ -76,6 +77,10 @@ class CholmodFactor:
         x = matrix(np.asfortranarray(B))
         cholmod.solve(self._symbolic, x, sys=_ALL)
         return np.array(x)
+
+    def part(self, rows: NDArray[np.int64]) -> FactorPart | None:
+        """Return what substitutions between these rows pass; None if inaccessible."""
+        return FactorPart.of(self._symbolic, self._lower.size[0], rows)
 
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return X with A_ii X = B for the leading block, from the one factor; B (leading, k)."""

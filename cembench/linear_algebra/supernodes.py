@@ -8,7 +8,7 @@ numbers have confirmed the expected layout.
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,13 @@ _NUMBERS_BEFORE = ("n", "minor")
 _POINTERS = ("Perm", "ColCount", "IPerm")
 _SIMPLICIAL = ("nzmax", "p", "i", "x", "z", "nz", "next", "prev")
 _SUPERNODAL = ("nsuper", "ssize", "xsize", "maxcsize", "maxesize", "super", "pi", "px", "s")
+#: The name of cvxopt's capsules around real supernodal factors.
+CAPSULE = b"CHOLMOD FACTOR D L"
 _FLAGS = ("ordering", "is_ll", "is_super", "is_monotonic", "itype", "xtype", "dtype")
 
 
-class _CholmodFactor(ctypes.Structure):
-    """The layout of CHOLMOD's factor."""
+class FactorStructure(ctypes.Structure):
+    """The layout of CHOLMOD's factor, as far as it is the same in all versions."""
 
     # Sizes and pointers have the same width; a null pointer reads as 0.
     _fields_ = [
@@ -29,6 +31,54 @@ class _CholmodFactor(ctypes.Structure):
         *((name, ctypes.c_size_t) for name in _SIMPLICIAL + _SUPERNODAL),
         *((name, ctypes.c_int) for name in _FLAGS),
     ]
+
+
+class Supernodes(NamedTuple):
+    """A supernodal factor's arrays, without copies. A supernode is a run of columns alike below."""
+
+    #: First column of each supernode, and the number of columns.
+    first: NDArray[np.int64]
+    #: Where the rows of each supernode begin, and the rows; the first are those of its columns.
+    row_at: NDArray[np.int64]
+    rows: NDArray[np.int64]
+    #: Where the entries of each supernode begin, by columns, and the entries.
+    value_at: NDArray[np.int64]
+    values: NDArray[np.float64]
+    #: The row of the matrix at each row of the factor.
+    order: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, held: FactorStructure) -> Self:
+        """Return the arrays of a structure that is as expected."""
+        return cls(
+            _array(held.super, ctypes.c_int64, held.nsuper + 1),
+            _array(held.pi, ctypes.c_int64, held.nsuper + 1),
+            _array(held.s, ctypes.c_int64, held.ssize),
+            _array(held.px, ctypes.c_int64, held.nsuper + 1),
+            _array(held.x, ctypes.c_double, held.xsize),
+            _array(held.Perm, ctypes.c_int64, held.n),
+        )
+
+    @property
+    def widths(self) -> NDArray[np.int64]:
+        """Number of columns of each supernode."""
+        return np.diff(self.first)
+
+    @property
+    def heights(self) -> NDArray[np.int64]:
+        """Number of rows of each supernode, those of its columns included."""
+        return np.diff(self.row_at)
+
+    def of_columns(self, columns: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the supernode of each column."""
+        return np.searchsorted(self.first, columns, side="right") - 1
+
+    def parents(self) -> NDArray[np.int64]:
+        """Return each supernode's parent in the elimination tree; -1 for a root."""
+        found = np.full(len(self.widths), -1)
+        inner = np.flatnonzero(self.heights > self.widths)
+        found[inner] = self.of_columns(self.rows[self.row_at[inner] + self.widths[inner]])
+        return found
 
 
 def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | None:
@@ -48,15 +98,10 @@ def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | N
         Lower triangular with positive diagonal; None if the structure is not as expected.
 
     """
-    held = _held(factor)
-    if held is None or not _as_expected(held, n):
+    held = held_factor(factor, n)
+    if held is None:
         return None
-    first = _array(held.super, ctypes.c_int64, held.nsuper + 1)  # columns of each supernode
-    row_at = _array(held.pi, ctypes.c_int64, held.nsuper + 1)
-    value_at = _array(held.px, ctypes.c_int64, held.nsuper + 1)
-    rows_of = _array(held.s, ctypes.c_int64, held.ssize)
-    values = _array(held.x, ctypes.c_double, held.xsize)
-    order = _array(held.Perm, ctypes.c_int64, n)
+    first, row_at, rows_of, value_at, values, order = Supernodes.of(held)
     if first[-1] != n or not (order[leading:] == np.arange(leading, n)).all():
         return None
     C = np.zeros((n - leading, n - leading), order="F")
@@ -79,38 +124,36 @@ def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | N
 
 def factor_entries(factor: Any) -> int:
     """Return the number of entries of a supernodal factor; 0 for an unexpected structure."""
-    held = _held(factor)
-    return int(held.xsize) if held is not None and _as_expected(held, held.n) else 0
+    held = held_factor(factor)
+    return 0 if held is None else int(held.xsize)
 
 
 def order_of(factor: Any, n: int) -> NDArray[np.int64] | None:
     """Return the order of rows (n,) of a symbolic supernodal factor; None if it is unexpected."""
-    held = _held(factor)
-    if held is None or not _as_expected(held, n, numeric=False):
+    held = held_factor(factor, n, numeric=False)
+    if held is None:
         return None
     return np.array(_array(held.Perm, ctypes.c_int64, n))
 
 
-def _held(factor: Any) -> _CholmodFactor | None:
-    """Return the structure in a capsule; None if the capsule is not as expected."""
+def held_factor(
+    factor: Any, n: int | None = None, *, numeric: bool = True
+) -> FactorStructure | None:
+    """Return the structure in a capsule; None if it is not as expected, or not of order n.
+
+    Expected is a real supernodal factor L L^T with 64-bit indices, with numbers or without.
+    """
     api = ctypes.pythonapi
     name_of, pointer_of = api.PyCapsule_GetName, api.PyCapsule_GetPointer
     name_of.restype, name_of.argtypes = ctypes.c_char_p, [ctypes.py_object]
     pointer_of.restype, pointer_of.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
-    name = name_of(factor)
-    if name != b"CHOLMOD FACTOR D L":
+    if name_of(factor) != CAPSULE:
         return None
-    return ctypes.cast(pointer_of(factor, name), ctypes.POINTER(_CholmodFactor)).contents
-
-
-def _as_expected(held: _CholmodFactor, n: int, *, numeric: bool = True) -> bool:
-    """Whether this is a real supernodal factor L L^T of order n with 64-bit indices.
-
-    A symbolic factor has no numbers yet.
-    """
+    held = ctypes.cast(pointer_of(factor, CAPSULE), ctypes.POINTER(FactorStructure)).contents
     flags = (held.is_ll, held.is_super, held.itype, held.xtype, held.dtype)
-    sizes = 0 < held.nsuper <= n <= held.xsize and held.nsuper <= held.ssize
-    return flags == (1, 1, 2, int(numeric), 0) and held.n == held.minor == n and sizes
+    sizes = 0 < held.nsuper <= held.n <= held.xsize and held.nsuper <= held.ssize
+    whole = held.n == held.minor and n in (None, held.n)
+    return held if flags == (1, 1, 2, int(numeric), 0) and sizes and whole else None
 
 
 def _array(address: int, kind: Any, length: int) -> NDArray[Any]:

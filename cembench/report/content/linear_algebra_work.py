@@ -60,7 +60,9 @@ def _table(evidence: Evidence, policy: str) -> Table:
                 continue
             cells += [
                 Value(str(work.numeric), work.numeric, surface.origin),
-                Value(f"{work.right_hand_sides:g}", work.right_hand_sides, surface.origin),
+                Value(
+                    f"{round(work.right_hand_sides, 1):g}", work.right_hand_sides, surface.origin
+                ),
                 Value(f"{work.entries / 1e6:.3g}", work.entries / 1e6, surface.origin)
                 if work.entries
                 else missing("the library does not report it"),
