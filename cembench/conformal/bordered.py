@@ -44,9 +44,10 @@ class BorderedLaplacian:
     loops : sequence of int arrays
         Its boundary loops, in the order wanted.
     iterations : int
-        How many times at most the harmonic map is needed beside the boundary only, as in CEM. Where
-        that pays (:func:`cembench.conformal.ring_order.ring_pays`) the neighbours of the boundary
-        are put last in the interior, and :meth:`dirichlet` gives the values at these alone.
+        How many times at most the harmonic map is needed beside the boundary only, as in CEM.
+        :meth:`dirichlet` then gives the values at the neighbours of the boundary alone. Where that
+        pays (:func:`cembench.conformal.ring_order.ring_pays`) these are put last in the interior;
+        else substitutions pass the columns that lead to them.
 
     Attributes
     ----------
@@ -54,7 +55,7 @@ class BorderedLaplacian:
         Indices i, and b: the loops one behind the other.
     beside : int64
         The interior vertices at which :meth:`dirichlet` gives values: the neighbours of the
-        boundary where their order was taken, else all.
+        boundary if there are iterations and the library shows its factors, else all.
     parts : tuple of slice
         The position of each loop in the boundary.
 
@@ -83,8 +84,7 @@ class BorderedLaplacian:
                 "the mesh has no interior vertex, so a harmonic map has no unknowns"
             )
         with phase("assembly"):
-            self.beside = self._ring(L, iterations)
-            self._ringed = len(self.beside) < len(self.interior)
+            self.beside, self._ringed = self._ring(L, iterations)
             if self._ringed:
                 rest = np.setdiff1d(self.interior, self.beside, assume_unique=True)
                 self.interior = np.concatenate([rest, self.beside])
@@ -94,17 +94,25 @@ class BorderedLaplacian:
         leading = len(self.interior) - (len(self.beside) if self._ringed else 0)
         self._whole = Cholesky(pinned, leading=leading, lower=True)
 
-    def _ring(self, L: scipy.sparse.sparray, iterations: int) -> NDArray[np.int64]:
-        """The interior vertices that get values: the boundary's neighbours if that pays, or all."""
-        if not iterations or not shows_trailing_block():
-            return self.interior
+    def _ring(self, L: scipy.sparse.sparray, iterations: int) -> tuple[NDArray[np.int64], bool]:
+        """Which interior vertices get values, and whether these come last in the interior."""
+        too_long = len(self.boundary) > LARGEST_DENSE
+        if not iterations or too_long or not shows_trailing_block():
+            return self.interior, False
         near = np.zeros(L.shape[0], dtype=bool)
         near[by_rows(L)[self.boundary].indices] = True
         near[self.boundary] = False
         ring = np.flatnonzero(near)
         sizes = len(self.interior), len(ring), len(self.boundary)
         short = len(ring) + len(self.boundary) <= LARGEST_DENSE
-        return ring if short and ring_pays(*sizes, iterations) else self.interior
+        return ring, short and ring_pays(*sizes, iterations)
+
+    @cached_property
+    def _rows_beside(self) -> NDArray[np.int64] | None:
+        """Where `beside` is in the interior; None for all of it."""
+        if len(self.beside) == len(self.interior):
+            return None
+        return np.searchsorted(self.interior, self.beside)
 
     @cached_property
     def L_bi(self) -> scipy.sparse.csr_array:
@@ -147,14 +155,17 @@ class BorderedLaplacian:
         if self._ringed:
             with phase("solves"):
                 return by_real_columns(self._ring_values, (f_b - f_b[-1])[:-1]) + f_b[-1]
-        if self._whole.halves:
-            return self._extended(f_b)
+        if self._whole.halves or self._rows_beside is not None:
+            return self._extended(f_b, self._rows_beside)
         return self.solve_interior(-(self._L_ib @ f_b))
 
-    def _extended(self, f: Complex) -> Complex:
-        """Return the harmonic values before f, which holds those of the last vertices in order."""
+    def _extended(self, f: Complex, rows: NDArray[np.int64] | None = None) -> Complex:
+        """Return the harmonic values before f, which holds those of the last vertices in order.
+
+        All of them, or those in some rows.
+        """
         # Constants are harmonic: so the last vertex can be taken to 0 and back.
-        inside: Complex = self._whole.extended((f - f[-1])[:-1]) + f[-1]
+        inside: Complex = self._whole.extended((f - f[-1])[:-1], rows) + f[-1]
         return inside
 
     def _needs_all_inside(self, what: str) -> None:
@@ -180,6 +191,8 @@ class BorderedLaplacian:
         """The map (n,) of boundary values and what :meth:`dirichlet` gave for them."""
         if self._ringed:
             f_i = np.concatenate([self._extended(np.concatenate([f_i, f_b])), f_i])
+        elif len(f_i) < len(self.interior):
+            f_i = self._extended(f_b)
         return self.in_order(f_i, f_b)
 
     def conformal_energy(self, f_i: Complex, f_b: Complex) -> float:

@@ -15,16 +15,19 @@ ENTRIES = 4.5
 #: A dense factorisation does so many operations while a substitution of two columns passes one
 #: entry of a sparse factor, which waits for memory.
 OPERATIONS_AN_ENTRY = 60
+#: What share of a factor leads from the ring and the boundary to its end, on real disks: an
+#: iteration in the usual order passes no more (:mod:`cembench.linear_algebra.factor_part`).
+LEADING_SHARE = 0.35
 #: How many iterations are expected where more are allowed: from 1 on large surfaces to all 20.
-LIKELY_ITERATIONS = 8
+LIKELY_ITERATIONS = 4
 
 
 def ring_pays(interior: int, ring: int, boundary: int, iterations: int) -> bool:
     """Return whether the ring's order is the cheaper one, by an estimate of the operations.
 
     The dense triangle costs ((N + B)^3 - B^3) / 3 operations more. Each iteration then passes
-    N^2 / 2 + N B numbers instead of the factor's, about 4.5 n log2(n) for n interior vertices, and
-    :data:`OPERATIONS_AN_ENTRY` operations are worth one number.
+    N^2 / 2 + N B numbers instead of a third of the factor's, which has about 4.5 n log2(n) for n
+    interior vertices, and :data:`OPERATIONS_AN_ENTRY` operations are worth one number.
 
     Parameters
     ----------
@@ -44,6 +47,7 @@ def ring_pays(interior: int, ring: int, boundary: int, iterations: int) -> bool:
     if ring == interior:
         return False
     denser = ((ring + boundary) ** 3 - boundary**3) / 3
-    spared = ENTRIES * interior * math.log2(interior) - ring * (ring / 2 + boundary)
+    passed = LEADING_SHARE * ENTRIES * interior * math.log2(interior)
+    spared = passed - ring * (ring / 2 + boundary)
     likely = min(iterations, LIKELY_ITERATIONS)
     return likely * spared * OPERATIONS_AN_ENTRY > denser

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from cvxopt import cholmod, matrix, spmatrix
@@ -12,16 +13,18 @@ from scipy import sparse
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.cholmod_options import set_options
-from cembench.linear_algebra.factor_part import FactorPart
+from cembench.linear_algebra.factor_part import FactorPart, FactorTree
 from cembench.linear_algebra.orderings import as_permutation, minimum_degree
 from cembench.linear_algebra.supernodes import factor_entries, trailing_block
 from cembench.linear_algebra.triangular import triangle_solved, triangle_times
-from cembench.linear_algebra.work import count_analysis, count_factorisation
+from cembench.linear_algebra.work import count_analysis, count_columns, count_factorisation
 
 # Codes of `cholmod.solve`: the whole system, and its four steps.
 _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
 
 
+#: Up to this share of rows with entries, substitution passes their ancestors instead of all.
+FEW = 0.1
 #: From a lower triangle to the order of its rows, by the postorder of the elimination tree:
 #: otherwise columns of one supernode would not be neighbours.
 Order = Callable[[spmatrix], NDArray[np.int64]]
@@ -48,6 +51,8 @@ class CholmodFactor:
         with phase("symbolic"):
             set_options(postorder=self._leading is None)
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
+            vars(self).pop("_tree", None)
+            self._near: tuple[NDArray[np.int64], FactorPart | None] | None = None
             count_analysis()
 
     def _factor(self) -> None:
@@ -80,7 +85,11 @@ class CholmodFactor:
 
     def part(self, rows: NDArray[np.int64]) -> FactorPart | None:
         """Return what substitutions between these rows pass; None if inaccessible."""
-        return FactorPart.of(self._symbolic, self._lower.size[0], rows)
+        return None if self._tree is None else FactorPart(self._tree, rows)
+
+    @cached_property
+    def _tree(self) -> FactorTree | None:
+        return FactorTree.of(self._symbolic, self._lower.size[0])
 
     def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return X with A_ii X = B for the leading block, from the one factor; B (leading, k)."""
@@ -113,23 +122,54 @@ class CholmodFactor:
         return None if C is None else triangle_times(C, self._forward_end(B))
 
     def _forward_end(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """y_t of L y = B."""
+        """y_t of L y = B; of the leading rows only those of few entries and their ancestors."""
+        assert self._leading is not None
+        rows = np.flatnonzero(B[: self._leading].any(axis=1))
+        if len(rows) <= FEW * self._leading and (part := self._with_trailing(rows)) is not None:
+            count_columns(part.share / 2 * B.shape[1])
+            ends = np.concatenate([B[rows], B[self._leading :]])
+            return part.forward(ends)[part.at[len(rows) :]]
+        count_columns(B.shape[1] / 2)
         x = matrix(np.asfortranarray(B))
         cholmod.solve(self._symbolic, x, sys=_PERMUTE)
         cholmod.solve(self._symbolic, x, sys=_FORWARD)
         return np.array(x)[self._leading :]
 
-    def extended(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
-        """Return -A_ll^-1 A_lt B for B (n - leading, k): the solution of L^T x = (0, C^T B)."""
+    def _with_trailing(self, rows: NDArray[np.int64]) -> FactorPart | None:
+        """Return the part between rows of the leading block and all behind it."""
+        assert self._leading is not None
+        trailing = np.arange(self._leading, self._lower.size[0])
+        return self.part(np.concatenate([rows, trailing]))
+
+    def extended(
+        self, B: NDArray[np.float64], rows: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64] | None:
+        """Return -A_ll^-1 A_lt B for B (n - leading, k): the solution of L^T x = (0, C^T B).
+
+        All leading rows of it, or some.
+        """
         C = self.schur_factor()
         if C is None:
             return None
+        right = triangle_times(C, B, transposed=True)
+        if rows is not None and (part := self._kept_part(rows)) is not None:
+            count_columns(part.share / 2 * B.shape[1])
+            ends = np.zeros((len(part.columns), B.shape[1]), order="F")
+            ends[part.at[len(rows) :]] = right
+            return part.backward(ends)[part.at[: len(rows)]]
+        count_columns(B.shape[1] / 2)
         padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
-        padded[self._leading :] = triangle_times(C, B, transposed=True)
+        padded[self._leading :] = right
         x = matrix(padded)
         cholmod.solve(self._symbolic, x, sys=_BACKWARD)
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
-        return np.array(x)[: self._leading]
+        return np.array(x)[slice(self._leading) if rows is None else rows]
+
+    def _kept_part(self, rows: NDArray[np.int64]) -> FactorPart | None:
+        """Return the part from some rows on, made once for the same array."""
+        if self._near is None or self._near[0] is not rows:
+            self._near = rows, self._with_trailing(rows)
+        return self._near[1]
 
 
 def _lower_triangle(A: sparse.csc_array) -> tuple[spmatrix, NDArray[np.intp]]:

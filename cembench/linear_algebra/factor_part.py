@@ -38,87 +38,102 @@ class _Padded(ctypes.Structure):
     _fields_ = [("known", FactorStructure), ("newer", ctypes.c_char * 64)]
 
 
+class FactorTree:
+    """The elimination tree of a numeric factor, of which parts can be taken.
+
+    The numbers are the factor's own, also after it was computed anew.
+    """
+
+    def __init__(self, factor: Any, whole: FactorStructure) -> None:
+        self.factor, self.whole, self.nodes = factor, whole, Supernodes.of(whole)
+        #: The column of the factor at each row of the matrix.
+        self.positions = np.empty(whole.n, dtype=np.int64)
+        self.positions[self.nodes.order] = np.arange(whole.n)
+        self._parents = self.nodes.parents().tolist()
+
+    @classmethod
+    def of(cls, factor: Any, n: int) -> Self | None:
+        """Return the tree of a factor of order n; None if its structure is not as expected."""
+        whole = held_factor(factor, n)
+        return None if whole is None else cls(factor, whole)
+
+    def with_ancestors(self, rows: Indices) -> Indices:
+        """Return the supernodes of these rows and all their ancestors, in order."""
+        reached = np.zeros(len(self._parents), dtype=bool)
+        for node in np.unique(self.nodes.of_columns(self.positions[rows])).tolist():
+            while node >= 0 and not reached[node]:
+                reached[node] = True
+                node = self._parents[node]
+        return np.flatnonzero(reached)
+
+
 class FactorPart:
     """Substitutions between some rows, by the columns of the factor that they pass.
 
     Attributes
     ----------
+    columns : int64
+        The columns of the factor that the part has.
+    at : int64 (rows,)
+        Where the rows are among these columns.
     share : float
         The part's entries over those of the whole factor.
 
     """
 
-    def __init__(self, factor: Any, whole: FactorStructure, nodes: Supernodes, rows: Indices):
-        positions = np.empty(whole.n, dtype=np.int64)
-        positions[nodes.order] = np.arange(whole.n)
-        kept = _with_ancestors(nodes, positions[rows])
+    def __init__(self, tree: FactorTree, rows: Indices) -> None:
+        self._tree, nodes = tree, tree.nodes
+        kept = tree.with_ancestors(rows)
         widths, heights = nodes.widths[kept], nodes.heights[kept]
-        self._columns = _ranges(nodes.first[kept], widths)
-        self._at = np.searchsorted(self._columns, positions[rows])
-        self._factor, self._whole = factor, whole
+        self.columns = _ranges(nodes.first[kept], widths)
+        self.at = np.searchsorted(self.columns, tree.positions[rows])
         below = nodes.rows[_ranges(nodes.row_at[kept], heights)]
         self._indices = {
             "super": np.append(0, widths.cumsum()),
             "pi": np.append(0, heights.cumsum()),
             "px": np.append(nodes.value_at[kept], 0),
-            "s": np.searchsorted(self._columns, below),
+            "s": np.searchsorted(self.columns, below),
         }
-        self._own = _Padded(known=whole)
+        self._own = _Padded(known=tree.whole)
         mine = self._own.known
-        mine.n = mine.minor = len(self._columns)
+        mine.n = mine.minor = len(self.columns)
         mine.nsuper, mine.ssize = len(kept), len(below)
         for name, of_part in self._indices.items():
             setattr(mine, name, of_part.ctypes.data)
         new = ctypes.pythonapi.PyCapsule_New
-        new.restype, new.argtypes = (
-            ctypes.py_object,
-            [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p],
-        )
+        new.restype = ctypes.py_object
+        new.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p]
         self._part = new(ctypes.addressof(self._own), CAPSULE, None)
-        self.share = float((widths * heights).sum() / whole.xsize)
-
-    @classmethod
-    def of(cls, factor: Any, n: int, rows: Indices) -> Self | None:
-        """Return the part of a numeric factor of order n; None if its structure is not as expected.
-
-        The numbers are the factor's own, also after it was computed anew.
-        """
-        whole = held_factor(factor, n)
-        return None if whole is None else cls(factor, whole, Supernodes.of(whole), rows)
+        self.share = float((widths * heights).sum() / tree.whole.xsize)
 
     def solve(self, B: Real) -> Real:
         """Return what X with A X = B is at the rows, for B (rows, k) there and 0 elsewhere."""
-        x = self._forward(B)
-        cholmod.solve(self._part, x, sys=_BACKWARD)
-        return np.array(x)[self._at]
+        return self.backward(self.forward(B))[self.at]
 
     def solve_everywhere(self, B: Real) -> Real:
         """Return all entries (n, k) of what :meth:`solve` finds."""
-        padded = np.zeros((self._whole.n, B.shape[1]), order="F")
-        padded[self._columns] = np.array(self._forward(B))
+        padded = np.zeros((self._tree.whole.n, B.shape[1]), order="F")
+        padded[self.columns] = self.forward(B)
         x = matrix(padded)
-        cholmod.solve(self._factor, x, sys=_BACKWARD)
-        cholmod.solve(self._factor, x, sys=_PERMUTE_BACK)
+        cholmod.solve(self._tree.factor, x, sys=_BACKWARD)
+        cholmod.solve(self._tree.factor, x, sys=_PERMUTE_BACK)
         return np.array(x)
 
-    def _forward(self, B: Real) -> matrix:
-        self._own.known.x = self._whole.x  # it may have moved
-        padded = np.zeros((len(self._columns), B.shape[1]), order="F")
-        padded[self._at] = B
-        x = matrix(padded)
-        cholmod.solve(self._part, x, sys=_FORWARD)
-        return x
+    def forward(self, B: Real) -> Real:
+        """Return Y with L Y = B on the part, for B (rows, k) at the rows and 0 elsewhere."""
+        padded = np.zeros((len(self.columns), B.shape[1]), order="F")
+        padded[self.at] = B
+        return self._substituted(padded, _FORWARD)
 
+    def backward(self, Y: Real) -> Real:
+        """Return X with L^T X = Y on the part, which needs nothing of the rest."""
+        return self._substituted(Y, _BACKWARD)
 
-def _with_ancestors(nodes: Supernodes, positions: Indices) -> Indices:
-    """Return the supernodes of these columns and all their ancestors, in order."""
-    parents = nodes.parents().tolist()
-    reached = np.zeros(len(parents), dtype=bool)
-    for node in np.unique(nodes.of_columns(positions)).tolist():
-        while node >= 0 and not reached[node]:
-            reached[node] = True
-            node = parents[node]
-    return np.flatnonzero(reached)
+    def _substituted(self, B: Real, step: int) -> Real:
+        self._own.known.x = self._tree.whole.x  # it may have moved
+        x = matrix(B)
+        cholmod.solve(self._part, x, sys=step)
+        return np.array(x)
 
 
 def _ranges(starts: Indices, lengths: Indices) -> Indices:

@@ -22,7 +22,8 @@ from tests.real_meshes import real_mesh
         (17_089, 270, 245, 0, False),
         (137_142, 1_482, 1_488, 20, False),
         (550_053, 2_960, 2_976, 20, False),
-        (1_100_000, 1_958, 1_960, 20, True),
+        (274_879, 980, 980, 20, False),
+        (1_100_000, 1_958, 1_960, 20, False),
         (40, 40, 30, 20, False),  # no other interior
     ],
 )
@@ -78,13 +79,14 @@ def test_the_iterate_of_least_energy_has_its_own_interior(ring):
     assert abs(best.uv - printed.uv).max() < 1e-11
 
 
-def test_half_a_solve_counts_half(ring):
+def test_less_than_half_a_solve_counts_less_than_half(ring):
     mesh, k = hemi_ellipsoid(1500, x=2.0), 5
     with counting() as work:
         assert cem(mesh, tolerance=0, max_iterations=k).iterations == k
-    # Two real columns each: the start, the boundary step, and the interior once or every time.
-    halves = 1 + (1 if ring else k + 1)
-    assert work.right_hand_sides == 2 * (0.5 * halves + k)
+    # Two real columns each: a boundary step each time, half a solve for the interior at the end,
+    # and parts of halves: the start, and the boundary's neighbours each time, if not by the ring.
+    parts = 1 + (0 if ring else k + 1)
+    assert 2 * (k + 0.5) < work.right_hand_sides < 2 * (k + 0.5 + 0.5 * parts)
     assert work.numeric == 2
 
 
