@@ -36,11 +36,12 @@ def cem(
     Faithful to Algorithm 1: start (14), (18), (15), (16); iteration (30), (24), (25), (22), or (23)
     instead of (30) with ``inversion=False``. With the vertices ordered interior first, boundary
     last, and the last one pinned, a single Cholesky factor serves the start, by forward
-    substitution, and its leading block all Dirichlet solves, by back substitution. If the boundary
-    is short for the surface, its neighbours come right before it (`ring_order.py` estimates what
-    pays): then iterations use only the dense end of the factor, and the rest of the interior is
-    solved for once. The maps are the same. `delaunay` takes the weights of the intrinsic Delaunay
-    triangulation.
+    substitution, and its leading block all Dirichlet solves, by back substitution. Iterations need
+    the map next to the boundary only, so they pass no more of the factor than leads there, and the
+    rest of the interior is solved for once. If the boundary is short for the surface, its
+    neighbours come right before it (`ring_order.py` estimates what pays): then iterations use only
+    the dense end of the factor. The maps are the same. `delaunay` takes the weights of the
+    intrinsic Delaunay triangulation.
 
     Decided here, where the paper is silent: the start's triangle is the one whose barycentre is
     nearest to the mean vertex. The iteration ends after the first step that changes E_C by less
