@@ -2,8 +2,8 @@
 
 If b is zero outside some rows, forward substitution begins at their columns and goes on only at the
 ancestors of these in the elimination tree. The solution's entries at the same rows need no other
-column for the substitution back. With the rows next to a surface's boundary that is a fifth of the
-factor or less.
+column for the substitution back. With the rows next to a surface's boundary that is a third of the
+factor.
 
 The part is a factor of its own to CHOLMOD, with the same numbers: of cvxopt's factor only its
 supernodes' indices are copied.
@@ -139,4 +139,4 @@ class FactorPart:
 def _ranges(starts: Indices, lengths: Indices) -> Indices:
     """Return all start, start + 1, ..., start + length - 1, one range behind the other."""
     ends = lengths.cumsum()
-    return np.repeat(starts - ends + lengths, lengths) + np.arange(ends[-1])
+    return np.repeat(starts - ends + lengths, lengths) + np.arange(lengths.sum())
