@@ -101,7 +101,7 @@ Budget = Annotated[
     typer.Option(
         metavar="TIME",
         help="Time of the run, e.g. 30m. While it lasts cells get rounds, the cheapest their first "
-        "7 before others; each has one (default: 110s for `quick`, 1h for `standard`, 4h for "
+        "7 before others; each has one (default: 105s for `quick`, 1h for `standard`, 4h for "
         "`paper`, else 30m).",
     ),
 ]
@@ -154,7 +154,7 @@ Verify = Annotated[
 
 
 #: Seconds after which cells get no more rounds.
-USUAL_BUDGETS = {Profile.quick: 110.0, Profile.standard: 3600.0, Profile.paper: 4 * 3600.0}
+USUAL_BUDGETS = {Profile.quick: 105.0, Profile.standard: 3600.0, Profile.paper: 4 * 3600.0}
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
