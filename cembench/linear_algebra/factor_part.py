@@ -18,12 +18,7 @@ import numpy as np
 from cvxopt import cholmod, matrix
 from numpy.typing import NDArray
 
-from cembench.linear_algebra.supernodes import (
-    CAPSULE,
-    FactorStructure,
-    Supernodes,
-    held_factor,
-)
+from cembench.linear_algebra.supernodes import CAPSULE, FactorStructure, Supernodes, held_factor
 
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
