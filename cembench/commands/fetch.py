@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Bars
     from rich.progress import TaskID
 
-    from cembench.mesh.datasets import Dataset, Progress
+    from cembench.mesh.datasets import Dataset
+    from cembench.mesh.download import Progress
 
 
 def fetch(
@@ -40,7 +42,10 @@ def fetch(
     timeout: Annotated[
         float,
         typer.Option(
-            min=0.1, max=LONGEST, callback=finite, help="Seconds to wait for a silent server."
+            min=0.1,
+            max=LONGEST,
+            callback=finite,
+            help="Seconds to wait for a silent server; a slow one must send 4 KiB a second.",
         ),
     ] = 60.0,
     as_json: Json = False,
@@ -86,10 +91,13 @@ def _fetch_all(
     if len(wanted) > 1 and not quiet:
         err.print(_intent(len({d.path for d in wanted}), list(missing.values())), style="dim")
     found: dict[str, dict[str, Any]] = {}
-    with bars(list(missing.values())) as progress:
-        for one in datasets.fetch_all(
-            wanted, jobs=jobs, timeout=timeout, have=have, progress=progress
-        ):
+    with (
+        bars(list(missing.values())) as progress,
+        closing(
+            datasets.fetch_all(wanted, jobs=jobs, timeout=timeout, have=have, progress=progress)
+        ) as downloads,
+    ):
+        for one in downloads:
             found[one.dataset.name] = _about(one.dataset)
             if one.error is not None:
                 found[one.dataset.name]["error"] = str(one.error)
@@ -119,8 +127,10 @@ def _intent(count: int, missing: list[Dataset]) -> str:
     return f"{count} files, {count - len(missing)} already here; to fetch: {total}{more}."
 
 
-def fetched(dataset: Dataset, *, timeout: float = 60.0) -> Path:
+def fetched(dataset: Dataset, *, timeout: float = 60.0, seconds: float = inf) -> Path:
     """Return the file of a dataset, fetched if necessary, with a progress bar on a terminal.
+
+    `timeout` and `seconds` are those of :func:`cembench.mesh.datasets.fetch`.
 
     Raises
     ------
@@ -131,7 +141,7 @@ def fetched(dataset: Dataset, *, timeout: float = 60.0) -> Path:
     from cembench.mesh import datasets
 
     with bars([dataset]) as progress:
-        datasets.fetch(dataset, timeout=timeout, progress=progress(dataset))
+        datasets.fetch(dataset, timeout=timeout, seconds=seconds, progress=progress(dataset))
     return datasets.surface_file(dataset)
 
 

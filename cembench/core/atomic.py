@@ -29,14 +29,20 @@ M = TypeVar("M", bound=BaseModel)
 _DRAFT = re.compile(r"\.draft-([0-9a-f]{12})-(\d+)-[0-9a-f]{32}(\.\w+)?")
 #: Drafts from older versions, whose names do not hold a process.
 _OLDER_DRAFT = re.compile(r"\.draft-[0-9a-f]{32}")
+#: The bits of a file's mode that say who may read, write and execute it.
+_PERMISSIONS = 0o777
 #: Error codes of a full disk or quota: another folder on the same disk would not help.
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
-def read_model(path: Path, model: type[M]) -> M:
-    """Read what :func:`write_model` wrote; a :class:`RecordError` names a damaged file."""
+def read_model(path: Path, model: type[M], root: Path | None = None) -> M:
+    """Read what :func:`write_model` wrote; a :class:`RecordError` names a damaged file.
+
+    `root` is as in :func:`cembench.core.loading.open_file`.
+    """
     noun = model.__name__.lower()
-    return read_json(path, TypeAdapter(model), f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}")
+    what = f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+    return read_json(path, TypeAdapter(model), what, root)
 
 
 def write_model(path: Path, model: BaseModel) -> None:
@@ -85,7 +91,7 @@ def write_by(
 ) -> None:
     """Write a file atomically: `make` writes a draft, which is flushed, checked and renamed.
 
-    The file's permissions follow the user's umask.
+    A new file's permissions follow the user's umask; a file that is replaced keeps its own.
 
     Parameters
     ----------
@@ -114,6 +120,9 @@ def write_by(
             path.parent.mkdir(parents=True, exist_ok=True)
         draft = _new_draft(path, path.suffix.lower())
         try:
+            draft.touch(exist_ok=False)
+            if path.is_file() and not path.is_symlink():
+                draft.chmod(path.stat().st_mode & _PERMISSIONS)  # before it holds anything
             make(draft)
             with draft.open("rb+") as file:
                 os.fsync(file.fileno())
@@ -205,7 +214,7 @@ def _runs(pid: int) -> bool:
 
 def _fill(draft: Path, fill: Callable[[BinaryIO], object]) -> None:
     """Write a draft by `fill`, and raise its first disk error even if `fill` drops it."""
-    opened = draft.open("xb")
+    opened = draft.open("wb")
     file = _Draft(opened)
     try:
         try:

@@ -33,7 +33,7 @@ class Extra(StrEnum):
 
 #: The modules that each extra installs.
 MODULES: Mapping[Extra, tuple[str, ...]] = {
-    Extra.CLUSTER: ("dask", "distributed", "dask_jobqueue"),
+    Extra.CLUSTER: ("cryptography", "dask", "distributed", "dask_jobqueue"),
     Extra.FETCH: ("requests",),
     Extra.FORMATS: ("OpenEXR", "meshio", "nibabel", "trimesh"),
     Extra.METIS: ("pymetis",),

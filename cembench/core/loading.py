@@ -1,19 +1,23 @@
 """Read files that may have been changed by others; every defect is a :class:`RecordError`.
 
 Nothing is trusted. Only regular files are opened (a FIFO would block forever), an array is read
-only if its header declares no more than memory can hold, and pickles are never loaded.
+only if its header declares no more than memory can hold, and pickles are never loaded. Of a folder
+that may come from elsewhere, `root`, no symbolic link is followed: it could lead to any file of the
+reader's. The folder itself may be reached by one.
 """
 
 from __future__ import annotations
 
+import io
 import math
+import os
 import stat
 import warnings
 import zipfile
 from collections.abc import Iterable
 from fnmatch import fnmatch
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 import psutil
@@ -26,6 +30,8 @@ from cembench.core.errors import RecordError
 T = TypeVar("T")
 
 REMEDY = "Delete it and run again."
+#: Maximum bytes of the header of an ``.npy`` file, numpy's own limit and the few before it.
+_LONGEST_HEADER = 10_016
 
 
 def damaged(path: Path, what: str, why: object) -> RecordError:
@@ -43,24 +49,85 @@ def unreadable(path: Path, error: Exception) -> RecordError:
     return RecordError(f"{str(path)!r} cannot be read: {why}. Check its name and permissions.")
 
 
-def read_bytes(path: Path) -> bytes:
-    """Return the content of a regular file.
+def check_no_link(path: Path, root: Path) -> None:
+    """Raise :class:`RecordError` if a path, or a folder between it and `root`, is a link."""
+    inside = path.relative_to(root)
+    for place in (path, *(root / parent for parent in inside.parents if parent.name)):
+        if place.is_symlink():
+            raise RecordError(
+                f"{place} is a symbolic link, and none is followed in {root}: it could lead to a "
+                "file that is not part of it. Put the file or folder itself in its place, or "
+                "delete the link."
+            )
+
+
+def open_file(path: Path, root: Path | None = None, flags: int = os.O_RDONLY) -> int:
+    """Open a regular file without waiting for a FIFO, and return its descriptor.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    root : Path, optional
+        A folder that holds the file; below it no link is followed, even one that is made meanwhile.
+    flags : int
+        Flags of ``os.open``.
 
     Raises
     ------
     RecordError
-        The file is missing, is not a regular file, or may not be read.
+        It is not a regular file, or a link leads to it.
+    OSError
+        The system refuses to open it.
+
+    """
+    flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    if root is None:
+        return _regular(path, os.open(path, flags))
+    check_no_link(path, root)
+    if os.open not in os.supports_dir_fd:
+        return _regular(path, os.open(path, flags))
+    *folders, name = path.relative_to(root).parts
+    handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        for folder in folders:
+            above = handle
+            handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW, dir_fd=above)
+            os.close(above)
+        return _regular(path, os.open(name, flags | os.O_NOFOLLOW, 0o666, dir_fd=handle))
+    finally:
+        os.close(handle)
+
+
+def _regular(path: Path, handle: int) -> int:
+    """Return the descriptor of a regular file; close any other."""
+    if not stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise RecordError(f"{path} is not a regular file. Remove it and run again.")
+    return handle
+
+
+def _opened(path: Path, root: Path | None) -> BinaryIO:
+    return os.fdopen(open_file(path, root), "rb")
+
+
+def read_bytes(path: Path, root: Path | None = None) -> bytes:
+    """Return the content of a regular file; `root` as in :func:`open_file`.
+
+    Raises
+    ------
+    RecordError
+        The file is missing, is not a regular file, or may not be read, or a link leads to it.
 
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise RecordError(f"{path} is not a regular file. Remove it and run again.")
-        return path.read_bytes()
+        with _opened(path, root) as file:
+            return file.read()
     except _REFUSED as error:
         raise unreadable(path, error) from error
 
 
-def read_json(path: Path, schema: TypeAdapter[T], what: str) -> T:
+def read_json(path: Path, schema: TypeAdapter[T], what: str, root: Path | None = None) -> T:
     """Return the validated content of a JSON file; `what` names it in messages ("a record").
 
     Raises
@@ -69,7 +136,7 @@ def read_json(path: Path, schema: TypeAdapter[T], what: str) -> T:
         As for :func:`read_bytes`, or the content does not fit the schema.
 
     """
-    content = read_bytes(path)
+    content = read_bytes(path, root)
     try:
         return schema.validate_json(content)
     except ValidationError as error:
@@ -78,8 +145,10 @@ def read_json(path: Path, schema: TypeAdapter[T], what: str) -> T:
         raise damaged(path, what, f"{place}: {first['msg']}" if place else first["msg"]) from error
 
 
-def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
-    """Return the named arrays of an ``.npz`` archive.
+def read_arrays(
+    path: Path, names: Iterable[str], root: Path | None = None
+) -> dict[str, NDArray[Any]]:
+    """Return the named arrays of an ``.npz`` archive; `root` as in :func:`open_file`.
 
     Raises
     ------
@@ -88,10 +157,12 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
 
     """
     try:
-        if not stat.S_ISREG(path.stat().st_mode):
-            raise RecordError(f"{path} is not a regular file. Remove it and run again.")
-        with zipfile.ZipFile(path) as archive, warnings.catch_warnings(action="error"):
-            return {name: _array(archive, name) for name in names}
+        with (
+            _opened(path, root) as file,
+            zipfile.ZipFile(file) as archive,
+            warnings.catch_warnings(action="error"),
+        ):
+            return arrays_of(archive, names)
     except RecordError:
         raise
     except OSError as error:
@@ -101,41 +172,76 @@ def read_arrays(path: Path, names: Iterable[str]) -> dict[str, NDArray[Any]]:
         raise damaged(path, "an archive of arrays", why) from error
 
 
-def _array(archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
-    """Return one array of an archive, after comparing its header with its size and with memory."""
+def arrays_of(
+    archive: zipfile.ZipFile, names: Iterable[str], copies: int = 1
+) -> dict[str, NDArray[Any]]:
+    """Return arrays of an archive, of which memory must be able to hold so many `copies`.
+
+    Nothing is unpacked before all sizes are known. Raises ValueError, :class:`TooLargeError` among
+    them, or what the library raises on damaged bytes.
+    """
+    members = {name: archive.getinfo(f"{name}.npy") for name in names}
+    for name in members:
+        declared_array(archive, name)
+    check_room(" and ".join(members), sum(m.file_size for m in members.values()), copies)
+    found: dict[str, NDArray[Any]] = {}
+    for name, member in members.items():
+        with archive.open(member) as file:
+            found[name] = npy.read_array(file, allow_pickle=False)
+    return found
+
+
+def declared_array(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Return the shape and type of an array in an archive; its size is compared with them.
+
+    Raises ValueError, or what the library raises on damaged bytes.
+    """
     member = archive.getinfo(f"{name}.npy")
-    with archive.open(member) as file:
-        shape, dtype = _header(file)
-        announced = math.prod(shape) * dtype.itemsize
-        if dtype.hasobject:
-            raise ValueError(f"{name} is pickled; pickles are never read")
-        if file.tell() + announced != member.file_size:
-            raise ValueError(f"{name} declares {announced:,} bytes but holds a different number")
-        if announced > psutil.virtual_memory().available:
-            raise ValueError(f"{name} declares {announced:,} bytes, more than memory can hold")
-    with archive.open(member) as file:
-        array: NDArray[Any] = npy.read_array(file, allow_pickle=False)
-        return array
-
-
-def _header(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Return the shape and type that the header of an ``.npy`` file declares."""
+    with archive.open(member) as packed:
+        file = io.BytesIO(packed.read(_LONGEST_HEADER))  # a header declares its length, too
     version = npy.read_magic(file)
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, _, dtype = read(file)
+    if dtype.hasobject:
+        raise ValueError(f"{name} is pickled; pickles are never read")
+    announced = math.prod(shape) * dtype.itemsize
+    if file.tell() + announced != member.file_size:
+        raise ValueError(f"{name} declares {announced:,} bytes but holds a different number")
     return shape, dtype
 
 
-def files_in(folder: Path, pattern: str) -> list[Path]:
+class TooLargeError(ValueError):
+    """What a file declares is more than memory can hold."""
+
+
+def check_room(what: str, size: int, copies: int = 1) -> None:
+    """Raise :class:`TooLargeError` if memory cannot hold so many copies of `size` bytes."""
+    if copies * size > free_memory():
+        times = f" {copies} times, as reading and checking need" if copies > 1 else ""
+        raise TooLargeError(
+            f"{what} declares {size:,} bytes, more than memory can hold{times}: "
+            f"{free_memory():,} bytes are free"
+        )
+
+
+def free_memory() -> int:
+    """Return how many bytes of memory are free on this machine."""
+    return int(psutil.virtual_memory().available)
+
+
+def files_in(folder: Path, pattern: str, root: Path | None = None) -> list[Path]:
     """Return the paths in a folder whose names match, sorted; none if the folder is missing.
 
     Raises
     ------
     RecordError
-        It is not a folder, or cannot be listed (``Path.glob`` would silently find nothing).
+        It is not a folder, or cannot be listed (``Path.glob`` would silently find nothing), or a
+        link below `root` leads to it.
 
     """
     try:
+        if root is not None:
+            check_no_link(folder, root)
         found = [path for path in folder.iterdir() if fnmatch(path.name, pattern)]
     except FileNotFoundError:
         return []
@@ -145,7 +251,7 @@ def files_in(folder: Path, pattern: str) -> list[Path]:
 
 
 def is_there(path: Path) -> bool:
-    """Whether a path exists; an unsearchable parent folder is an error.
+    """Whether a path exists, be it a link to nothing; an unsearchable parent folder is an error.
 
     Raises
     ------
@@ -154,7 +260,7 @@ def is_there(path: Path) -> bool:
 
     """
     try:
-        path.stat()
+        path.lstat()
     except (FileNotFoundError, NotADirectoryError):
         return False
     except _REFUSED as error:

@@ -41,6 +41,8 @@ class NoticeKind(StrEnum):
     #: The iteration ended early, because the boundary is too crowded for it.
     CROWDED_BOUNDARY = "crowded_boundary"
     FAR_FROM_CONFORMAL = "far_from_conformal"
+    #: Other parameters, which the algorithm suggested, give much smaller angle errors.
+    BETTER_PARAMETERS = "better_parameters"
     #: Timed calls returned a different result than the checked call.
     NOT_DETERMINISTIC = "not_deterministic"
     PROCESSES_LEFT = "processes_left"

@@ -25,8 +25,11 @@ class Parameterization:
     extras : dict
         Further results as JSON values. The harness knows some keys: ``energy_of`` names the kind of
         energy if it is not E_C, ``stopped: "crowded"`` marks an iteration that ended early because
-        the boundary is too crowded, and ``fold_repairs`` counts the solves that repaired folds. The
-        last two are reported where the angles are bad.
+        the boundary is too crowded, and ``fold_repairs`` counts the solves that repaired folds;
+        these two are reported where the angles are bad. ``folded_before_repair``, the number of
+        folded triangles before any repair, is shown beside the metrics. ``alternative`` names
+        parameters that may be better here; they are tried outside of the clock, and a notice says
+        if they are.
 
     Examples
     --------

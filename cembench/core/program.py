@@ -61,6 +61,8 @@ class Program:
         Whether the file holds the flattened surface; its x and y are then the UVs.
     remedy : str
         How to install the program.
+    language : str
+        "matlab" if words are code of MATLAB or Octave, in which each placeholder becomes a string.
 
     """
 
@@ -73,6 +75,7 @@ class Program:
     fit: bool = False
     flat: bool = False
     remedy: str = ""
+    language: str = ""
 
     @property
     def output_format(self) -> str:
@@ -91,7 +94,8 @@ class Program:
 
     def words(self, values: Mapping[str, object]) -> list[str]:
         """Return the command with its placeholders filled in."""
-        return [_PLACEHOLDER.sub(lambda m: str(values[m[1]]), word) for word in self.command]
+        written = matlab_string if self.language == "matlab" else str
+        return [_PLACEHOLDER.sub(lambda m: written(values[m[1]]), word) for word in self.command]
 
     def __str__(self) -> str:
         """Return the command with file names instead of full paths."""
@@ -154,16 +158,42 @@ def _wrong_pattern(pattern: str) -> str:
     return ""
 
 
+def matlab_string(value: object) -> str:
+    """Return a string in the code of MATLAB and Octave, whatever it holds; no escapes, no braces.
+
+    Examples
+    --------
+    >>> print(matlab_string("it's {here}"))
+    ['it''s ' char(123) 'here}']
+
+    """
+    literal = str(value).replace("'", "''").replace("{", "' char(123) '")
+    return f"['{literal}']"
+
+
 def of_matlab_function(file: Path) -> dict[str, str]:
     """Return the declaration of a MATLAB function ``uv = f(V, F)`` in a file, F counted from 1.
 
     Octave runs it, or MATLAB if Octave is missing. The solve time is that of the function alone.
+
+    Raises
+    ------
+    RegistryError
+        The file's name cannot be that of a function, or its folder has a path that cannot be
+        written in code.
+
     """
+    folder = str(file.parent.absolute())
+    if not re.fullmatch(r"[A-Za-z]\w*", file.stem, re.ASCII) or not folder.isprintable():
+        raise RegistryError(
+            f"{str(file)!r} cannot be called as a function: its name must be a letter and then "
+            "letters, digits and underscores, and its folder's name without line breaks. Rename it."
+        )
     octave = next((name for name in ("octave-cli", "octave") if shutil.which(name)), "")
     code = (
-        f'addpath("{file.parent.absolute()}"); mesh = load("{{input}}"); started = tic; '
+        f"addpath({matlab_string(folder)}); mesh = load({{input}}); started = tic; "
         f"uv = {file.stem}(double(mesh.v), double(mesh.f)); "
-        'fprintf("solve: %.9f s\\n", toc(started)); save("-v7", "{output}", "uv");'
+        "fprintf('solve: %.9f s\\n', toc(started)); save('-v7', {output}, 'uv');"
     )
     words = [octave, "--norc", "--quiet", "--eval", code]
     if not octave:
@@ -172,6 +202,7 @@ def of_matlab_function(file: Path) -> dict[str, str]:
         "command": shlex.join(words),
         "input": ".mat",
         "output": ".mat",
+        "language": "matlab",
         "seconds": r"^solve: (\S+) s$",
         "version": f"{words[0]} --version" if octave else "",
         "remedy": "Install Octave (in Debian: apt-get install octave-cli), or MATLAB",

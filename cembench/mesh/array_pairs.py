@@ -12,6 +12,8 @@ from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup
 
+#: So many times the memory of a file's arrays is needed to find and check a surface among them.
+COPIES = 4
 #: Usual names of vertices and triangles, tried before any guess.
 USUAL = (("v", "f"), ("V", "F"))
 #: Two arrays fit if the indices span one of these ranges exactly: 1 to n, or 0 to n - 1.

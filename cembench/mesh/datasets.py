@@ -1,8 +1,8 @@
 """Surfaces in files that are downloaded once, verified and kept.
 
-`CEMBENCH_CACHE` names the folder in which they are kept. `CEMBENCH_DATA_URL` names a mirror: a
-folder that holds the files under their own names. The download libraries are imported only when
-something is fetched, since every measuring process imports this module.
+`CEMBENCH_CACHE` names the folder in which they are kept. `CEMBENCH_DATA_URL` names a mirror: a copy
+of that folder's `datasets`, with each file under the name of its dataset. The download libraries
+are imported only when something is fetched, since every measuring process imports this module.
 
 A file is used only if it is the published one: its SHA-256 matches or, if none is known, the mesh
 in it does. A file that is already in the folder is recognised by its content, whatever its name.
@@ -14,11 +14,14 @@ import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, Protocol, cast
+from math import inf
+from pathlib import Path, PurePosixPath
+from threading import Event
+from time import monotonic
+from typing import BinaryIO, cast
 from urllib.parse import quote
 
 from platformdirs import user_cache_dir
@@ -27,9 +30,7 @@ from cembench.core.atomic import is_draft, write, write_bytes
 from cembench.core.errors import CembenchError, DatasetError, MeshError, RecordError
 from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
-
-if TYPE_CHECKING:
-    from requests import Response
+from cembench.mesh.download import LARGEST, Bounds, DownloadError, Progress, download
 
 #: Environment variable for the cache folder.
 CACHE_VARIABLE = "CEMBENCH_CACHE"
@@ -40,18 +41,6 @@ MIRROR_VARIABLE = "CEMBENCH_DATA_URL"
 def cache_directory() -> Path:
     """Return the folder of surfaces and downloads: `CEMBENCH_CACHE`, or the user's cache."""
     return Path(os.environ.get(CACHE_VARIABLE) or user_cache_dir("cembench"))
-
-
-class Progress(Protocol):
-    """Receives the progress of a download in bytes."""
-
-    total: int
-
-    def update(self, count: int) -> None:
-        """Receive the number of bytes that have arrived since the last call."""
-
-    def close(self) -> None:
-        """End the display."""
 
 
 @dataclass(frozen=True)
@@ -82,7 +71,7 @@ class Dataset:
     licence : str
         SPDX identifier.
     size : int or None
-        Bytes, if known.
+        Bytes, if known; no more are read.
     paper_row : str
         The model of the paper's Table 1 that the mesh is, if any.
     mesh_hash : str
@@ -119,8 +108,8 @@ class Dataset:
 
     @property
     def file(self) -> str:
-        """The name of the file."""
-        return self.source_url.rpartition("/")[2]
+        """The name of the file here and on a mirror: the dataset's, with the published suffix."""
+        return self.name + PurePosixPath(self.source_url).suffix
 
     @property
     def url(self) -> str:
@@ -175,6 +164,7 @@ def fetch(
     dataset: Dataset,
     *,
     timeout: float = 60.0,
+    seconds: float = inf,
     progress: Progress | None = None,
     have: Sequence[Path] = (),
 ) -> Path:
@@ -187,7 +177,9 @@ def fetch(
     dataset : Dataset
         What to fetch.
     timeout : float
-        Seconds to wait for the server's answer; the download itself may take longer.
+        Seconds to wait for the server's answer, and in which it must send 4 KiB each at least.
+    seconds : float
+        Seconds that the download may take; default: no bound but that on the server's pace.
     progress : Progress, optional
         Receives the progress.
     have : sequence of Path
@@ -201,14 +193,24 @@ def fetch(
     Raises
     ------
     DatasetError
-        The server does not answer, the download breaks off, or the checksum is wrong; the message
-        names the file and the URL.
+        The server does not answer or sends too slowly or too much, the download breaks off or takes
+        too long, or the checksum is wrong; the message names the file and the URL.
     MissingExtra
         The download libraries are not installed.
     RecordError
         The cache cannot be written to, or its disk is full.
 
     """
+    return _fetch(dataset, _bounds(dataset, timeout, seconds), progress, have)
+
+
+def _bounds(dataset: Dataset, timeout: float, seconds: float, stop: Event | None = None) -> Bounds:
+    return Bounds(dataset.size or LARGEST, timeout, monotonic() + seconds, stop or Event())
+
+
+def _fetch(
+    dataset: Dataset, bounds: Bounds, progress: Progress | None, have: Sequence[Path]
+) -> Path:
     if is_fetched(dataset):
         return dataset.path
     try:
@@ -216,7 +218,7 @@ def fetch(
             _keep(dataset, lambda file: _copied(same, file))
             return dataset.path
         require(Extra.FETCH, f"fetching {dataset.file} from {dataset.url}")
-        _keep(dataset, lambda file: _download(dataset, file, timeout, progress))
+        _keep(dataset, lambda file: _download(dataset, file, bounds, progress))
     except RecordError as error:
         raise RecordError(
             f"cannot keep {dataset.file} from {dataset.url}: {error} {CACHE_VARIABLE} names the "
@@ -284,13 +286,15 @@ def fetch_all(
     *,
     jobs: int = 4,
     timeout: float = 60.0,
+    seconds: float = inf,
     have: Sequence[Path] = (),
     progress: Callable[[Dataset], Progress | None] = lambda dataset: None,
-) -> Iterator[Fetched]:
+) -> Generator[Fetched, None, None]:
     """Fetch several datasets at once and yield each as it ends; an error does not stop the others.
 
     Datasets with the same file fetch it once. Files fetched before an interruption are kept, so the
-    same call continues from there.
+    same call continues from there. Closing the iterator stops all downloads; `seconds` are those of
+    each.
 
     Raises
     ------
@@ -298,15 +302,19 @@ def fetch_all(
         The cache cannot be written to, or its disk is full; no further download is started.
 
     """
-    by_place: dict[Path, list[Dataset]] = {}
+    by_source: dict[str, list[Dataset]] = {}
     for dataset in datasets:
-        by_place.setdefault(dataset.path, []).append(dataset)
+        by_source.setdefault(dataset.source_url, []).append(dataset)
 
-    def one(dataset: Dataset) -> Path:
-        return fetch(dataset, timeout=timeout, have=have, progress=progress(dataset))
+    stop = Event()
+
+    def one(first: Dataset, *same: Dataset) -> None:
+        _fetch(first, _bounds(first, timeout, seconds, stop), progress(first), have)
+        for dataset in same:  # copies the file of the first
+            _fetch(dataset, _bounds(dataset, timeout, seconds, stop), None, ())
 
     with ThreadPoolExecutor(max_workers=jobs) as pool:
-        waiting = {pool.submit(one, same[0]): same for same in by_place.values()}
+        waiting = {pool.submit(one, *same): same for same in by_source.values()}
         try:
             for done in as_completed(waiting):
                 error = done.exception()
@@ -316,6 +324,7 @@ def fetch_all(
                     path = None if error else dataset.path
                     yield Fetched(dataset, path, cast("CembenchError | None", error))
         finally:
+            stop.set()
             pool.shutdown(wait=False, cancel_futures=True)
 
 
@@ -337,36 +346,16 @@ def surface_file(dataset: Dataset) -> Path:
     return path
 
 
-def _download(dataset: Dataset, file: BinaryIO, timeout: float, progress: Progress | None) -> None:
+def _download(dataset: Dataset, file: BinaryIO, bounds: Bounds, progress: Progress | None) -> None:
     """Download a dataset's file; :class:`DatasetError` if that fails."""
-    import requests
-
     try:
-        with requests.get(dataset.url, timeout=timeout, stream=True) as answer:
-            answer.raise_for_status()
-            _receive(answer, file, progress)
-    except requests.RequestException as error:
+        download(dataset.url, file, bounds, progress)
+    except DownloadError as error:
         raise DatasetError(
-            f"cannot fetch {dataset.file} from {dataset.url}: {type(error).__name__}: {error}. "
+            f"cannot fetch {dataset.file} from {dataset.url}: {error}. "
             f"Check the network, set {MIRROR_VARIABLE} to a mirror, or put the file at "
             f"{dataset.path}."
         ) from error
-
-
-def _receive(answer: Response, file: BinaryIO, progress: Progress | None) -> None:
-    """Write a server's answer to a file; progress counts the bytes that are sent."""
-    if progress is None:
-        for chunk in answer.iter_content(2**16):
-            file.write(chunk)
-        return
-    progress.total = int(answer.headers.get("Content-Length", 0))
-    told = 0
-    for chunk in answer.iter_content(2**16):
-        file.write(chunk)
-        arrived = answer.raw.tell()
-        progress.update(arrived - told)
-        told = arrived
-    progress.close()
 
 
 def _check_whole(dataset: Dataset, path: Path) -> None:
@@ -380,16 +369,6 @@ def _check_whole(dataset: Dataset, path: Path) -> None:
         f"{dataset.file} from {dataset.url} is damaged or another file: its {what}. Try again, "
         f"or set {MIRROR_VARIABLE} to another mirror."
     )
-
-
-def recognised(datasets: Iterable[Dataset], path: Path, mesh_hash: str) -> Dataset | None:
-    """Return the dataset that a file holds, by its bytes or by its mesh; None if unknown."""
-    checksum = _sha256(path)
-    for dataset in datasets:
-        whole = dataset.arrays is None and dataset.polygons is None
-        if mesh_hash == dataset.mesh_hash or (whole and checksum == dataset.sha256):
-            return dataset
-    return None
 
 
 def _sha256(path: Path) -> str:

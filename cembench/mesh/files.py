@@ -115,6 +115,11 @@ def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
         return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
     except MeshError as error:
         raise located(error, path) from None
+    except MemoryError as error:
+        raise MeshError(
+            f"{path}: memory does not suffice to check {len(soup.V):,} vertices and "
+            f"{len(soup.sizes):,} polygons. Use a machine with more, or a smaller surface."
+        ) from error
 
 
 def write_mesh(

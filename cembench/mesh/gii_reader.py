@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 
 from cembench.core.errors import MeshError
-from cembench.core.extras import Extra, require
 from cembench.mesh.soup import Soup, damaged
 
 
 def read_gii(path: Path) -> Soup:
     """Read the points and the triangles of a GIFTI file."""
-    require(Extra.FORMATS, "reading .gii files", "nibabel")
     nibabel: Any = importlib.import_module("nibabel")
 
     try:
-        image = nibabel.gifti.GiftiImage.from_filename(path)
+        image = nibabel.gifti.GiftiImage.from_bytes(path.read_bytes())
         points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
         triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
         V, F = ([np.asarray(one.data) for one in found] for found in (points, triangles))
+    except MemoryError:
+        raise
     except Exception as error:  # whatever a library raises on damaged bytes
         raise damaged(f"it cannot be read as GIFTI: {type(error).__name__}: {error}") from None
     if len(V) != 1 or len(F) != 1:

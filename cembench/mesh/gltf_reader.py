@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from cembench.core.extras import Extra, require
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, damaged
 
@@ -16,12 +15,13 @@ def read_gltf(path: Path) -> Soup:
 
     glTF has a vertex for each texture coordinate or normal, so seams would cut the surface open.
     """
-    require(Extra.FORMATS, f"reading {path.suffix} files", "trimesh")
     import trimesh
 
     try:
         scene = trimesh.load_scene(path, process=False)
         pieces = scene.dump()
+    except MemoryError:
+        raise
     except Exception as error:  # whatever a library raises on damaged bytes
         raise damaged(f"it cannot be read as glTF: {type(error).__name__}: {error}") from None
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]

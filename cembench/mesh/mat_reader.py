@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import MeshError
-from cembench.mesh.array_pairs import soup_of_arrays
+from cembench.core.loading import check_room
+from cembench.mesh.array_pairs import COPIES, soup_of_arrays
 from cembench.mesh.soup import Soup, damaged
 
 _HEADER_BYTES = 128
@@ -36,20 +37,47 @@ def read_mat(path: Path, arrays: tuple[str, str] | None = None) -> Soup:
     """Read the vertices and triangles of a MATLAB file: v and f, the named two, or two that fit."""
     content = path.read_bytes()
     if arrays:
-        return soup_of_arrays(_read(content, lambda name, shape: name in arrays), arrays, 1)
-    found = _read(content, lambda name, shape: name in ("v", "f"))
+        return soup_of_arrays(_columns(content, lambda name, shape: name in arrays), arrays, 1)
+    found = _columns(content, lambda name, shape: name in ("v", "f"))
     if not {"v", "f"} <= set(found):
-        found |= _read(content, lambda name, shape: shape[1:] in ([2], [3]))
+        found |= _columns(content, lambda name, shape: shape[1:] in ([2], [3]))
     return soup_of_arrays(found, None, 1)
 
 
-def _read(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[str, NDArray[Any]]:
+def _columns(
+    content: bytes, is_wanted: Callable[[str, list[int]], bool]
+) -> dict[str, NDArray[Any]]:
+    """Return the wanted arrays by name, which must be real numbers (rows, 3) or (rows, 2)."""
+    found = mat_arrays(content, is_wanted)
+    for name, array in found.items():
+        numeric = array.dtype.kind in "fiu"
+        if not numeric or array.ndim != 2 or array.shape[1] not in (2, 3):
+            raise MeshError(
+                f"variable {name!r} must be real numbers of shape (rows, 3); it has shape "
+                f"{array.shape} and is {'numeric' if numeric else 'not real numbers'}."
+            )
+    return found
+
+
+def mat_arrays(
+    content: bytes, is_wanted: Callable[[str, list[int]], bool]
+) -> dict[str, NDArray[Any]]:
     """Return the wanted arrays by name, and check the lengths of all others.
 
-    `is_wanted` receives an array's name, and its shape if it holds real numbers.
+    `is_wanted` receives an array's name, and its shape if it holds real numbers. What is no array
+    of numbers comes back empty, with its shape, as dtype "V1".
+
+    Raises
+    ------
+    MeshError
+        The file is damaged, or of another version.
+    TooLargeError
+        Memory cannot hold the wanted arrays.
+
     """
     order = _byte_order(content)
     found: dict[str, NDArray[Any]] = {}
+    unpacked = 0
     for kind, element in _elements(content[_HEADER_BYTES:], order):
         begin, size = element, 0
         if kind == _COMPRESSED:
@@ -62,6 +90,8 @@ def _read(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[s
             )
         name, shape, flags = _head(_elements(begin, order), order)
         if is_wanted(name, shape if _is_numeric(flags) else []) and name not in found:
+            unpacked += size or len(element)
+            check_room(f"variable {name!r} with those before it", unpacked, COPIES)
             whole = element if begin is element else _inflated_whole(element, size + 8)[8:]
             found[name] = _matrix(whole, order)
         elif begin is not element:
@@ -172,19 +202,17 @@ def _is_numeric(flags: int) -> bool:
 
 
 def _matrix(content: bytes, order: str) -> NDArray[Any]:
-    """Return the real numbers (rows, 3) or (rows, 2) of an array."""
+    """Return an array of numbers; in place of any other, one of its shape that holds nothing."""
     parts = _elements(content, order)
     name, shape, flags = _head(parts, order)
-    numeric = _is_numeric(flags)
-    if not numeric or len(shape) != 2 or shape[1] not in (2, 3):
-        raise MeshError(
-            f"variable {name!r} must be real numbers of shape (rows, 3); it has shape "
-            f"{tuple(shape)} and is {'numeric' if numeric else 'not real numbers'}."
-        )
+    if flags & 0xFF not in _NUMERIC_CLASSES:
+        return np.broadcast_to(np.zeros(1, "V1"), [max(0, side) for side in shape])
     numbers = _numbers(next(parts, (0, b"")), order)
+    if flags & _COMPLEX:
+        numbers = numbers + 1j * _numbers(next(parts, (0, b"")), order)
     if len(numbers) != math.prod(shape):
         raise damaged(
-            f"variable {name!r} declares {shape[0]} rows of {shape[1]}, but {len(numbers)} numbers "
+            f"variable {name!r} declares the shape {tuple(shape)}, but {len(numbers)} numbers "
             "follow"
         )
     return numbers.reshape(shape, order="F")

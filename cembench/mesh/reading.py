@@ -2,7 +2,8 @@
 
 Every vertex is kept, in the file's order and in float64, and nothing but geometry. No face is lost
 silently: the content must match what the file declares, and invalid statements give an error or a
-notice. Every reader goes through the file once, so none can hang.
+notice. Every reader of ours goes through the file once, so none can hang, and compares what a file
+unpacks to with memory first; libraries read in a process whose memory is bounded.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from cembench.core.errors import MeshError
+from cembench.core.extras import Extra
+from cembench.core.loading import TooLargeError
+from cembench.mesh.apart import apart
 from cembench.mesh.gii_reader import read_gii
 from cembench.mesh.gltf_reader import read_gltf
 from cembench.mesh.mat_reader import read_mat
@@ -32,12 +36,12 @@ READERS: dict[str, Callable[[Path], Soup]] = {
     ".stl": read_stl,
     ".mat": read_mat,
     ".npz": read_npz,
-    ".vtk": read_vtk,
-    ".vtu": read_vtk,
-    ".vtp": read_vtp,
-    ".glb": read_gltf,
-    ".gltf": read_gltf,
-    ".gii": read_gii,
+    ".vtk": apart(read_vtk, Extra.FORMATS, "meshio"),
+    ".vtu": apart(read_vtk, Extra.FORMATS, "meshio"),
+    ".vtp": apart(read_vtp, Extra.VTP, "vtk"),
+    ".glb": apart(read_gltf, Extra.FORMATS, "trimesh"),
+    ".gltf": apart(read_gltf, Extra.FORMATS, "trimesh"),
+    ".gii": apart(read_gii, Extra.FORMATS, "nibabel"),
 }
 #: Formats of named arrays.
 _OF_ARRAYS: dict[str, Callable[[Path, tuple[str, str] | None], Soup]] = {
@@ -88,6 +92,10 @@ def read_soup(
         return (soup.subset(*polygons) if polygons else soup).named(path.stem)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error.__cause__
+    except TooLargeError as error:
+        raise MeshError(
+            f"{path}: {error}. Use a machine with more memory, or a smaller surface."
+        ) from error
     except MemoryError as error:
         raise MeshError(f"{path}: the file is too large for this machine's memory.") from error
     except OSError as error:

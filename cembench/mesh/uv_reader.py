@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError, RecordError, describe_error
 from cembench.core.loading import read_arrays
+from cembench.mesh.mat_reader import mat_arrays
 from cembench.mesh.obj_reader import statement_words
 from cembench.mesh.ply_reader import read_ply_texture
 from cembench.mesh.reading import read_soup
@@ -253,16 +254,16 @@ def _read_ply(path: Path) -> UVFile:
 
 
 def _read_mat(path: Path) -> UVFile:
-    """Read the UVs of a MATLAB file of versions up to 7.2."""
-    from scipy.io import loadmat
+    """Read the UVs of a MATLAB file of versions 5 to 7.2."""
+    wanted = (*_UV_NAMES, *_INDEX_NAMES)
+    names: list[str] = []
 
-    try:
-        found = loadmat(path, verify_compressed_data_integrity=True)
-    except NotImplementedError:
-        raise damaged("MATLAB 7.3 files are not supported; save it with save(..., '-v7')") from None
-    except Exception as error:  # scipy may raise anything on a damaged file
-        raise damaged(f"it cannot be read as MAT: {describe_error(error)}") from None
-    return _named_arrays({k: v for k, v in found.items() if not k.startswith("__")}, first=1)
+    def is_wanted(name: str, shape: list[int]) -> bool:
+        names.append(name)
+        return name in wanted
+
+    found = mat_arrays(path.read_bytes(), is_wanted)
+    return _named_arrays(found or dict.fromkeys(names), first=1)
 
 
 def _read_npz(path: Path) -> UVFile:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from cembench.core.errors import MeshError
-from cembench.core.extras import Extra, require
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, damaged
 
@@ -19,12 +18,13 @@ _POLYGONS = ("triangle", "quad", "polygon")
 
 def read_vtk(path: Path) -> Soup:
     """Read the planar cells of a file; others, such as lines and tetrahedra, give a notice."""
-    require(Extra.FORMATS, f"reading {path.suffix} files", "meshio")
     import meshio
 
     try:
         with redirect_stderr(StringIO()):  # it prints what its error says as well
             mesh = meshio.read(path)
+    except MemoryError:
+        raise
     except (SystemExit, Exception) as error:  # meshio calls sys.exit on some damaged files
         raise damaged(
             f"it cannot be read as {path.suffix[1:].upper()}: {type(error).__name__}: {error}"

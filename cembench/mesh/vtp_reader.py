@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from cembench.core.errors import MeshError
-from cembench.core.extras import Extra, require
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, damaged
 
@@ -18,13 +17,10 @@ def read_vtp(path: Path) -> Soup:
 
     Raises
     ------
-    MissingExtra
-        VTK is not installed.
     MeshError
         The file is damaged, or holds triangle strips.
 
     """
-    require(Extra.VTP, "reading .vtp files", "vtk")
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
     found = _poly_data(path)

@@ -32,6 +32,12 @@ VECTOR_BYTES = 55_000
 _SVG_UNITS = {"pt": 4 / 3, "px": 1.0, "": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54}
 
 
+#: Suffixes of the pictures that a report takes, by Pillow's name of the format.
+_SUFFIXES = {"PNG": ".png", "JPEG": ".jpg", "WEBP": ".webp"}
+#: Errors of Pillow for a file that is no picture, or one of too many pixels.
+_NO_PICTURE = (OSError, Image.DecompressionBombError)
+
+
 @dataclass(frozen=True)
 class Embedded:
     """A picture as a data URI, with its width and height in pixels."""
@@ -61,12 +67,21 @@ def pixel_cap(sizes: Sequence[tuple[int, int]], budget: int = PIXELS) -> float:
     return float("inf")
 
 
+def pixel_suffix(content: bytes) -> str | None:
+    """Return the suffix for a picture of pixels, by its content; None if it is something else."""
+    try:
+        with Image.open(io.BytesIO(content), formats=tuple(_SUFFIXES)) as picture:
+            return _SUFFIXES[str(picture.format)]
+    except (*_NO_PICTURE, SyntaxError, ValueError):
+        return None
+
+
 def size_of(path: Path) -> tuple[int, int]:
     """Return the width and height of a picture file in pixels."""
     try:
         with Image.open(path) as picture:
             return picture.size
-    except OSError as error:
+    except _NO_PICTURE as error:
         raise unreadable(path, error) from error
 
 
@@ -82,7 +97,7 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
     try:
         with Image.open(path) as opened:
             picture = opened.convert("RGBA" if "A" in opened.getbands() else "RGB")
-    except OSError as error:
+    except _NO_PICTURE as error:
         raise unreadable(path, error) from error
     if not exact and "A" not in picture.getbands():
         picture = with_transparent_background(picture)
@@ -135,9 +150,10 @@ def _svg_side(head: str, side: str) -> float | None:
     return float(found.group(1)) * unit if found and unit else None
 
 
-def unreadable(path: Path, error: OSError) -> RenderError:
+def unreadable(path: Path, error: Exception) -> RenderError:
     """Return the error for an unreadable file of a report."""
     return RenderError(
-        f"The report names {path}, which cannot be read: {error.strerror or error}. "
+        f"The report names {path}, which cannot be read: "
+        f"{getattr(error, 'strerror', None) or error}. "
         "Its figures are written before its pages; write the whole report again."
     )

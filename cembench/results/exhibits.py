@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from cembench.core.atomic import read_model, unwritable, write_model
 from cembench.core.errors import RecordError
-from cembench.core.loading import files_in, is_there
+from cembench.core.loading import check_no_link, files_in, is_there
 from cembench.core.names import file_name
 from cembench.results import run_folder
 from cembench.results.records import MeshOrigin, Printable
@@ -77,11 +77,13 @@ def exhibit_folder(run: Path, name: str) -> Path:
     Raises
     ------
     RecordError
-        The folder `run` is not a run and not empty, or cannot be written to.
+        The folder `run` is not a run and not empty, or cannot be written to, or a link is in the
+        exhibit's place.
 
     """
     run_folder.claim(run)
     folder = place_of(run, name)
+    check_no_link(folder, run)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -121,8 +123,8 @@ def read_exhibits(run: Path) -> list[Exhibit]:
     Raises
     ------
     RecordError
-        A description cannot be read.
+        A description cannot be read, or a link leads to it.
 
     """
-    described = [folder / _DESCRIPTION for folder in files_in(run / FOLDER, "*")]
-    return [read_model(path, Exhibit) for path in described if is_there(path)]
+    described = [folder / _DESCRIPTION for folder in files_in(run / FOLDER, "*", run)]
+    return [read_model(path, Exhibit, run) for path in described if is_there(path)]

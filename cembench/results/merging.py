@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cembench.core.loading import check_no_link, files_in
 from cembench.core.names import file_name
 from cembench.results import run_folder
 from cembench.results.comparison import circumstances
@@ -93,8 +94,18 @@ def merge(runs: Iterable[Store], into: Store) -> Merged:
 
 
 def others_of(run: Store) -> list[Store]:
-    """Return the runs of other machines that are stored beside a merged run."""
-    return [Store(folder) for folder in sorted(run.folder.glob("others/*/")) if folder.is_dir()]
+    """Return the runs of other machines that are stored beside a merged run.
+
+    Raises
+    ------
+    RecordError
+        One of them is a link.
+
+    """
+    found = files_in(run.folder / "others", "*", run.folder)
+    for folder in found:
+        check_no_link(folder, run.folder)
+    return [Store(folder) for folder in found if folder.is_dir()]
 
 
 def _beside(into: Store, machine: str) -> Store:

@@ -17,12 +17,13 @@ from pydantic import TypeAdapter, ValidationError
 from cembench.core import folders
 from cembench.core.atomic import clear_drafts, is_draft
 from cembench.core.errors import RecordError
+from cembench.core.loading import read_bytes
 from cembench.results.records import Cell, Record
 
 #: Folders of a run.
 FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits", "others")
 #: Files of a run, without its marker.
-PLAN, LOCK, MACHINES = "plan.json", "lock", "machines.json"
+PLAN, LOCK, MACHINES, SIGNATURE = "plan.json", "lock", "machines.json", "signature"
 #: Adapter for the cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 
@@ -47,7 +48,7 @@ def is_own(folder: Path, path: Path) -> bool:
         inside = path.resolve().relative_to(folder.resolve())
     except ValueError:
         return False
-    own = (*FOLDERS, PLAN, LOCK, MACHINES, folders.MARKERS["run"])
+    own = (*FOLDERS, PLAN, LOCK, MACHINES, SIGNATURE, folders.MARKERS["run"])
     return not inside.parts or inside.parts[0] in own
 
 
@@ -63,7 +64,8 @@ def empty_scratch(folder: Path) -> Path:
     for place in (folder, *(folder / name for name in FOLDERS)):
         clear_drafts(place)
     for place in (*folder.glob("samples/*/"), *folder.glob("exhibits/*/")):
-        clear_drafts(place)
+        if not place.is_symlink():
+            clear_drafts(place)
     return scratch
 
 
@@ -78,13 +80,13 @@ def is_older_run(folder: Path) -> bool:
     if not all(_RECORD.fullmatch(path.name) for path in records):
         return False
     plan = folder / PLAN
-    if plan.exists() and not _holds(plan, CELLS.validate_json):
+    if plan.exists() and not _holds(plan, CELLS.validate_json, folder):
         return False
     exhibits = folder.glob("exhibits/*/exhibit.json")
     return (
         plan.exists()
-        or any(_holds(path, Record.model_validate_json) for path in records)
-        or any(_holds(path, _exhibit) for path in exhibits)
+        or any(_holds(path, Record.model_validate_json, folder) for path in records)
+        or any(_holds(path, _exhibit, folder) for path in exhibits)
     )
 
 
@@ -95,10 +97,10 @@ def _exhibit(content: bytes) -> None:
         raise ValueError("not an exhibit")
 
 
-def _holds(path: Path, parse: Callable[[bytes], object]) -> bool:
+def _holds(path: Path, parse: Callable[[bytes], object], root: Path) -> bool:
     try:
-        parse(path.read_bytes())
-    except (OSError, ValueError, ValidationError):
+        parse(read_bytes(path, root))
+    except (RecordError, ValueError, ValidationError):
         return False
     return True
 

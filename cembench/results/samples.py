@@ -8,6 +8,7 @@ environment: rounds of two machines, or of two commits, are never mixed in one r
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,14 @@ from pydantic import BaseModel, ValidationError
 
 from cembench.core.atomic import unwritable, write
 from cembench.core.errors import RecordError
-from cembench.core.loading import damaged, is_there, read_arrays, read_bytes
+from cembench.core.loading import (
+    check_no_link,
+    damaged,
+    is_there,
+    open_file,
+    read_arrays,
+    read_bytes,
+)
 from cembench.results.records import Outcome, Round
 
 
@@ -31,13 +39,17 @@ class Entry(BaseModel):
 
 @dataclass(frozen=True)
 class Samples:
-    """The journal of one cell in one environment, a ``.jsonl`` file with the map as ``.npz``."""
+    """The journal of one cell in one environment, with its map as ``.npz`` beside it.
+
+    `journal` is ``RUN/samples/CELL/ENVIRONMENT.jsonl``.
+    """
 
     journal: Path
 
     def save_check(self, outcome: Outcome, uv: NDArray[np.complex128] | None) -> None:
         """Save the outcome of the checked call, after its map, so that the map is always there."""
         if uv is not None:
+            check_no_link(self._map, self._run)
             write(self._map, lambda file: np.savez(file, uv=uv))
         self._append(Entry(check=outcome))
 
@@ -47,7 +59,7 @@ class Samples:
 
     def uv(self) -> NDArray[np.complex128] | None:
         """Return the map of the checked call, complex128 (n,)."""
-        return read_map(self._map)
+        return read_map(self._map, self._run)
 
     def save_round(self, number: int, measured: Round) -> None:
         """Save one round; rounds are numbered from 0."""
@@ -59,13 +71,17 @@ class Samples:
         return {number: found[number] for number in sorted(found)}
 
     @property
+    def _run(self) -> Path:
+        return self.journal.parents[2]
+
+    @property
     def _map(self) -> Path:
         return self.journal.with_suffix(".npz")
 
     def _entries(self) -> list[Entry]:
         if not is_there(self.journal):
             return []
-        lines = _whole_lines(read_bytes(self.journal)).splitlines()
+        lines = _whole_lines(read_bytes(self.journal, self._run)).splitlines()
         try:
             return [Entry.model_validate_json(line) for line in lines]
         except ValidationError as error:
@@ -76,8 +92,8 @@ class Samples:
     def _append(self, entry: Entry) -> None:
         try:
             self.journal.parent.mkdir(parents=True, exist_ok=True)
-            with self.journal.open("ab+") as file:
-                file.seek(0)
+            handle = open_file(self.journal, self._run, os.O_RDWR | os.O_CREAT | os.O_APPEND)
+            with os.fdopen(handle, "rb+") as file:
                 file.truncate(len(_whole_lines(file.read())))
                 file.write(entry.model_dump_json(exclude_none=True).encode() + b"\n")
         except OSError as error:
@@ -88,11 +104,11 @@ def _whole_lines(text: bytes) -> bytes:
     return text[: text.rfind(b"\n") + 1]
 
 
-def read_map(path: Path) -> NDArray[np.complex128] | None:
-    """Return the map ``uv`` (n,) of an NPZ file; None if there is no file."""
+def read_map(path: Path, root: Path) -> NDArray[np.complex128] | None:
+    """Return the map ``uv`` (n,) of an NPZ file of the run `root`; None if there is no file."""
     if not is_there(path):
         return None
-    uv = read_arrays(path, ["uv"])["uv"]
+    uv = read_arrays(path, ["uv"], root)["uv"]
     if uv.ndim != 1 or uv.dtype != np.complex128:
         raise damaged(path, "a map", f"its uv is {uv.dtype} {uv.shape}, not complex128 (n,)")
     return uv

@@ -10,6 +10,7 @@
     RUN/samples/<mesh>--<algorithm>--<key>/       the journal of an unfinished cell:
         <id>.jsonl  <id>.npz                      one line per finished process, and the map
     RUN/machines.json                             progress of a run on a cluster
+    RUN/signature                                 its measurer's, if it was signed
     RUN/others/<machine>/                         records of other machines in a merged run
     RUN/lock                                      held while a run is writing
     RUN/cembench.json                             marker of the folder
@@ -78,7 +79,7 @@ class Store:
         if path is None:
             return None
         record = read_record(path)
-        if is_as_written(json.loads(read_bytes(path))) is False:
+        if is_as_written(json.loads(read_bytes(path, self.folder))) is False:
             raise RecordError(
                 f"{path} was changed after it was written: its digest differs. Delete it and run "
                 "again."
@@ -136,7 +137,7 @@ class Store:
 
     def record_files(self) -> list[Path]:
         """Return the files of all records, sorted by name."""
-        return files_in(self.folder / "records", "*.json")
+        return files_in(self.folder / "records", "*.json", self.folder)
 
     def save(
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
@@ -160,7 +161,7 @@ class Store:
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
         """Return the recorded map, complex128 (n,); None if there is none."""
         path = self._found(self._map_path(cell), cell)
-        return None if path is None else read_map(path)
+        return None if path is None else read_map(path, self.folder)
 
     def save_mesh(self, mesh: TriangleMesh) -> None:
         """Save a surface once, so that metrics can be recomputed from its maps."""
@@ -181,7 +182,7 @@ class Store:
         path = self.mesh_file(cell)
         if not is_there(path):
             return None
-        data = read_arrays(path, ("V", "F", "name"))
+        data = read_arrays(path, ("V", "F", "name"), self.folder)
         V, F = data["V"], data["F"]
         if V.dtype != np.float64 or F.dtype.kind not in "iu" or V.shape[1:] + F.shape[1:] != (3, 3):
             why = f"V is {V.dtype} {V.shape}, F {F.dtype} {F.shape}; both have three columns"
@@ -202,7 +203,7 @@ class Store:
 
     def rounds_done(self, cell: Cell) -> int | None:
         """Return the number of saved rounds of an unfinished cell; None if it was not begun."""
-        journals = files_in(self.folder / "samples" / cell.label, "*.jsonl")
+        journals = files_in(self.folder / "samples" / cell.label, "*.jsonl", self.folder)
         return max((len(Samples(journal).rounds()) for journal in journals), default=None)
 
     def forget(self, cell: Cell) -> None:
@@ -222,13 +223,15 @@ class Store:
     def plan(self) -> list[Cell]:
         """Return the cells of the last request; empty if no plan was saved."""
         path = self.folder / run_folder.PLAN
-        return read_json(path, run_folder.CELLS, "a plan") if is_there(path) else []
+        if not is_there(path):
+            return []
+        return read_json(path, run_folder.CELLS, "a plan", self.folder)
 
     def environments(self) -> dict[str, dict[str, Any]]:
         """Return the facts of the machines, by id."""
-        paths = files_in(self.folder / "environments", "*.json")
+        paths = files_in(self.folder / "environments", "*.json", self.folder)
         return {
-            path.stem: read_model(path, Environment).model_dump(exclude_unset=True)
+            path.stem: read_model(path, Environment, self.folder).model_dump(exclude_unset=True)
             for path in paths
         }
 
@@ -290,9 +293,10 @@ class Store:
 
         A mesh may have been renamed, and older versions did not clean names.
         """
-        if path.exists():
+        if is_there(path):
             return path
-        return min(path.parent.glob(f"*--{cell.key[:12]}{path.suffix}"), default=None)
+        pattern = f"*--{cell.key[:12]}{path.suffix}"
+        return min(files_in(path.parent, pattern, self.folder), default=None)
 
     def record_file(self, cell: Cell) -> Path:
         """Return the path of a cell's record, if it was saved."""
@@ -322,8 +326,8 @@ def lock_path(folder: Path) -> Path:
 
 
 def read_record(path: Path) -> Record:
-    """Return the record in a file; raise :class:`RecordError` if it is not valid."""
-    record = read_model(path, Record)
+    """Return the record in ``RUN/records/NAME``; raise :class:`RecordError` if it is not valid."""
+    record = read_model(path, Record, path.parents[1])
     if record.schema_version != SCHEMA_VERSION:
         raise RecordError(
             f"{path} is of schema version {record.schema_version}; this cembench reads "

@@ -134,7 +134,7 @@ def _refusal(store: Store, found: Sequence[Finding]) -> str:
 
 def verify_record(file: Path, record: Record) -> Iterator[Finding]:
     """Compare a record with its digest, its file's name and its own status."""
-    as_written = is_as_written(json.loads(read_bytes(file)))
+    as_written = is_as_written(json.loads(read_bytes(file, file.parents[1])))
     if as_written is None:
         yield Finding(file, Kind.not_signed, "has no digest: written by an earlier version")
     elif not as_written:

@@ -2,7 +2,8 @@
 
 The limits apply to everything that the command starts. Its descendants are tracked while it runs,
 and recognised afterwards by a mark in their environment, so that even one that left the process
-group, or whose parent is gone, is ended.
+group, or whose parent is gone, is ended. On Linux a limit of no other use is a second mark: it is
+inherited by those, too, that take another environment, and cannot be raised again by a user.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ KEPT_OUTPUT_BYTES = 4000
 _LARGEST_LOG_BYTES = 2**20
 #: Environment variable that marks all processes of a command.
 MARK = "CEMBENCH_PROCESS"
+#: The limit that is a mark, that of message queues in bytes (Linux), and its largest value as one.
+_LIMIT, _LARGEST_MARK = getattr(psutil, "RLIMIT_MSGQUEUE", None), 800_000
 
 
 @dataclass(frozen=True)
@@ -136,8 +139,10 @@ def run_limited(
     log.touch()
     process = start(mark, log)
     tree: dict[int, psutil.Process] = {}
+    inherited = 0
     with suppress(psutil.NoSuchProcess):
         tree[process.pid] = psutil.Process(process.pid)
+        inherited = _mark_by_limit(tree[process.pid], mark)
     deadline = monotonic() + limits.seconds
     try:
         while not _ended_within(process, min(LOOK_EVERY, max(deadline - monotonic(), 0))):
@@ -152,7 +157,9 @@ def run_limited(
             if limit or stopped():
                 break
     finally:
-        code, left = _end_all(process, tree, "" if alone else mark)
+        if not alone:
+            _follow(tree, process.pid)
+        code, left = _end_all(process, tree, *(("", 0) if alone else (mark, inherited)))
     with suppress(OSError), log.open("rb") as file:  # the process may have removed it
         said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
     words = said.decode(errors="replace").strip()
@@ -226,7 +233,7 @@ def _end_of(file: IO[bytes]) -> bytes:
 
 
 def _end_all(
-    process: StartedProcess, tree: dict[int, psutil.Process], mark: str
+    process: StartedProcess, tree: dict[int, psutil.Process], mark: str, inherited: int
 ) -> tuple[int, int]:
     """End the process and every descendant, twice: one may have started another meanwhile.
 
@@ -234,7 +241,7 @@ def _end_all(
     """
     code, left = process.poll(), set()
     for _ in range(2):
-        marked = _marked(mark) if mark else []
+        marked = _marked(mark, inherited) if mark else []
         others = [one for one in {*tree.values(), *marked} if one.pid != process.pid]
         left |= {one.pid for one in others if _is_running(one)}
         if os.name == "posix":
@@ -260,14 +267,34 @@ def _is_running(process: psutil.Process) -> bool:
         return False
 
 
-def _marked(mark: str) -> list[psutil.Process]:
-    """Return the processes with the mark in their environment, whatever their parent is now."""
+def _marked(mark: str, inherited: int) -> list[psutil.Process]:
+    """Return the processes with one of the marks, whatever their parent is now."""
     found = []
     for one in psutil.process_iter():
         with suppress(psutil.Error, OSError):
-            if one.environ().get(MARK) == mark:
+            if (inherited and one.rlimit(_LIMIT)[1] == inherited) or one.environ().get(
+                MARK
+            ) == mark:
                 found.append(one)
     return found
+
+
+def finds_all() -> bool:
+    """Whether a descendant is found that has another environment, and whose parent is gone."""
+    return _LIMIT is not None
+
+
+def _mark_by_limit(process: psutil.Process, mark: str) -> int:
+    """Mark a process by a limit that its descendants inherit; return it, 0 where there is none."""
+    with suppress(psutil.Error, OSError):
+        if _LIMIT is not None:
+            _, hard = process.rlimit(_LIMIT)
+            half = (_LARGEST_MARK if hard < 0 else min(hard, _LARGEST_MARK)) // 2
+            if half > 0:
+                value = half + int(mark[:12], 16) % half
+                process.rlimit(_LIMIT, (value, value))
+                return value
+    return 0
 
 
 def die_with_parent(parent: int) -> None:

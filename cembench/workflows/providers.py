@@ -7,13 +7,16 @@ that success rates have the right denominator.
 
 from __future__ import annotations
 
+import bz2
+import gzip
 import importlib
+import lzma
 import tarfile
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path, PurePosixPath
@@ -29,7 +32,13 @@ from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 LARGEST_MEMBER = 2**31
 #: Maximum number of archive members that are examined.
 MOST_MEMBERS = 1_000_000
+#: Maximum size of a header in a TAR archive, which is read at once, and how many times its own size
+#: such an archive may unpack to, beside one member of the maximum size.
+LARGEST_HEADER, MOST_UNPACKED = 2**24, 200
 _PIECE = 2**20
+
+
+_DAMAGED = (zlib.error, lzma.LZMAError)
 
 
 @dataclass(frozen=True)
@@ -112,7 +121,7 @@ def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Pro
             with closing(_members(path)) as members:
                 for member in _first(members, limit):
                     yield _unpacked(member, names, Path(folder), path)
-        except (zipfile.BadZipFile, tarfile.TarError, EOFError, zlib.error, OSError) as error:
+        except (zipfile.BadZipFile, tarfile.TarError, EOFError, *_DAMAGED, OSError) as error:
             raise ParameterError(
                 f"{path} cannot be read as an archive ({type(error).__name__}: {error}); name a "
                 "complete .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz file."
@@ -247,7 +256,7 @@ def _members(path: Path) -> Generator[_Member, None, None]:
                     opened = lambda info=info: cast(BinaryIO, archive.open(info))  # noqa: E731
                     yield _Member(inside, info.file_size, opened)
         return
-    with tarfile.open(path) as archive_:
+    with _unpacking(path) as content, tarfile.open(fileobj=cast(BinaryIO, content)) as archive_:
         for count, member in enumerate(archive_):
             inside = PurePosixPath(member.name)
             if count >= MOST_MEMBERS:
@@ -255,6 +264,37 @@ def _members(path: Path) -> Generator[_Member, None, None]:
             if member.isreg() and is_named_like_a_mesh(Path(inside.name)):
                 taken = lambda member=member: cast(BinaryIO, archive_.extractfile(member))  # noqa: E731
                 yield _Member(inside, member.size, taken)
+
+
+class _Bounded:
+    """A TAR archive while it is unpacked: neither a header nor the whole is larger than allowed."""
+
+    def __init__(self, file: BinaryIO, most: int) -> None:
+        self._file, self._most = file, most
+        self.tell = file.tell
+
+    def read(self, size: int = -1) -> bytes:
+        if not 0 <= size <= LARGEST_HEADER:
+            raise tarfile.ReadError(f"a header of {size:,} bytes; allowed are {LARGEST_HEADER:,}")
+        return self._file.read(size)
+
+    def seek(self, place: int) -> int:
+        if place > self._most:
+            raise tarfile.ReadError(
+                f"it unpacks to more than {self._most:,} bytes, {MOST_UNPACKED} times its own size"
+            )
+        return self._file.seek(place)
+
+
+@contextmanager
+def _unpacking(path: Path) -> Iterator[_Bounded]:
+    """Open a TAR archive, packed or not."""
+    with path.open("rb") as file:
+        start = file.read(6)
+    openers = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ": lzma.open}
+    opener = next((one for magic, one in openers.items() if start.startswith(magic)), open)
+    with cast(Callable[[Path, str], BinaryIO], opener)(path, "rb") as content:
+        yield _Bounded(content, LARGEST_MEMBER + MOST_UNPACKED * path.stat().st_size)
 
 
 def _unpacked(member: _Member, names: Names, folder: Path, archive: Path) -> Provided:

@@ -26,6 +26,24 @@ def test_who_may_read_a_file_is_up_to_the_umask(tmp_path):
     assert stat.S_IMODE((tmp_path / "new").stat().st_mode) == 0o640
 
 
+def test_a_file_that_is_replaced_keeps_who_may_read_it(tmp_path):
+    private, modes = tmp_path / "private", []
+    private.write_bytes(b"older")
+    private.chmod(0o600)
+
+    def make(draft):
+        modes.append(stat.S_IMODE(draft.stat().st_mode))
+        draft.write_bytes(b"newer")
+
+    write_by(private, make)
+    write_bytes(private, b"newest")
+    assert [*modes, stat.S_IMODE(private.stat().st_mode)] == [0o600, 0o600]
+    (tmp_path / "link").symlink_to(private)
+    write_bytes(tmp_path / "link", b"of its own")
+    assert private.read_bytes() == b"newest"
+    assert stat.S_IMODE((tmp_path / "link").stat().st_mode) != 0o600
+
+
 def test_the_draft_is_closed_before_it_is_deleted(tmp_path):
     """Python 3.13 shows what goes wrong while a file is closed by its deletion."""
     kept = []

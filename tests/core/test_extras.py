@@ -90,7 +90,7 @@ def a_table(folder):
 
 
 def a_stand_in(folder):
-    cembench.surface("cowboy-hat", 1000)
+    cembench.surface("cowboy-hat-stand-in", 1000)
 
 
 def a_film(folder):

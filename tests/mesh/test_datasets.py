@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import requests
 from cembench.surfaces.disk_grid import disk_grid
+from requests.adapters import HTTPAdapter
 from rich.console import Console
 from scipy.io import savemat
 
@@ -25,7 +25,7 @@ from cembench.mesh.datasets import Dataset, fetch, is_fetched
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
-from cembench.running.plan import PaperRole, paper_role_of_file
+from cembench.running.plan import PaperRole, paper_role_of
 from tests.limits import files_of_at_most, tree
 from tests.real_meshes import real_mesh
 
@@ -68,13 +68,13 @@ def server(monkeypatch, tmp_path):
     thread.start()
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path / "cache"))
     monkeypatch.setenv("CEMBENCH_DATA_URL", server.url)
-    answers, get = [], requests.get
+    answers, send = [], HTTPAdapter.send
 
     def kept(*given, **settings):
-        answers.append(get(*given, **settings))
+        answers.append(send(*given, **settings))
         return answers[-1]
 
-    monkeypatch.setattr(requests, "get", kept)
+    monkeypatch.setattr(HTTPAdapter, "send", kept)
     yield server
     assert all(answer.raw.closed for answer in answers), "a connection is left to the collector"
     server.http.shutdown()
@@ -91,9 +91,12 @@ def tiny(server):
 
 
 @pytest.fixture
-def known(tiny, monkeypatch):
+def known(tiny, server, monkeypatch, tmp_path):
     """The command line knows of this dataset, and of one that its server has not."""
     absent = replace(tiny, name="absent", source_url="https://example.org/absent.mat")
+    published = tmp_path / "published.mat"
+    published.write_bytes(server.content)
+    tiny = replace(tiny, mesh_hash=read_mesh(published).hash)
     installed = replace(load_registry(), datasets={"tiny": tiny, "absent": absent})
     monkeypatch.setattr(registry, "_installed", lambda: installed)
 
@@ -175,10 +178,14 @@ def test_progress_is_told_of_every_byte(server, tiny):
     assert (bar.total, bar.done, bar.closed) == (len(server.content), len(server.content), True)
 
 
-def test_three_of_those_that_are_known_are_models_of_the_paper():
+def test_seven_of_those_that_are_known_are_models_of_the_paper():
     known = load_registry().datasets
     assert {name: d.paper_row for name, d in known.items() if d.paper_row} == {
+        "nefertiti": "Nefertiti",
+        "cowboy-hat": "Cowboy Hat",
         "chinese-lion": "Chinese Lion",
+        "david-head": "David Head",
+        "stanford-bunny": "Stanford Bunny",
         "human-brain": "Human Brain",
         "left-hand": "Left Hand",
     }
@@ -186,22 +193,22 @@ def test_three_of_those_that_are_known_are_models_of_the_paper():
         load_registry().dataset("teapot")
 
 
-def test_a_model_is_recognised_by_its_bytes_and_by_its_mesh(tiny, known, server, tmp_path):
+def test_a_model_is_recognised_by_its_mesh_in_any_file(tiny, known, server, tmp_path):
     path = tmp_path / "renamed.mat"
     path.write_bytes(server.content)
     mesh = read_mesh(path)
-    found = load_registry()
-    assert paper_role_of_file(found, path, mesh) == PaperRole("Nefertiti", "model")
     write_mesh(tmp_path / "other.ply", mesh)
-    assert paper_role_of_file(found, tmp_path / "other.ply", mesh) == PaperRole()
-    hashed = replace(found, datasets={"tiny": replace(tiny, mesh_hash=mesh.hash)})
-    assert paper_role_of_file(hashed, tmp_path / "other.ply", mesh).paper_row == "Nefertiti"
+    for file in (path, tmp_path / "other.ply"):
+        found = paper_role_of(load_registry(), read_mesh(file))
+        assert found == PaperRole("Nefertiti", "model")
+    unknown = replace(load_registry(), datasets={"tiny": tiny})
+    assert paper_role_of(unknown, mesh) == PaperRole()
 
 
 @pytest.mark.parametrize("name", ["chinese_lion.mat", "chinese_lion.obj"])
 def test_the_chinese_lion_is_recognised_in_either_format(name):
     path = real_mesh(name)
-    found = paper_role_of_file(load_registry(), path, read_mesh(path, TriangleMesh))
+    found = paper_role_of(load_registry(), read_mesh(path, TriangleMesh))
     assert found == PaperRole("Chinese Lion", "model")
 
 

@@ -126,6 +126,26 @@ def test_an_archive_is_not_trusted(tmp_path, monkeypatch):
     assert "more than allowed" in bomb.error
 
 
+@pytest.mark.parametrize("packing", ["gz", "bz2", "xz"])
+def test_a_tar_archive_is_not_unpacked_without_bounds(tmp_path, monkeypatch, packing):
+    path = tmp_path / "a.tar"
+    with tarfile.open(path, f"w:{packing}") as archive:
+        info = tarfile.TarInfo("disk.obj")
+        info.pax_headers = {"comment": "x" * 2**25}
+        archive.addfile(info, io.BytesIO(b""))
+    assert path.stat().st_size < 2**20
+    with pytest.raises(ParameterError, match=r"a header of 33,\d+,\d+ bytes"):
+        list(surfaces_of_archive(path))
+    with tarfile.open(path, f"w:{packing}") as archive:
+        for name in ("a.bin", "b.obj"):
+            info = tarfile.TarInfo(name)
+            info.size = 2**25
+            archive.addfile(info, io.BytesIO(bytes(info.size)))
+    monkeypatch.setattr(providers, "LARGEST_MEMBER", 1_000_000)
+    with pytest.raises(ParameterError, match="it unpacks to more than"):
+        list(surfaces_of_archive(path))
+
+
 def test_what_is_no_archive_or_a_damaged_one(tmp_path, folder):
     (tmp_path / "a.zip").write_text("hello")
     with pytest.raises(ParameterError, match="cannot be read as an archive"):

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path, PurePosixPath
 
 from cembench.core.atomic import write_bytes
-from cembench.core.names import digest, distinct_slugs, slug
+from cembench.core.loading import damaged, is_there, read_bytes
+from cembench.core.names import digest, distinct_slugs
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import (
     ORIGINS,
@@ -20,6 +21,7 @@ from cembench.report.document import (
     Value,
     missing,
 )
+from cembench.report.pictures import pixel_suffix
 from cembench.results.exhibits import Exhibit, ExhibitTable, place_of
 from cembench.results.records import MeshOrigin
 
@@ -51,7 +53,14 @@ def figures_of(exhibit: Exhibit) -> list[str]:
 
 
 def exhibit_sections(evidence: Evidence, folder: Path) -> list[Section]:
-    """Return a section for each exhibit; its pictures are copied into the report."""
+    """Return a section for each exhibit; its pictures are copied into the report.
+
+    Raises
+    ------
+    RecordError
+        The file of a picture holds something else, or a link leads to it.
+
+    """
     names = distinct_slugs({digest(exhibit.name): exhibit.name for exhibit in evidence.exhibits})
     return [
         _section(evidence, exhibit, f"exhibit-{names[digest(exhibit.name)]}", folder)
@@ -65,13 +74,17 @@ def _section(evidence: Evidence, exhibit: Exhibit, name: str, folder: Path) -> S
     items.append(Text(f"Made on: {ORIGINS[exhibit.origin][0].removeprefix('measured here on ')}."))
     figures, lost = [], []
     for k, picture in enumerate(exhibit.pictures):
-        file = place_of(evidence.store.folder, exhibit.name, picture.file)
-        if not file.is_file():
+        run = evidence.store.folder
+        file = place_of(run, exhibit.name, picture.file)
+        if not is_there(file):
             lost.append(Gap(picture.caption, f"the picture {file} is gone.", exhibit.command))
             continue
-        stem = stems[digest(picture.file)]
-        path = PurePosixPath("figures", f"{name}-{stem}.{slug(file.suffix, 20)}")
-        write_bytes(folder / path, file.read_bytes())
+        content = read_bytes(file, run)
+        suffix = pixel_suffix(content)
+        if suffix is None:
+            raise damaged(file, "a picture", "it holds no PNG, JPEG or WebP")
+        path = PurePosixPath("figures", f"{name}-{stems[digest(picture.file)]}{suffix}")
+        write_bytes(folder / path, content)
         figures.append(
             Figure(
                 f"{name}-{k + 1}", picture.caption, (path,), picture.caption,

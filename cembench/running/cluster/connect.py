@@ -1,4 +1,9 @@
-"""Connect to the cluster that ``--cluster`` names: local workers, a scheduler, or Slurm."""
+"""Connect to the cluster that ``--cluster`` names: local workers, a scheduler, or Slurm.
+
+Whoever may talk to a scheduler or worker of dask runs code as the user who started it. So all that
+is started here talks through TLS with certificates made for the one run, and its pages are for this
+machine alone.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +24,18 @@ if TYPE_CHECKING:
 
 #: Seconds in which a scheduler has to answer.
 CONNECT_SECONDS = 15
+#: Where schedulers and workers show their pages, which ask for no certificate.
+_PAGES = "127.0.0.1:0"
+#: Variables of dask that name the certificates of a scheduler that somebody else started.
+TLS_VARIABLES = tuple(
+    f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__KEY", "CLIENT__CERT")
+)
+#: The modules that each kind of place needs.
+MODULES: Mapping[str, tuple[str, ...]] = {
+    "address": ("dask", "distributed"),
+    "local": ("dask", "distributed", "cryptography"),
+    "slurm": ("dask", "distributed", "cryptography", "dask_jobqueue"),
+}
 #: What ``slurm:`` takes: name, default (None: required), and what it means.
 SLURM = {
     "partition": (None, "the partition (queue)"),
@@ -47,6 +64,11 @@ class ClusterPlace:
     workers: int = 0
     settings: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether anybody who reaches its port can run code there."""
+        return self.address.startswith("tcp:")
+
 
 def parse_cluster(text: str) -> ClusterPlace:
     """Parse the value of ``--cluster``.
@@ -54,7 +76,8 @@ def parse_cluster(text: str) -> ClusterPlace:
     Raises
     ------
     ParameterError
-        It is none of ``local:N``, ``tcp://HOST:PORT`` and ``slurm:NAME=VALUE,...``.
+        It is none of ``local:N``, ``tcp://HOST:PORT``, ``tls://HOST:PORT`` and
+        ``slurm:NAME=VALUE,...``.
 
     Examples
     --------
@@ -72,7 +95,8 @@ def parse_cluster(text: str) -> ClusterPlace:
         return ClusterPlace("slurm", settings=_settings(rest))
     raise ParameterError(
         f"--cluster {text!r} is not allowed; write local:4 (workers on this machine), "
-        "tcp://HOST:8786 (a scheduler that runs), or slurm:partition=cpu,cores=16,machines=10."
+        "tls://HOST:8786 or tcp://HOST:8786 (a scheduler that runs), or "
+        "slurm:partition=cpu,cores=16,machines=10."
     )
 
 
@@ -114,13 +138,18 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
         The scheduler cannot be reached.
 
     """
-    require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
+    require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
     import dask
     from distributed import Client
 
     if where.kind == "address":
         try:
             client = Client(where.address, timeout=CONNECT_SECONDS, set_as_default=False)
+        except (TypeError, RuntimeError) as error:  # dask's for certificates that are missing
+            raise ClusterError(
+                f"{where.address} cannot be reached through TLS: {error}. Set "
+                f"{', '.join(TLS_VARIABLES)} to the files of the certificates."
+            ) from error
         except (OSError, TimeoutError, ValueError) as error:
             raise ClusterError(
                 f"no scheduler answers at {where.address}: {error or 'timed out'}. Start one with "
@@ -154,14 +183,16 @@ def _local(where: ClusterPlace) -> Any:
         threads_per_worker=1,
         memory_limit=0,
         silence_logs=logging.CRITICAL,
-        dashboard_address=":0",
+        host="127.0.0.1",
+        protocol="tls://",
+        security=True,
+        dashboard_address=_PAGES,
         local_directory=str(place() / "dask"),
         preload=["cembench.running.cluster.worker"],
     )
 
 
 def _slurm(where: ClusterPlace) -> Any:
-    require(Extra.CLUSTER, "a run on Slurm", "dask_jobqueue")
     from dask_jobqueue import SLURMCluster
 
     chosen = where.settings
@@ -176,13 +207,15 @@ def _slurm(where: ClusterPlace) -> Any:
         interface=chosen["interface"] or None,
         processes=1,
         python=sys.executable,
-        worker_extra_args=["--no-dashboard"],
+        security=True,
+        shared_temp_directory=str(logs),  # for the workers' certificates, readable to this user
+        worker_extra_args=["--no-dashboard", "--dashboard-address", _PAGES],
         job_extra_directives=["--exclusive"] if chosen["exclusive"] == "yes" else [],
         job_script_prologue=[f"export {name}={value}" for name, value in quiet_variables().items()],
         job_name="cembench",
         local_directory=str(place() / "dask"),
         log_directory=str(logs),
-        scheduler_options={"dashboard_address": ":0"},
+        scheduler_options={"dashboard_address": _PAGES},
     )
     try:
         wanted = int(chosen["machines"])

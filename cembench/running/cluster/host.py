@@ -1,14 +1,17 @@
 """One machine of a cluster: its stored files, and the lock for timing.
 
 Several workers may stand on one machine. Their checks run side by side; while one of them times,
-no other checks or times. A lock of the system holds that, so it ends with the process that has it,
-and whoever started the workers need not know.
+no other checks or times. A lock of the system holds that, so it ends with the process that has it.
+Each user has a lock of their own, which no other user can take.
 """
 
 from __future__ import annotations
 
+import errno
 import os
+import platform
 import shutil
+import stat
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -22,6 +25,7 @@ from numpy.typing import NDArray
 from cembench.core.atomic import write
 from cembench.core.errors import ClusterError, RecordError
 from cembench.core.loading import is_there, read_arrays
+from cembench.core.names import file_name
 from cembench.mesh.datasets import cache_directory
 
 #: Days after which what nobody came back for is deleted from a machine.
@@ -42,16 +46,16 @@ class Turn:
     """
 
     def __init__(self, path: Path | None = None) -> None:
-        self.path = path or _common_folder() / "cembench-machine.lock"
+        self.path = path or _lock_folder() / "machine.lock"
         self._file = -1
 
     def __enter__(self) -> Self:
-        """Open the lock's file, which all users of the machine have in common.
+        """Open the lock's file, which all workers of this user on the machine have in common.
 
         Raises
         ------
         ClusterError
-            It cannot be opened.
+            It cannot be opened, or is a link, or not a regular file of this user's.
 
         """
         try:
@@ -59,7 +63,7 @@ class Turn:
         except OSError as error:
             raise ClusterError(
                 f"{self.path}, by which the workers of a machine take turns, cannot be opened: "
-                f"{error.strerror or error}. Let all users read it, or delete it."
+                f"{error.strerror or error}. Delete it, and let this user write to its folder."
             ) from error
         return self
 
@@ -91,24 +95,39 @@ class Turn:
         return True
 
 
-def _common_folder() -> Path:
-    """Return a folder that all jobs and users of this machine have, whatever TMPDIR is."""
+def _lock_folder() -> Path:
+    """Return a folder that all jobs of this user on this machine have, and nobody else writes to.
+
+    It is in the folder for temporary files that all jobs have, whatever TMPDIR is. Whoever takes
+    its name there before us stops nothing: then it is in the cache, by the machine's name.
+    """
     common = Path("/tmp")
-    return common if common.is_dir() else Path(tempfile.gettempdir())
+    above = common if common.is_dir() else Path(tempfile.gettempdir())
+    folder = above / f"cembench-{_user()}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700, exist_ok=True)
+        about = folder.lstat()
+        if stat.S_ISDIR(about.st_mode) and about.st_uid == _user() and not about.st_mode & 0o022:
+            return folder
+    folder = place() / "locks" / file_name(platform.node())
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def _user() -> int:
+    """Return the number of this user; 0 where users have none (Windows)."""
+    return os.geteuid() if hasattr(os, "geteuid") else 0
 
 
 def _opened(path: Path) -> int:
-    """Open a file for locking, which may be another user's, and is made where there is none.
-
-    Some systems refuse to open another user's file in a common folder in a way that would make it.
-    """
-    with suppress(FileNotFoundError):
-        return os.open(path, os.O_RDONLY)
-    try:
-        file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o644)
-    except FileExistsError:  # made by another worker just now
-        return os.open(path, os.O_RDONLY)
-    path.chmod(0o644)  # whatever the user's umask is
+    """Open a file for locking, which is made where there is none; nothing else is waited for."""
+    flags = os.O_RDWR | os.O_CREAT
+    flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+    file = os.open(path, flags, 0o600)
+    about = os.fstat(file)
+    if not stat.S_ISREG(about.st_mode) or about.st_uid != _user():
+        os.close(file)
+        raise OSError(errno.EPERM, "it is not a regular file of this user's")
     return file
 
 

@@ -46,4 +46,6 @@ def save_state(folder: Path, state: ClusterState) -> None:
 def read_state(folder: Path) -> ClusterState | None:
     """Return the last saved progress of a run; None for a run without a cluster."""
     path = folder / MACHINES
-    return read_json(path, TypeAdapter(ClusterState), "a state") if is_there(path) else None
+    if not is_there(path):
+        return None
+    return read_json(path, TypeAdapter(ClusterState), "a state", folder)

@@ -1,6 +1,7 @@
 """What travels, and the machine that it travels to; no scheduler takes part."""
 
 import json
+import os
 import sys
 import tempfile
 import threading
@@ -264,21 +265,52 @@ def test_what_is_kept_of_a_unit_counts_under_another_share_of_the_budget():
 def test_whose_turn_it_is_hangs_on_one_file_of_the_machine(tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", None)
-    assert host.Turn().path == Path("/tmp/cembench-machine.lock")
+    assert host.Turn().path == Path(f"/tmp/cembench-{os.geteuid()}/machine.lock")
     path = tmp_path / "lock"
-    path.write_bytes(b"")
-    path.chmod(0o444)  # another user's: reading is enough to lock it
     with host.Turn(path) as one:
         one.alone()
         with host.Turn(path) as other:
             assert not other._lock(alone=True, at_once=True)
-    (tmp_path / "link").symlink_to(tmp_path / "none")
-    for cannot in (tmp_path / "none" / "lock", tmp_path / "link"):
+    (tmp_path / "link").symlink_to(path)
+    os.mkfifo(tmp_path / "fifo")
+    for cannot in (tmp_path / "none" / "lock", tmp_path / "link", tmp_path / "fifo"):
         with (
             pytest.raises(ClusterError, match="by which the workers of a machine take turns"),
             host.Turn(cannot),
         ):
             pass
+
+
+@pytest.mark.parametrize("taken", ["link", "file", "open to all", "another user's"])
+def test_whoever_takes_the_name_of_the_lock_stops_nothing(tmp_path, monkeypatch, taken):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "common"))
+    monkeypatch.setattr(host, "Path", lambda name: Path(str(name).replace("/tmp", "/none")))
+    ours = tmp_path / "common" / f"cembench-{os.geteuid()}"
+    (tmp_path / "common").mkdir()
+    if taken == "link":
+        (tmp_path / "elsewhere").mkdir()
+        ours.symlink_to(tmp_path / "elsewhere")
+    elif taken == "file":
+        ours.touch()
+    else:
+        ours.mkdir()
+        ours.chmod(0o777 if taken == "open to all" else 0o700)
+    if taken == "another user's":
+        if os.geteuid() != 0:
+            pytest.skip("NOT CHECKED: only root can give a folder to another user")
+        os.chown(ours, 12345, -1)
+    with host.Turn() as turn:
+        assert turn.path.parent.parent == host.place() / "locks"
+        turn.alone()
+
+
+def test_a_lock_of_another_users_is_not_taken(tmp_path):
+    if os.geteuid() != 0:
+        pytest.skip("NOT CHECKED: only root can give a file to another user")
+    (tmp_path / "lock").touch()
+    os.chown(tmp_path / "lock", 12345, -1)
+    with pytest.raises(ClusterError, match="regular file of this user's"):
+        host.Turn(tmp_path / "lock").__enter__()
 
 
 def test_the_page_names_how_dask_is_kept_quiet():

@@ -1,0 +1,109 @@
+"""Read a file by a library, in a process of its own whose memory is bounded.
+
+A small file can declare, or unpack to, more than memory holds. Our own readers compare sizes first;
+libraries do not, and those in C++ end the process when memory runs out. That process is not ours.
+"""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from cembench.core.atomic import write, write_text
+from cembench.core.errors import MeshError, RecordError
+from cembench.core.extras import Extra, require
+from cembench.core.loading import free_memory, read_arrays
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.soup import Soup, damaged
+
+Reader = Callable[[Path], Soup]
+
+_SOUP, _ERROR = "soup.npz", "error.txt"
+#: Exit code of a process in which a reader ran out of memory.
+_NO_MEMORY = 12
+
+
+def apart(reader: Reader, extra: Extra, module: str) -> Reader:
+    """Return a reader that calls this one in another process; its library is of an extra.
+
+    The reader raises :class:`MissingExtra` where the library is not installed.
+    """
+
+    def read(path: Path) -> Soup:
+        require(extra, f"reading {path.suffix} files", module)
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            words = [reader.__module__, reader.__name__, str(path.absolute()), name]
+            nowhere = subprocess.DEVNULL
+            ended = subprocess.run(
+                [sys.executable, "-m", __name__, *words],
+                stdin=nowhere,
+                stdout=nowhere,
+                stderr=nowhere,
+                check=False,
+            )
+            if (folder / _ERROR).exists():
+                raise MeshError((folder / _ERROR).read_text())
+            if ended.returncode == 0:
+                return _soup(folder / _SOUP)
+        if ended.returncode == _NO_MEMORY:
+            raise MemoryError
+        how = f"code {ended.returncode}"
+        with suppress(ValueError):
+            how = signal.Signals(-ended.returncode).name
+        raise damaged(
+            f"the process that read it through {module} ended with {how}: what the file declares "
+            f"may be more than memory can hold ({free_memory():,} bytes are free)"
+        )
+
+    return read
+
+
+def _soup(file: Path) -> Soup:
+    try:
+        found = read_arrays(file, ("V", "corners", "sizes", "notices"))
+    except RecordError as error:
+        raise MeshError(str(error)) from error
+    told = json.loads(str(found["notices"]))
+    notices = tuple(Notice(NoticeKind(kind), text) for kind, text in told)
+    return Soup(found["V"], found["corners"], found["sizes"], notices=notices)
+
+
+def _main(module: str, reader: str, path: str, folder: str) -> int:
+    """Call a reader, and write its surface or the words of its error to a folder."""
+    read: Reader = getattr(import_module(module), reader)
+    _bound_memory()
+    try:
+        soup = read(Path(path))
+        told = np.array(json.dumps([(notice.kind, notice.text) for notice in soup.notices]))
+        fields = {"V": soup.V, "corners": soup.corners, "sizes": soup.sizes, "notices": told}
+        write(Path(folder) / _SOUP, lambda file: np.savez(file, allow_pickle=False, **fields))
+    except MeshError as error:
+        write_text(Path(folder) / _ERROR, str(error))
+    except MemoryError:
+        return _NO_MEMORY
+    return 0
+
+
+def _bound_memory() -> None:
+    """Let this process reserve what is free now and no more, where the system can bound that."""
+    with suppress(ImportError, ValueError, OSError):  # Windows, or a lower limit is in force
+        import resource
+
+        most = int(psutil.Process().memory_info().vms) + free_memory()
+        _, hard = resource.getrlimit(resource.RLIMIT_AS)
+        resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+
+
+if __name__ == "__main__":
+    sys.exit(_main(*sys.argv[1:]))

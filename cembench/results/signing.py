@@ -1,0 +1,125 @@
+"""Sign a run with its measurer's SSH key, and check who signed one.
+
+A digest shows that a file was not damaged; a signature shows who vouches for all files of a run.
+It is OpenSSH's (``ssh-keygen -Y``, namespace "cembench"), detached, in ``RUN/signature``, over the
+names and SHA-256 of the files. Whether what the signer measured is true it cannot show.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import subprocess
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from cembench.core.atomic import is_draft, write_bytes
+from cembench.core.errors import ParameterError, RecordError
+from cembench.core.loading import check_no_link, is_there, open_file, read_bytes
+from cembench.results.run_folder import PLAN, SIGNATURE
+from cembench.results.store import Store
+
+_NAMESPACE = "cembench"
+#: What is signed: all that a run keeps but the journals of unfinished cells.
+_SIGNED = ("records", "maps", "meshes", "environments", "exhibits", "others")
+
+
+def sign(run: Path, key: Path) -> Path:
+    """Sign a run; return the file of the signature.
+
+    Parameters
+    ----------
+    run : Path
+        The run's folder.
+    key : Path
+        A private SSH key, or a public one whose private key an agent holds.
+
+    Raises
+    ------
+    RecordError
+        The folder holds no run, or a file in it cannot be read.
+    ParameterError
+        OpenSSH is not installed, or refuses the key.
+
+    """
+    signature = _ssh_keygen(["sign", "-f", str(key)], _contents(run))
+    if signature is None:
+        raise ParameterError(
+            f"ssh-keygen does not sign with {key}. Name a private key, as ~/.ssh/id_ed25519, or "
+            "the public key of one that your agent holds."
+        )
+    write_bytes(run / SIGNATURE, signature)
+    return run / SIGNATURE
+
+
+def signer(run: Path, allowed: Path) -> str:
+    """Return who signed a run: a principal of a file of allowed signers.
+
+    Parameters
+    ----------
+    run : Path
+        The run's folder.
+    allowed : Path
+        Who may sign, as ``man ssh-keygen`` describes under ALLOWED SIGNERS: a line has a name and
+        a public key.
+
+    Raises
+    ------
+    RecordError
+        The run is not signed, or by none of them, or was changed since.
+    ParameterError
+        OpenSSH is not installed, or there is no such file.
+
+    """
+    if not allowed.is_file():
+        raise ParameterError(f"{allowed}, the file of allowed signers, does not exist.")
+    contents, path = _contents(run), run / SIGNATURE
+    if not is_there(path):
+        raise RecordError(f"{run} is not signed; its measurer can run `cembench sign {run}`.")
+    read_bytes(path, run)  # a regular file, and no link
+    given = ["-f", str(allowed), "-s", str(path)]
+    names = _ssh_keygen(["find-principals", *given], b"")
+    if names is None:
+        raise RecordError(f"{run} is signed by nobody whom {allowed} names.")
+    name = names.decode(errors="replace").splitlines()[0]
+    if _ssh_keygen(["verify", *given, "-I", name], contents) is None:
+        raise RecordError(
+            f"{run} was changed after {name} signed it, or the signature is of something else. Get "
+            "the run anew, or have it signed again."
+        )
+    return name
+
+
+def _contents(run: Path) -> bytes:
+    """Return what is signed: the names and hashes of a run's files."""
+    Store(run).check_is_run()
+    found = []
+    for path in _files(run):
+        with os.fdopen(open_file(path, run), "rb") as file:
+            hashed = hashlib.file_digest(file, "sha256").hexdigest()
+        found.append((path.relative_to(run).as_posix(), hashed))
+    return json.dumps(sorted(found)).encode()
+
+
+def _files(run: Path) -> Iterator[Path]:
+    """Yield the files of a run that are signed; a link among them is refused."""
+    places = [run / PLAN, *(path for name in _SIGNED for path in (run / name).rglob("*"))]
+    for path in places:
+        check_no_link(path, run)
+        if is_there(path) and not path.is_dir() and not is_draft(path):
+            yield path
+
+
+def _ssh_keygen(words: Sequence[str], message: bytes) -> bytes | None:
+    """Return what ssh-keygen prints, given a message; None if it refuses."""
+    command = ["ssh-keygen", "-Y", *words]
+    if words[0] != "find-principals":
+        command += ["-n", _NAMESPACE]
+    try:
+        ended = subprocess.run(command, input=message, capture_output=True, check=False)
+    except FileNotFoundError as error:
+        raise ParameterError(
+            "ssh-keygen is not installed; signatures are OpenSSH's. Install its client."
+        ) from error
+    return ended.stdout if ended.returncode == 0 else None
