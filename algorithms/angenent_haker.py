@@ -18,7 +18,9 @@ from cembench.registry import algorithm
     source="The CEM paper, Eqs. 11-15; Angenent, Haker et al. 1999; Haker et al. 2000",
     usual=False,
 )
-def angenent_haker(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
+def angenent_haker(
+    mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True
+) -> Parameterization:
     """Map a disk by the linear map with a pole in the middle, whose boundary is natural.
 
     Eqs. 11-14 and 18: L f = b with a dipole in the triangle nearest to the mean vertex and no
@@ -37,5 +39,5 @@ def angenent_haker(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterizatio
     f_b = pole_start(mesh.V, mesh.F, bordered.solved_boundary)
     f_b = f_b - f_b.mean()
     uv = bordered.in_order(bordered.dirichlet(f_b), f_b)
-    uv, repair = with_area_pi(mesh, uv)
-    return Parameterization(uv, extras=repair)
+    uv, folds = with_area_pi(mesh, uv, repair=repair)
+    return Parameterization(uv, extras=folds)

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
-from cembench.conformal.boundary_iteration import iterate_boundary, on_circle, pole_start
+from cembench.conformal.boundary_iteration import Stop, iterate_boundary, on_circle, pole_start
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
@@ -27,9 +26,11 @@ def cem(
     *,
     tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-5,
     max_iterations: Annotated[int, Field(ge=0, le=1_000_000)] = 20,
+    stop: Stop = "drop",
     inversion: bool = True,
     best: bool = False,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a disk by Algorithm 1 of the paper.
 
@@ -44,23 +45,28 @@ def cem(
     intrinsic Delaunay triangulation.
 
     Decided here, where the paper is silent: the start's triangle is the one whose barycentre is
-    nearest to the mean vertex. The iteration ends after the first step that changes E_C by less
-    than `tolerance`, or after `max_iterations`, and the last iterate is the map, even if E_C
-    increased on the way; `best` returns the iterate of least E_C instead, where the history then
-    ends (`iterations_dropped` counts those after it). A vertex at the origin, which has no inverse,
-    counts as zero in (30). If (30) would make boundary vertices change places, which folds the map,
-    that step is (23), and the iteration ends if (23) would do so too (`order_kept` counts these
-    steps; 0 on most surfaces). If negative cotangent weights still fold the final map, patches
-    around the folds are laid out again (`fold_repairs`).
+    nearest to the mean vertex. The iteration ends after the first step that does not lower E_C by
+    at least `tolerance`, or after `max_iterations`, and the last iterate is the map, even if that
+    step raised E_C. These two readings give the most of the figures that the paper prints for its
+    public models. With `stop="change"` a step that raises E_C by `tolerance` or more does not end
+    the iteration; if the first one does raise it, that is suggested as the `alternative`. `best`
+    returns the iterate of least E_C, where the history then ends (`iterations_dropped` counts those
+    after it). A vertex at the origin, which has no inverse, counts as zero in (30). If (30) would
+    make boundary vertices change places, which folds the map, that step is (23), and the iteration
+    ends if (23) would do so too (`order_kept` counts these steps; 0 on most surfaces). If negative
+    cotangent weights still fold the final map, patches around the folds are laid out again
+    (`fold_repairs`), unless `repair` is off.
     """
     return map_from_triangle(
         mesh,
         None,
         tolerance=tolerance,
         max_iterations=max_iterations,
+        stop=stop,
         inversion=inversion,
         best=best,
         delaunay=delaunay,
+        repair=repair,
     )
 
 
@@ -70,9 +76,11 @@ def map_from_triangle(
     *,
     tolerance: float = 1e-5,
     max_iterations: int = 20,
+    stop: Stop = "drop",
     inversion: bool = True,
     best: bool = False,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map by CEM starting from the given triangle; None for the usual one."""
     L = laplacian(mesh, delaunay=delaunay)
@@ -89,15 +97,18 @@ def map_from_triangle(
         bordered.conformal_energy,
         tolerance=tolerance,
         max_iterations=max_iterations,
+        stop=stop,
         inversion=inversion,
         best=best,
     )
     iterations = int(np.argmin(history)) if best else len(history) - 1
     uv = bordered.completed(f_i, f_b)
-    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
+    uv, folds = accepted_repair(mesh, uv, L, repair=repair)
     extras = {
         "order_kept": order_kept,
         "iterations_dropped": len(history) - 1 - iterations,
-        **repair,
+        **folds,
     }
+    if stop == "drop" and len(history) == 2 and history[1] > history[0]:
+        extras["alternative"] = {"stop": "change"}
     return Parameterization(uv, iterations, tuple(history[: iterations + 1]), extras)

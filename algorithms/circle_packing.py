@@ -10,7 +10,6 @@ from pydantic import Field
 
 from cembench.conformal.discrete_metric import BlockPattern, angle_sums, angles
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import laplacian
 from cembench.core.clock import phase
@@ -45,6 +44,7 @@ def circle_packing(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 500,
     gauge: Gauge = "boundary",
+    repair: bool = True,
 ) -> Parameterization:
     """Map a disk by the circle packing of its graph, one circle per vertex.
 
@@ -71,9 +71,9 @@ def circle_packing(
     uv = _touching(mesh, z, packing.radii)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, mesh.boundary))
     uv[mesh.boundary] /= np.abs(uv[mesh.boundary])
-    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, laplacian(mesh), uv))
+    uv, folds = accepted_repair(mesh, uv, laplacian(mesh), repair=repair)
     told = {"angle_sum": history[-1], "ignores": "geometry"}
-    return Parameterization(uv, len(history), extras={**told, **repair})
+    return Parameterization(uv, len(history), extras={**told, **folds})
 
 
 def _touching(mesh: DiskMesh, z: Complex, radii: Real) -> Complex:

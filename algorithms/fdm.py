@@ -19,7 +19,6 @@ from cembench.conformal.beltrami import (
 )
 from cembench.conformal.doubling import DoubledSurface, doubled
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import (
     HarmonicExtension,
     arc_length_circle,
@@ -55,6 +54,7 @@ def fdm(
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 5,
     delaunay: bool = False,
     public_program: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a disk by correcting a harmonic map, first in the half plane and then by reflection.
 
@@ -106,9 +106,9 @@ def fdm(
             best, least, dropped = z, min(distortion, least), 0
         if abs(before - distortion) < tolerance:
             break
-    z, repair = accepted_repair(mesh, best, without_folds(mesh, L, best))
+    z, folds = accepted_repair(mesh, best, L, repair=repair)
     kept = history[: len(history) - dropped]
-    told = {**repair, "iterations_dropped": dropped}
+    told = {**folds, "iterations_dropped": dropped}
     return Parameterization(z, len(kept) - 1, tuple(kept), told)
 
 

@@ -11,7 +11,6 @@ from pydantic import Field
 from cembench.conformal.balancing import moebius_centred
 from cembench.conformal.doubling import doubled, doubled_laplacian
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import by_rows, laplacian
 from cembench.conformal.spherical import balanced_planar_map
@@ -43,6 +42,7 @@ def gu_yau(
     tolerance: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 1e-7,
     max_iterations: Annotated[int, Field(ge=0, le=10_000_000)] = 1_000,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a disk by explicit diffusion of the doubled surface on the sphere.
 
@@ -95,7 +95,7 @@ def gu_yau(
                 stopped = "energy"
                 break
     z = harmonic_extension(L, mesh.boundary, boundary_on_circle(mesh, S))
-    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
+    z, folds = accepted_repair(mesh, z, L, repair=repair)
     told = {"stopped": stopped, "energy_of": "half of the sphere's, less 2 pi"}
     history = tuple(energy / 2 - 2 * np.pi for energy in energies)
-    return Parameterization(z, len(history) - 1, history, {**told, **repair})
+    return Parameterization(z, len(history) - 1, history, {**told, **folds})

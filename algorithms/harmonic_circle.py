@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
@@ -18,7 +17,9 @@ from cembench.registry import algorithm
     source="Eq. (10) with a prescribed boundary; Floater & Hormann 2005, Sec. 3",
     conformal=False,
 )
-def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
+def harmonic_circle(
+    mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True
+) -> Parameterization:
     """Map a disk by one Dirichlet solve, with the boundary spaced by arc length.
 
     The cheapest map to the disk, and the baseline for all others: nothing adapts the boundary, so
@@ -28,5 +29,5 @@ def harmonic_circle(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterizati
     """
     L = laplacian(mesh, delaunay=delaunay)
     z = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))
-    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
-    return Parameterization(z, extras=repair)
+    z, folds = accepted_repair(mesh, z, L, repair=repair)
+    return Parameterization(z, extras=folds)

@@ -7,9 +7,9 @@ from typing import Annotated
 from pydantic import Field
 
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.patches import filled
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import HoledMesh
@@ -23,7 +23,10 @@ from cembench.registry import algorithm
     source="Eq. (10) on the filled surface; Floater & Hormann 2005, Sec. 3",
 )
 def harmonic_filled(
-    mesh: HoledMesh, *, outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None
+    mesh: HoledMesh,
+    *,
+    outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a surface with holes by one Dirichlet solve, with its holes filled temporarily.
 
@@ -35,6 +38,8 @@ def harmonic_filled(
     _, holes = mesh.outer_and_holes(outer)
     disk = filled(mesh, holes)
     L = laplacian(disk)
-    z = harmonic_extension(L, disk.boundary, arc_length_circle(disk))
-    z, repair = accepted_repair(disk, z, without_folds(disk, L, z))
-    return Parameterization(z[: mesh.n].copy(), extras=repair)
+    own = harmonic_extension(L, disk.boundary, arc_length_circle(disk))
+    z, folds = accepted_repair(disk, own, L, repair=repair)
+    if folds["folded_before_repair"]:  # some may be of the patches
+        folds["folded_before_repair"] = flipped_triangles(mesh, own)
+    return Parameterization(z[: mesh.n].copy(), extras=folds)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian_of_weights
 from cembench.core.clock import phase
@@ -22,7 +21,7 @@ from cembench.registry import algorithm
     usual=False,
     conformal=False,
 )
-def harmonic_tutte(mesh: DiskMesh) -> Parameterization:
+def harmonic_tutte(mesh: DiskMesh, *, repair: bool = True) -> Parameterization:
     """Map a disk by one Dirichlet solve that uses the graph of the mesh but not its geometry.
 
     As harmonic-circle, with the weight 1 on every edge instead of cotangents (the paper's Remark 5
@@ -33,5 +32,5 @@ def harmonic_tutte(mesh: DiskMesh) -> Parameterization:
         # An interior edge counts from both of its triangles.
         L = laplacian_of_weights(mesh.F, np.full(mesh.F.shape, 0.5), mesh.n)
     z = harmonic_extension(L, mesh.boundary, arc_length_circle(mesh))
-    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
-    return Parameterization(z, extras=repair)
+    z, folds = accepted_repair(mesh, z, L, repair=repair)
+    return Parameterization(z, extras=folds)

@@ -13,7 +13,6 @@ from cembench.conformal.beltrami import (
 )
 from cembench.conformal.doubling import DoubledSurface, doubled, doubled_laplacian
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.moebius import three_point_map
@@ -40,7 +39,7 @@ NEAREST = 1e-8
     target="disk",
     source="Choi & Lui, A linear formulation for disk conformal parameterization (2015)",
 )
-def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
+def ldm(mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True) -> Parameterization:
     """Map a disk by half of a conformal map of the doubled surface to the sphere.
 
     Faithful to the published method and to the program that its authors made public: the doubled
@@ -60,11 +59,16 @@ def ldm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     weights of the intrinsic Delaunay triangulation in every solve: both linear Beltrami solvers
     have the surface's own Laplacian as their matrix.
     """
-    return map_numbered(mesh, farthest_from_mean(mesh), delaunay=delaunay)
+    return map_numbered(mesh, farthest_from_mean(mesh), delaunay=delaunay, repair=repair)
 
 
 def map_numbered(
-    mesh: DiskMesh, first: int, *, mirrored: bool = False, delaunay: bool = False
+    mesh: DiskMesh,
+    first: int,
+    *,
+    mirrored: bool = False,
+    delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map by LDM with the choices that depend on the numbering of a mesh given explicitly.
 
@@ -77,7 +81,7 @@ def map_numbered(
     mirrored : bool
         Whether the most regular triangle is taken from the mirror copy, where it is equally
         regular.
-    delaunay : bool
+    delaunay, repair : bool
         As for `ldm`.
 
     """
@@ -96,8 +100,8 @@ def map_numbered(
         z = harmonic_extension(L, b, z[b])
     else:
         z = linear_beltrami_solver(mesh.F, _weights(z, mesh.F, mesh.V), b, z[b])
-    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
-    return Parameterization(z, extras=repair)
+    z, folds = accepted_repair(mesh, z, L, repair=repair)
+    return Parameterization(z, extras=folds)
 
 
 def _weights(z: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:

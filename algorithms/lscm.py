@@ -15,7 +15,7 @@ from cembench.registry import algorithm
     target="free boundary",
     source="Levy, Petitjean, Ray & Maillot 2002; Desbrun, Meyer & Alliez 2002",
 )
-def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
+def lscm(mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True) -> Parameterization:
     """Map a disk with a free boundary and least conformal energy, with two vertices pinned.
 
     E_C = E_D - A (Eq. 7) is a quadratic form in (u, v); pinning two vertices makes it positive
@@ -28,5 +28,5 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False) -> Parameterization:
     """
     pins = two_distant_vertices(mesh)
     uv = pinned_map(laplacian(mesh, delaunay=delaunay), mesh.boundary, pins)
-    uv, repair = with_area_pi(mesh, uv)
-    return Parameterization(uv, extras={"pins": pins.tolist(), **repair})
+    uv, folds = with_area_pi(mesh, uv, repair=repair)
+    return Parameterization(uv, extras={"pins": pins.tolist(), **folds})

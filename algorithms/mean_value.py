@@ -7,7 +7,6 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import interior_without_folds
 from cembench.conformal.harmonic import arc_length_circle
 from cembench.conformal.laplacian import corner_products
 from cembench.core.clock import phase
@@ -28,7 +27,7 @@ Real = NDArray[np.float64]
     usual=False,
     conformal=False,
 )
-def mean_value(mesh: DiskMesh) -> Parameterization:
+def mean_value(mesh: DiskMesh, *, repair: bool = True) -> Parameterization:
     """Map a disk by mean value weights, which use the geometry and are always positive.
 
     As harmonic-circle, with the weight (tan(a / 2) + tan(b / 2)) / l_ij from i to j, a and b the
@@ -58,8 +57,8 @@ def mean_value(mesh: DiskMesh) -> Parameterization:
     count_columns(2)
     with phase("solves"):
         z[i] = factor.solve(right.real) + 1j * factor.solve(right.imag)
-    z, repair = accepted_repair(mesh, z, interior_without_folds(mesh, z))
-    return Parameterization(z, extras=repair)
+    z, folds = accepted_repair(mesh, z, repair=repair)
+    return Parameterization(z, extras=folds)
 
 
 def _factored(A: scipy.sparse.csc_array) -> scipy.sparse.linalg.SuperLU:

@@ -12,7 +12,6 @@ from pydantic import Field
 from cembench.conformal.balancing import moebius_centred
 from cembench.conformal.doubling import doubled, doubled_laplacian
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import fitted_circle, polygon_area
@@ -45,6 +44,7 @@ def qiem(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 200,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a disk by half of the limit of the heat flow of the doubled surface on the sphere.
 
@@ -77,12 +77,12 @@ def qiem(
     z = balanced_planar_map(L_double, V, double.F)
     S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
     z = harmonic_extension(L, mesh.boundary, boundary_on_circle(mesh, S))
-    z, repair = accepted_repair(mesh, z, without_folds(mesh, L, z))
+    z, folds = accepted_repair(mesh, z, L, repair=repair)
     return Parameterization(
         z,
         len(energies) - 1,
         tuple(energy / 2 - 2 * np.pi for energy in energies),
-        {**repair, "energy_of": "half of the sphere's, less 2 pi"},
+        {**folds, "energy_of": "half of the sphere's, less 2 pi"},
     )
 
 

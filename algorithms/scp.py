@@ -49,6 +49,7 @@ def scp(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-6,
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 100,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a disk with a free boundary and least conformal energy for its size, without pins.
 
@@ -83,9 +84,9 @@ def scp(
     with phase("eigenvectors"):
         found, value, residual, iterations = _least(H, solve, W, tolerance, max_iterations)
     uv = found if len(found) == mesh.n else bordered.harmonic_extension(found)
-    uv, repair = with_area_pi(mesh, uv)
+    uv, folds = with_area_pi(mesh, uv, repair=repair)
     told = {"eigenvalue": value, "residual": residual, "sweeps": iterations}
-    return Parameterization(uv, extras={**told, **repair})
+    return Parameterization(uv, extras={**told, **folds})
 
 
 def _weights(mesh: DiskMesh, weights: Weights, at: NDArray[np.int64]) -> Real:

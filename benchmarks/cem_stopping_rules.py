@@ -1,82 +1,82 @@
-"""Compare CEM's two readings of its stopping rule. Fills the table of docs/algorithms.md.
+"""The stop of Algorithm 1: which reading meets the most figures that the paper prints.
 
-The paper does not state when its iteration stops, except after 20 iterations at most. Both readings
-take the same steps; they differ in how many::
+The paper does not state when the iteration stops, except after 20 steps at most, nor whether its
+last or its best iterate is the result. Fills a table of docs/paper_models.md from the seven public
+models in a folder (`cembench fetch --group paper` prints one)::
 
-    python -m benchmarks.cem_stopping_rules --meshes ../meshes
-    python -m benchmarks.cem_stopping_rules --most-faces 100000
+    python -m benchmarks.cem_stopping_rules FOLDER_OF_MESHES
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
+from typing import get_args
 
 from cembench.algorithms.cem import cem
-from cembench.surfaces.catalogue import stand_in
-from cembench.surfaces.rows import ROWS
 
 from benchmarks.pages import fill
-from cembench.conformal.metrics import all_metrics
-from cembench.mesh.files import read_mesh
-from cembench.mesh.reading import is_named_like_a_mesh
+from benchmarks.paper_models import FOLDED, PAGE, cells, models, printed
+from cembench.conformal.boundary_iteration import Stop
 from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.results import paper
 
-PAGE = Path(__file__).parents[1] / "docs/algorithms.md"
-TOLERANCE = 1e-5
+#: The stops, and whether the best iterate is the result or the last one.
+READINGS = tuple(product(get_args(Stop), (False, True)))
+#: E_C, mean and SD of the angular distortion, and the number of iterations, as printed.
+Figures = tuple[str, ...]
+
+ABOUT = f"""\
+The paper does not say when the iteration ends, except after 20 steps at most, nor which iterate is
+the result. Each cell has E_C, mean, SD and the iterations of the map, and how many of these four
+agree with the printed ones. `stop=drop` ends after the first step that does not lower E_C by 1e-5,
+`stop=change` after the first that changes it by less; `best` is the iterate of least E_C. Folds are
+not repaired on {FOLDED} (`repair=false`)."""
 
 
 def main() -> None:
     """Measure, and write the table into the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--meshes", type=Path, help="folder of real disks; they are marked *")
-    parser.add_argument("--most-faces", type=int, default=10**9, help="leave larger stand-ins out")
-    chosen = parser.parse_args()
-    lines = []
-    for name, mesh in surfaces(chosen.meshes, chosen.most_faces):
-        lines.append((mesh.m, line(name, mesh)))
-        print(lines[-1][1], flush=True)
-    table = "\n".join(text for _, text in sorted(lines))
-    fill(PAGE, "cem_stopping_rules", f"{HEADING}\n{table}")
+    parser.add_argument("folder", type=Path)
+    table = "\n".join(lines(models(parser.parse_args().folder)))
+    fill(PAGE, "cem_stopping_rules", f"{ABOUT}\n\n{table}")
 
 
-HEADING = """\
-| surface | triangles | old: iterations | E_C | mean | new: iterations | E_C | mean | least E_C at |
-|---|---:|---:|---:|---:|---:|---:|---:|---:|"""
+def lines(meshes: dict[str, DiskMesh]) -> Iterator[str]:
+    """Yield the lines of the table."""
+    titles = [f"{stop}, {'best' if best else 'last'}" for stop, best in READINGS]
+    yield f"| model | printed | {' | '.join(titles)} |"
+    yield f"|---|---|{'---|' * len(titles)}"
+    met = [0] * len(READINGS)
+    for model, mesh in meshes.items():
+        said = in_print(model)
+        shown = []
+        for k, (stop, best) in enumerate(READINGS):
+            found = measured(model, mesh, stop, best=best)
+            count = agreeing(said, found)
+            met[k] += count
+            shown.append(f"{' '.join(found)} ({count})")
+        yield f"| {model} | {' '.join(said)} | {' | '.join(shown)} |"
+    totals = " | ".join(map(str, met))
+    yield f"| agreeing, of {4 * len(meshes)} | | {totals} |"
 
 
-def surfaces(folder: Path | None, most_faces: int) -> Iterator[tuple[str, DiskMesh]]:
-    """The stand-ins up to a size, and the meshes of a folder, marked with a star."""
-    for path in sorted(folder.iterdir()) if folder else ():
-        if is_named_like_a_mesh(path):
-            yield f"{path.name}*", read_mesh(path)
-    for name, row in ROWS.items():
-        if row.faces <= most_faces:
-            yield name, stand_in(name)
+def in_print(model: str) -> Figures:
+    """Return the figures that the paper prints for CEM."""
+    return (*printed(model, "cem"), f"{paper.table(1)[model]['cem_iterations']:.0f}")
 
 
-def line(name: str, mesh: DiskMesh) -> str:
-    """The table's row of one surface."""
-    history = cem(mesh.fresh(), tolerance=TOLERANCE).energy_history
-    least = min(range(len(history)), key=history.__getitem__)
-    cells = [figures(mesh, count) for count in (old_rule(history), len(history) - 1)]
-    return f"| {name} | {mesh.m:,} | {' | '.join(cells)} | {least} |"
+def measured(model: str, mesh: DiskMesh, stop: Stop, *, best: bool) -> Figures:
+    """Return the figures of CEM with this stop and result."""
+    found = cells(mesh, cem(mesh.fresh(), stop=stop, best=best, repair=model != FOLDED))
+    return (*found.shown(), str(found.iterations))
 
 
-def old_rule(history: Sequence[float]) -> int:
-    """Return after how many iterations the first one lowers E_C by less than the tolerance."""
-    falls = [before - after for before, after in pairwise(history)]
-    small = [k for k, fall in enumerate(falls, start=1) if fall < TOLERANCE]
-    return small[0] if small else len(falls)
-
-
-def figures(mesh: DiskMesh, iterations: int) -> str:
-    """Iterations, E_C and mean angle error of CEM after so many iterations."""
-    found = all_metrics(mesh, cem(mesh.fresh(), tolerance=0, max_iterations=iterations).uv)
-    energy, angle = found["conformal_energy"], found["angle_error_mean_deg"]
-    return f"{iterations} | {energy:#.4g} | {angle:#.4g}"
+def agreeing(said: Figures, found: Figures) -> int:
+    """Return how many figures have the printed digits."""
+    return sum(a == b for a, b in zip(said, found, strict=True))
 
 
 if __name__ == "__main__":

@@ -188,7 +188,7 @@ def kept_positive(angles: Real, e: Real) -> tuple[Real, float]:
 
 
 def placed(
-    mesh: DiskMesh, angles: Real, told: dict[str, Any], *, iterations: int = 0
+    mesh: DiskMesh, angles: Real, told: dict[str, Any], *, repair: bool, iterations: int = 0
 ) -> Parameterization:
     """Place vertices by least squares conformal maps of triangles with these angles."""
     with phase("assembly"):
@@ -196,5 +196,5 @@ def placed(
         weights = 0.5 / np.tan(angles * (np.pi / angles.sum(axis=1, keepdims=True)))
         L = laplacian_of_weights(mesh.F, weights, mesh.n)
     uv = pinned_map(L, mesh.boundary, two_distant_vertices(mesh))
-    uv, repair = with_area_pi(mesh, uv)
-    return Parameterization(uv, iterations, extras={**told, **repair})
+    uv, folds = with_area_pi(mesh, uv, repair=repair)
+    return Parameterization(uv, iterations, extras={**told, **folds})

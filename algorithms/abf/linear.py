@@ -18,7 +18,7 @@ from .constraints import Angles, kept_positive, placed
     source="Zayer, Levy & Seidel, Linear angle based parameterization, 2007",
     usual=False,
 )
-def abf_linear(mesh: DiskMesh) -> Parameterization:
+def abf_linear(mesh: DiskMesh, *, repair: bool = True) -> Parameterization:
     """Find the flat triangulation with the angles nearest to the surface's, to first order.
 
     The relative changes of all angles are minimal in least squares, subject to the angle sums of
@@ -37,4 +37,4 @@ def abf_linear(mesh: DiskMesh) -> Parameterization:
     wanted = problem.wanted
     e, _ = problem.step(wanted, wanted**2, np.zeros_like(wanted))
     angles, share = kept_positive(wanted, e)
-    return placed(mesh, angles, {**problem.told(angles), "step": share})
+    return placed(mesh, angles, {**problem.told(angles), "step": share}, repair=repair)

@@ -30,6 +30,7 @@ def abf_plus_plus(
     *,
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-8,
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 50,
+    repair: bool = True,
 ) -> Parameterization:
     """Find the flat triangulation with the angles nearest to the surface's.
 
@@ -61,7 +62,7 @@ def abf_plus_plus(
         told = problem.told(angles)
         moved = float(np.abs(share * e / angles).max())
         if share == 1 and max(told.values()) <= tolerance and moved <= 1e-4:
-            return placed(mesh, angles, told, iterations=iteration)
+            return placed(mesh, angles, told, repair=repair, iterations=iteration)
     raise AlgorithmFailed(
         f"the angles have not converged after {max_iterations} Newton steps: the constraints are "
         f"still off by up to {max(told.values()):.2g}, tolerance {tolerance:g}, and the last step "

@@ -11,7 +11,6 @@ from pydantic import Field
 from cembench.conformal.boundary_energy import in_gauge
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -41,6 +40,7 @@ def bff(
     max_sweeps: Annotated[int, Field(ge=1, le=1_000_000)] = 100,
     gauge: Gauge = "boundary",
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map to the disk with exterior angles of the boundary in proportion to its lengths.
 
@@ -64,13 +64,13 @@ def bff(
     with phase("boundary sweeps"):
         domain, sweeps, change = _circular(yamabe, weights, tolerance, max_sweeps)
     uv = yamabe.bordered.harmonic_extension(domain.points)
-    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, yamabe.L, uv))
+    uv, folds = accepted_repair(mesh, uv, yamabe.L, repair=repair)
     told = {
         "sweeps": sweeps,
         "change": change,
         "gauss_bonnet": abs(float(yamabe.natural.sum()) - 2 * np.pi),
     }
-    return Parameterization(uv, extras={**told, **repair})
+    return Parameterization(uv, extras={**told, **folds})
 
 
 def _turns(lengths: Real) -> Real:

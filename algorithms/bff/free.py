@@ -38,6 +38,7 @@ def bff_free(
     *,
     corners: Annotated[int, Field(ge=0, le=1_000), AfterValidator(_check_number_of_corners)] = 0,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Flatten with the boundary at its own scale, or to a polygon.
 
@@ -58,9 +59,9 @@ def bff_free(
         turns = _corners(yamabe.lengths, corners)
         lengths = yamabe.scaled(yamabe.scale(turns))
     z, closing = closed_curve(lengths, turns)
-    uv, repair = with_area_pi(mesh, yamabe.bordered.harmonic_extension(z))
+    uv, folds = with_area_pi(mesh, yamabe.bordered.harmonic_extension(z), repair=repair)
     told = {"closing": closing, "gauss_bonnet": abs(float(turns.sum()) - 2 * np.pi)}
-    return Parameterization(uv, extras={**told, **repair})
+    return Parameterization(uv, extras={**told, **folds})
 
 
 def _corners(lengths: Real, corners: int) -> Real:

@@ -10,7 +10,6 @@ from pydantic import Field
 
 from cembench.conformal.discrete_metric import angle_sums
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure, middle_triangle, moved_to_gauge
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
@@ -45,6 +44,7 @@ def cetm(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-10,
     max_iterations: Annotated[int, Field(ge=0, le=10_000)] = 50,
     gauge: Gauge = "boundary",
+    repair: bool = True,
 ) -> Parameterization:
     """Map to the disk by scaling edges at their vertices, by way of a half plane.
 
@@ -83,14 +83,14 @@ def cetm(
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
     kept = cross_ratio_change(mesh, uv)
-    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, laplacian(mesh), uv))
+    uv, folds = accepted_repair(mesh, uv, laplacian(mesh), repair=repair)
     told = {
         "curvature": found.residual,
         "factorisations": found.factorisations,
         "cross_ratios": kept,
         "at_infinity": v,
     }
-    return Parameterization(uv, len(found.history) - 1, extras={**told, **repair})
+    return Parameterization(uv, len(found.history) - 1, extras={**told, **folds})
 
 
 def _with_infinity_at(

@@ -12,10 +12,8 @@ from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.discrete_metric import angle_sums, angles, half_cotangents_of
 from cembench.conformal.doubling import doubled
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
-from cembench.conformal.planar import folded_triangles
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -45,6 +43,7 @@ def cetm_flips(
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-9,
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 200,
     gauge: Gauge = "boundary",
+    repair: bool = True,
 ) -> Parameterization:
     """Map to the disk by scaling edges, with flips that keep the triangulation Delaunay.
 
@@ -63,7 +62,7 @@ def cetm_flips(
     (radians), `flips` counts flips, and `layout` is the largest relative difference between edges
     and their lengths after laying them out triangle by triangle. The map consists of the images of
     the vertices. The surface's own triangles, between straight edges, differ from the flipped ones:
-    those that fold are counted (`folds_of_own_triangles`) and repaired as in CEM (`fold_repairs`).
+    those that fold are counted (`folded_before_repair`) and repaired as in CEM (`fold_repairs`).
     """
     b = mesh.boundary
     L = laplacian(mesh)
@@ -82,19 +81,18 @@ def cetm_flips(
     uv /= np.maximum(np.abs(uv), 1.0)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
-    folds = len(folded_triangles(uv, mesh.F))
     try:
-        uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
+        uv, told = accepted_repair(mesh, uv, L, repair=repair)
     except AlgorithmFailed as error:  # the map is reported unrepaired
-        repair = {"fold_repairs": 0, "no_repair": str(error)}
-    told = {
+        _, told = accepted_repair(mesh, uv, repair=False)
+        told["no_repair"] = str(error)
+    told |= {
         "curvature": residual,
         "flips": T.flips,
         "layout": off,
-        "folds_of_own_triangles": folds,
         "corners": cones.tolist(),
     }
-    return Parameterization(uv, iterations, extras={**told, **repair})
+    return Parameterization(uv, iterations, extras=told)
 
 
 def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:

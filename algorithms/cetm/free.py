@@ -32,6 +32,7 @@ def cetm_free(
     *,
     tolerance: Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)] = 1e-10,
     max_iterations: Annotated[int, Field(ge=0, le=10_000)] = 50,
+    repair: bool = True,
 ) -> Parameterization:
     """Flatten by scaling edges at their vertices, with the boundary keeping its lengths.
 
@@ -65,14 +66,14 @@ def cetm_free(
     fixed = np.zeros(mesh.n, dtype=bool)
     fixed[b] = True
     uv = found.laid_out(mesh.F, fixed, z)
-    uv, repair = with_area_pi(mesh, uv)
+    uv, folds = with_area_pi(mesh, uv, repair=repair)
     told = {
         "curvature": found.residual,
         "factorisations": found.factorisations,
         "closing": closing,
         "cross_ratios": cross_ratio_change(mesh, uv),
     }
-    return Parameterization(uv, len(found.history) - 1, extras={**told, **repair})
+    return Parameterization(uv, len(found.history) - 1, extras={**told, **folds})
 
 
 def cross_ratio_change(mesh: DiskMesh, uv: NDArray[np.complex128]) -> float:

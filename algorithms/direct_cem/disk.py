@@ -17,7 +17,6 @@ from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.filled_start import arcs_of_measure
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.interior_laplacian import InteriorLaplacian, solves_pay
@@ -47,6 +46,7 @@ def direct_cem(
     gauge: Gauge = "boundary",
     back: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.01,
     delaunay: bool = True,
+    repair: bool = True,
 ) -> Parameterization:
     """Minimise the conformal energy over the boundary's angles on the circle, by Newton's method.
 
@@ -89,14 +89,14 @@ def direct_cem(
         here = here.at(in_gauge(here.domain.towards(start, share), here.weights))
         energies += (here.energy,)
     uv = extended(here.domain.points)
-    uv, repair = accepted_repair(mesh, uv, without_folds(mesh, L, uv))
+    uv, folds = accepted_repair(mesh, uv, L, repair=repair)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
         "start": begun,
         "hessian_products": found.products,
         "held_arcs": found.held_arcs,
-        **repair,
+        **folds,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
 

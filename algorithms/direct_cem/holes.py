@@ -14,7 +14,6 @@ from cembench.conformal.boundary_energy import EnergyModel, in_gauge, minimise
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.filled_start import widest_start
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import interior_without_folds
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
@@ -46,6 +45,7 @@ def direct_cem_holes(
     gauge: Gauge = "boundary",
     outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None,
     delaunay: bool = False,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a surface with holes to the circle domain of least conformal energy.
 
@@ -86,7 +86,7 @@ def direct_cem_holes(
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
     uv, walked = gauge_walk(here, bordered.harmonic_extension, angle_error, steps)
     energies += () if chart else walked
-    uv, repair = accepted_repair(mesh, uv, interior_without_folds(mesh, uv))
+    uv, folds = accepted_repair(mesh, uv, repair=repair)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
@@ -95,7 +95,7 @@ def direct_cem_holes(
         "held_arcs": found.held_arcs,
         "settled": settled,
         "outside_while_minimised": int(widest[0] if not chart else holes[chart - 1][0]),
-        **repair,
+        **folds,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
 

@@ -32,6 +32,7 @@ def koebe_cem(
     patches: Patches = "disks",
     weights: Weights = "surface",
     rounding: bool = True,
+    repair: bool = True,
 ) -> Parameterization:
     """Map a surface with holes to a disk with round holes by Algorithm 2 of the paper.
 
@@ -63,11 +64,11 @@ def koebe_cem(
         )
     )
     iterations = [len(step.energies) - 1 for step in steps]
-    uv, repairs = finished(mesh, steps[-1], outer=outer, rounding=rounding)
+    uv, folds = finished(mesh, steps[-1], outer=outer, rounding=rounding, repair=repair)
     extras: dict[str, Any] = {
         "iterations_by_step": iterations,
         "order_kept": sum(step.order_kept for step in steps),
         "circularity_before_rounding": boundary_circularity(mesh, steps[-1].uv),
-        "fold_repairs": repairs,
+        **folds,
     }
     return Parameterization(uv, sum(iterations), (), extras)

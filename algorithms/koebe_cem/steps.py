@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import scipy
@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import iterate_boundary, on_circle, pole
-from cembench.conformal.folds import in_order, interior_without_folds
+from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.folds import in_order
 from cembench.conformal.laplacian import cotangent_laplacian, laplacian
 from cembench.conformal.patches import disk_patch, fan_patch
-from cembench.conformal.planar import backward_arcs, fitted_circle, polygon_area, signed_areas
+from cembench.conformal.planar import backward_arcs, fitted_circle, polygon_area
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import MapStep
@@ -127,18 +128,24 @@ def shown_steps(mesh: HoledMesh, *, sweeps: int = 1, outer: int | None = None) -
 
 
 def finished(
-    mesh: HoledMesh, step: KoebeStep, *, outer: int | None = None, rounding: bool = True
-) -> tuple[Complex, int]:
-    """Return the final map of a step: its holes made round, its folds repaired; and the repairs.
+    mesh: HoledMesh,
+    step: KoebeStep,
+    *,
+    outer: int | None = None,
+    rounding: bool = True,
+    repair: bool = True,
+) -> tuple[Complex, dict[str, Any]]:
+    """Return the final map of a step, its holes made round and its folds repaired.
 
     With `rounding`, each hole is put radially on the circle fitted to it, as (25) does with the
     outer boundary (vertices that would change places get the nearest angles in order), and the
-    interior is solved for again. The second value counts the repairs of folds.
+    interior is solved for again. The second value is that of
+    :func:`cembench.conformal.fold_repair.accepted_repair`.
 
     Raises
     ------
     AlgorithmFailed
-        A hole is too far from a circle, or folds remain.
+        A hole is too far from a circle.
 
     """
     uv = step.uv
@@ -149,9 +156,7 @@ def finished(
             uv[hole] = centre + radius * np.conj(_around(uv[hole], centre))
         f_b = uv[step.surface.boundary]
         uv = step.surface.in_order(step.surface.dirichlet(f_b), f_b)
-    if (signed_areas(uv, mesh.F) > 0).all():
-        return uv, 0
-    return interior_without_folds(mesh, uv)
+    return accepted_repair(mesh, uv, repair=repair)
 
 
 class _FilledSurface:
@@ -227,6 +232,7 @@ class _FilledSurface:
             lambda _, f_o: self.energy(f_o),
             tolerance=tolerance,
             max_iterations=max_iterations,
+            stop="change",
             inversion=inversion,
         )
         uv = surface.in_order(f[m:], on_boundaries(f_o))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from cembench.core.errors import AlgorithmFailed
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+#: What ends CEM's iteration: a step that does not lower E_C by at least the tolerance, or one that
+#: changes it by less, whichever way.
+Stop: TypeAlias = Literal["drop", "change"]
 
 
 def pole(
@@ -90,6 +94,7 @@ def iterate_boundary(
     *,
     tolerance: float,
     max_iterations: int,
+    stop: Stop,
     inversion: bool = True,
     best: bool = False,
 ) -> tuple[Complex, Complex, list[float], int]:
@@ -106,9 +111,11 @@ def iterate_boundary(
     energy : callable
         Returns E_C (Eq. 7) of f_i and f_b.
     tolerance, max_iterations : float, int
-        The iteration ends after the first step that changes E_C by less than `tolerance`, or after
-        `max_iterations` steps. An initial increase does not end it: Remark 3 says that E_C "would
-        become" decreasing.
+        The iteration ends after the first step that `stop` names, or after `max_iterations` steps.
+    stop : {"drop", "change"}
+        Whether that is a step that does not lower E_C by at least `tolerance`, so that an increase
+        ends the iteration, or one that changes E_C by less than `tolerance`. With "change" and 0 no
+        step ends it.
     inversion : bool
         Whether to use step (30) rather than (23). A step that would exchange boundary vertices is
         replaced by (23), and the iteration ends if (23) would do so too.
@@ -146,6 +153,7 @@ def iterate_boundary(
         history.append(energy(f_i, f_b))
         if history[-1] < min(history[:-1]):
             least = f_b, f_i
-        if abs(history[-2] - history[-1]) < tolerance:
+        drop = history[-2] - history[-1]
+        if (drop if stop == "drop" else abs(drop)) < tolerance:
             break
     return *(least if best else (f_b, f_i)), history, order_kept

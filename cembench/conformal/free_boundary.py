@@ -9,7 +9,6 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.folds import interior_without_folds
 from cembench.conformal.planar import polygon_area
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -57,8 +56,10 @@ def pinned_map(L: scipy.sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np
     return x[:n] + 1j * x[n:]
 
 
-def with_area_pi(mesh: DiskMesh, uv: Complex) -> tuple[Complex, dict[str, Any]]:
-    """Scale a map so that its boundary encloses pi, as a disk does, and repair interior folds.
+def with_area_pi(
+    mesh: DiskMesh, uv: Complex, *, repair: bool = True
+) -> tuple[Complex, dict[str, Any]]:
+    """Scale a map so that its boundary encloses pi, as a disk does, and `repair` interior folds.
 
     Returns
     -------
@@ -80,4 +81,4 @@ def with_area_pi(mesh: DiskMesh, uv: Complex) -> tuple[Complex, dict[str, Any]]:
             "the map has collapsed or crosses itself. Use a disk map, such as direct-cem"
         )
     uv = uv * np.sqrt(np.pi / area)
-    return accepted_repair(mesh, uv, interior_without_folds(mesh, uv))
+    return accepted_repair(mesh, uv, repair=repair)

@@ -21,7 +21,7 @@ from cembench.conformal.filled_start import arcs_of_measure, widest_start
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import by_rows, laplacian
-from cembench.conformal.metrics import angle_errors, corner_angles
+from cembench.conformal.metrics import angle_errors, corner_angles, flipped_triangles
 from cembench.conformal.planar import polygon_area, signed_areas
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
@@ -40,6 +40,8 @@ COLLAPSED = 0.25
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
+#: Other parameters are better if the mean angle error with them is below this share.
+BETTER = 0.9
 
 
 def quality_notes(
@@ -78,6 +80,21 @@ def quality_notes(
         )
         notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
     return notes
+
+
+def better_parameters(
+    name: str, mesh: TriangleMesh, uv: Complex, other: Complex, parameters: Mapping[str, Any]
+) -> list[Notice]:
+    """Return a remark if the map `other`, made with these parameters, has much better angles."""
+    here, there = (float(angle_errors(mesh, z).mean()) for z in (uv, other))
+    if there >= BETTER * here or flipped_triangles(mesh, other) > flipped_triangles(mesh, uv):
+        return []
+    named = " ".join(f"-p {name}.{key}={value}" for key, value in parameters.items())
+    told = (
+        f"the mean angle error is {here:.3g} degrees; with {named}, which the algorithm suggests "
+        f"for this surface, it is {there:.3g}"
+    )
+    return [Notice(NoticeKind.BETTER_PARAMETERS, told)]
 
 
 def collapsed_error(mesh: TriangleMesh) -> float:

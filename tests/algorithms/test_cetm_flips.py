@@ -105,7 +105,7 @@ def test_it_ends_where_cetm_cannot(seed):
     mesh = hard_surface(seed)
     found = cetm_flips(mesh)
     assert found.extras["curvature"] < 1e-9
-    assert found.extras["folds_of_own_triangles"] <= 0.05 * mesh.m
+    assert found.extras["folded_before_repair"] <= 0.05 * mesh.m
 
 
 @pytest.mark.parametrize("name", ["nefertiti.obj", "hand_lowres.obj", "canonical_face.obj"])
@@ -120,7 +120,7 @@ def test_it_ends_on_real_surfaces(name):
 def test_it_ends_on_every_disk(name):
     found = cetm_flips(read_mesh(real_mesh(name)))
     assert found.extras["curvature"] < 1e-9
-    assert found.extras["folds_of_own_triangles"] >= 0
+    assert found.extras["folded_before_repair"] >= 0
 
 
 def test_a_flat_disk_comes_out_nearly_as_it_is():

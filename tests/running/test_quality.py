@@ -1,5 +1,7 @@
 """How far from conformal is a valid map, judged on its own mesh?"""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from cembench.algorithms.cem import cem
@@ -11,12 +13,17 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import spherical_cap
 
+import cembench
 from cembench import DiskMesh
 from cembench.conformal.metrics import angle_errors
 from cembench.core.notices import NoticeKind
 from cembench.mesh.triangle_mesh import HoledMesh
+from cembench.registry import load_registry
+from cembench.running.measure import check_cell
+from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.quality import collapsed_error, likely_causes, quality_notes, yardstick
 from tests import gallery
+from tests.hard_surfaces import hard_surface
 
 
 def warped():
@@ -74,6 +81,39 @@ def test_with_holes_the_yardstick_has_the_same_boundary_outside():
     turned = harmonic_filled(mesh, outer=int(hole[0])).uv
     known = yardstick("circular holes", mesh, turned)
     assert abs(abs(known[hole]) - 1).max() < 1e-12
+
+
+def test_where_the_first_iteration_ends_cem_on_a_rise_a_much_better_stop_is_named():
+    mesh = hemi_ellipsoid(6400)
+    (notice,) = cembench.parameterize(mesh, "cem").outcome.notes
+    assert notice.kind is NoticeKind.BETTER_PARAMETERS
+    errors = [angle_errors(mesh, cem(mesh, stop=stop).uv).mean() for stop in ("drop", "change")]
+    assert errors[1] < 0.9 * errors[0]
+    assert "-p cem.stop=change" in notice.text
+    assert f"{errors[0]:.3g}" in notice.text
+    assert f"{errors[1]:.3g}" in notice.text
+    assert not cembench.parameterize(mesh, "cem", stop="change").outcome.notes
+
+
+def test_a_rise_without_a_better_stop_is_not_told():
+    mesh = hard_surface(1)
+    result = cembench.parameterize(mesh, "cem", keep_invalid=True)
+    assert "alternative" in result.extras
+    kinds = {notice.kind for notice in result.outcome.notes}
+    assert NoticeKind.BETTER_PARAMETERS not in kinds
+
+
+@pytest.mark.parametrize("suggested", [{"stop": "never"}, {"no such": 1}, "stop", {}])
+def test_a_suggestion_that_is_none_is_passed_over(suggested):
+    def found(mesh, **parameters):
+        return cembench.Parameterization(uv, extras={"alternative": suggested})
+
+    mesh = flat_disk(200)
+    uv = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    spec = replace(load_registry().algorithm("cem"), function=found)
+    task = plan_cells([spec], [mesh], {}, MeasurementSettings(repeats=1))[0]
+    outcome, _ = check_cell(spec, task.mesh, task.cell)
+    assert (outcome.status, outcome.notes) == ("ok", ())
 
 
 def test_a_crowded_end_is_never_passed_over():
