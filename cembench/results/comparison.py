@@ -12,7 +12,7 @@ the interval was narrow (:mod:`cembench.results.looks`). For many comparisons in
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, log
 from statistics import median
 from typing import Literal
@@ -26,6 +26,13 @@ from cembench.results.student import paired_p
 #: "undecided": the interval contains 1. "too few rounds": there is no interval. "not side by side":
 #: no round of one sitting measured both.
 Verdict = Literal["faster", "slower", "undecided", "too few rounds", "not side by side"]
+
+#: What a table of speedups says of the limits of what is detected.
+NOT_DETECTED = (
+    "Results kept by accident are detected or of no use. A solver written to deceive is not "
+    "detected: it can recognise a surface by what no motion changes, such as its edge lengths "
+    "(docs/cheating.md)."
+)
 
 #: A cell whose interval is wider than this share of its figure gets a warning; a cell that reaches
 #: the default precision does not.
@@ -97,9 +104,18 @@ def paired_ratios(record: Record, reference: Record) -> list[float]:
     return ratios_of_rounds(record.outcome.rounds, reference.outcome.rounds)
 
 
+def measured_ratios(record: Record, reference: Record) -> list[float]:
+    """Return :func:`paired_ratios` by our clock alone, whatever solve time a program prints."""
+    pairs = _pairs(record.outcome.rounds, reference.outcome.rounds)
+    return _ratios([(a.measured_seconds, b.measured_seconds) for a, b in pairs])
+
+
 def ratios_of_rounds(ours: Sequence[Round], theirs: Sequence[Round]) -> list[float]:
     """Like :func:`paired_ratios`, for rounds that are not in a record yet."""
-    times = [(a.solve_seconds, b.solve_seconds) for a, b in _pairs(ours, theirs)]
+    return _ratios([(a.solve_seconds, b.solve_seconds) for a, b in _pairs(ours, theirs)])
+
+
+def _ratios(times: Sequence[tuple[float | None, float | None]]) -> list[float]:
     ratios = [a / b for a, b in times if a is not None and b is not None]
     return ratios if len(ratios) == len(times) else []
 
@@ -119,7 +135,20 @@ def compare(record: Record, reference: Record) -> Comparison | None:
     ratios = paired_ratios(record, reference)
     if not ratios:
         return Comparison(ours / theirs, None, "not side by side", 0)
-    return compare_ratios(ratios, share_of(len(ratios), record.cell, reference.cell))
+    share = share_of(len(ratios), record.cell, reference.cell)
+    return confirmed(compare_ratios(ratios, share), measured_ratios(record, reference), share)
+
+
+def confirmed(found: Comparison, measured: Sequence[float], share: float = 1.0) -> Comparison:
+    """Return a comparison with its verdict only if the ratios by our clock have the same one.
+
+    They differ only for an external program that prints its solve time: its own word never decides
+    a comparison alone.
+    """
+    ours = compare_ratios(measured, share) if measured else None
+    if ours is not None and ours.verdict == found.verdict:
+        return replace(found, p=max(found.p, ours.p))
+    return replace(found, verdict="undecided", p=1.0) if found.p < 1 else found
 
 
 def compare_cpu(record: Record, reference: Record) -> Comparison | None:

@@ -22,7 +22,8 @@ def marks_explained(records: list[Record]) -> list[str]:
     if PROGRAM_MARK in marks:
         lines.append(
             f"{PROGRAM_MARK} external program: its seconds are the wall clock of a process, with "
-            "its start and its files; comparisons take its solve time"
+            "its start and its files; comparisons take its solve time, and a verdict needs the "
+            "wall clock less its start to agree with the time that it prints"
         )
     if LIBRARY_MARK in marks:
         lines.append(

@@ -265,6 +265,14 @@ class Round(BaseModel):
         """
         if self.own_seconds:
             return lower_median(self.own_seconds) or None
+        return self.measured_seconds
+
+    @property
+    def measured_seconds(self) -> float | None:
+        """The solve time of an external program by our clock alone: its wall clock less its start.
+
+        For other algorithms, the figure itself; None if the difference is not positive.
+        """
         left = self.seconds - (self.start_seconds or 0.0)
         return left if left > 0 else None
 
@@ -365,6 +373,12 @@ class Outcome(BaseModel):
         """E_C over the image's area; None if one of them is unknown."""
         energy, area = (self.metrics.get(name) for name in ("conformal_energy", "image_area"))
         return None if energy is None or not area else energy / area
+
+    @property
+    def folded_before_repair(self) -> int | None:
+        """Folded triangles of the method's own map, before any repair; None if it counts none."""
+        told = self.extras.get("folded_before_repair")
+        return told if type(told) is int else None
 
     @property
     def solve_seconds(self) -> float | None:

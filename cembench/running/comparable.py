@@ -18,6 +18,9 @@ from cembench.results.records import Fault, FaultKind, Round, lower_median
 MORE, GRAIN, GRAIN_OF_OTHERS = 0.1, 0.002, 0.02
 #: Tolerated CPU seconds between the calls, as a share of the calls and absolute.
 BESIDE, LITTLE = 0.05, 0.005
+#: Tolerated CPU seconds of the calling thread between the calls: a share of the calls, for garbage
+#: that they leave to the collector, and a multiple of what preparing a call takes.
+LEFT, PREPARING = 0.5, 3.0
 #: Tolerated looks, as a number and a share, that find more threads running than allowed.
 MOST_CROWDED, CROWDED = 2, 0.2
 #: Tolerated difference between two processes reading the same clock, in seconds.
@@ -37,6 +40,10 @@ class Used(BaseModel):
     others: float = 0.0
     #: CPU seconds between the calls, of all threads except the calling one.
     beside: float = 0.0
+    #: CPU seconds between the calls of the calling thread, and what preparing as many calls took
+    #: before the algorithm was loaded.
+    between: float = 0.0
+    preparing: float = 0.0
     #: Number of later calls before which something else was running, and number of looks.
     disturbed: int = 0
     looked: int = 0
@@ -74,7 +81,17 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     # With several threads, a library's idle thread pool may spin.
     much = used.beside > BESIDE * used.wall + LITTLE + grain - GRAIN
     often = used.disturbed > 1 and 2 * used.disturbed > used.looked
-    if threads == 1 and (much or often):
+    late = used.between > LEFT * (used.cold + used.wall) + PREPARING * used.preparing + LITTLE
+    if late:
+        told = (
+            f"work went on between the timed calls: {used.between:.3g} s of CPU time in the "
+            f"calling thread, of which preparing the calls explains {used.preparing:.3g} s. All "
+            "work on a map must be done within the call, and none by a finaliser, a callback of "
+            "the garbage collector or a signal handler; if the call leaves much garbage, end it "
+            "with gc.collect()"
+        )
+        found.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=told))
+    elif threads == 1 and (much or often):
         told = (
             f"work went on between the timed calls: {used.beside:.3g} s of CPU time "
             f"besides {used.wall:.3g} s of calls, before {used.disturbed} of {used.looked} calls. "

@@ -30,7 +30,7 @@ from cembench.core.errors import describe_error
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Boundary, Fault, FaultKind, Outcome, not_ok
 from cembench.running.judge import Promise, faults, remarks
-from cembench.running.motion import UNMOVED, moved
+from cembench.running.motion import UNMOVED, in_first_order, moved
 from cembench.running.quality import quality_notes
 from cembench.running.returned import hash_of, outcome_of_error
 
@@ -42,6 +42,9 @@ SAME_ENERGY = 1e-6
 #: Largest distance of a vertex, relative to the image's size, between maps that are equal to
 #: rounding, and between maps of two motions.
 SAME_MAP, NEARLY_THE_SAME = 1e-8, 1e-4
+#: Largest difference between a map of a process with earlier calls and one of a fresh process, as
+#: a multiple of that between fresh ones, for which a randomised solver is believed to keep nothing.
+SCATTER = 10.0
 #: Maximum number of entries of a map that are kept for comparisons.
 SAMPLED = 4096
 
@@ -71,11 +74,29 @@ class JudgedCalls(BaseModel):
     doubtful: str | None = None
     #: Whether all compared maps agree to rounding; None if none could be compared.
     repeated: bool | None = None
+    #: The largest difference from a known map of the same motion, relative to its size.
+    apart: float | None = None
 
 
 def sample(uv: Complex) -> Complex:
     """Return at most :data:`SAMPLED` entries of a map, evenly spaced."""
     return np.array(uv[:: max(1, -(-len(uv) // SAMPLED))])
+
+
+def kept_from_call_to_call(apart: float, scatter: float) -> Fault | None:
+    """Return the fault that a process with earlier calls maps in another way than fresh ones.
+
+    `apart` is the difference between their maps of one surface; `scatter` is the largest one seen
+    between fresh processes, which is 0 for a deterministic solver.
+    """
+    if apart <= max(SAME_MAP, SCATTER * scatter):
+        return None
+    told = (
+        f"maps of the same surface differ by {apart:.2g} between a fresh process and one with "
+        f"earlier calls, but by {scatter:.2g} at most between fresh ones: results are kept from "
+        "call to call"
+    )
+    return Fault(kind=FaultKind.KEPT_RESULT, detail=told)
 
 
 def judged_check(promise: Promise, mesh: TriangleMesh, called: Outcome, uv: Complex) -> Outcome:
@@ -99,16 +120,14 @@ def judged_calls(
     checked: Checked,
     maps: Sequence[tuple[str, str, Complex]],
     known: Mapping[str, Complex],
-    *,
-    repeats: bool | None = None,
 ) -> JudgedCalls:
     """Judge the maps of a process, each given with its name, motion and values.
 
-    `known` holds samples of maps from other processes by motion; that of :data:`UNMOVED` is the
-    checked one. `repeats` says whether fresh processes are known to give the same map.
+    `known` holds samples of maps from other processes by motion, in the surface's own order; that
+    of :data:`UNMOVED` is the checked one.
     """
     seen = {checked.uv_hash: UNMOVED}
-    repeated, kept, doubtful = None, [], None
+    repeated, far, doubtful = None, None, None
     for name, motion, uv in maps:
         bits = hash_of(uv)
         if seen.setdefault(bits, motion) != motion and not promise.combinatorial:
@@ -120,6 +139,7 @@ def judged_calls(
             return JudgedCalls(kept=(Fault(kind=FaultKind.KEPT_RESULT, detail=told),))
         if motion == UNMOVED and bits == checked.uv_hash:
             repeated = repeated is not False
+            far = far or 0.0
             continue
         surface = moved(mesh, motion)
         with _warnings_ignored():
@@ -127,31 +147,25 @@ def judged_calls(
             wrong = wrong or _other_energy(promise, surface, uv, checked)
         only_energy = wrong and wrong[0].kind is FaultKind.OTHER_ENERGY
         other = known.get(motion)
+        mine = sample(in_first_order(uv, mesh, motion))
         if other is not None:
-            apart = _apart(uv, other)
+            apart = difference(mine, other)
             repeated = repeated is not False and apart <= SAME_MAP
+            far = max(far or 0.0, apart)
             if apart <= SAME_MAP and only_energy:
                 wrong = []
-            elif apart > SAME_MAP and not wrong and repeats and not promise.is_program:
-                told = (
-                    f"maps of the same surface differ by {apart:.2g} between a fresh process and "
-                    "one with earlier calls, but not between two fresh ones: results are kept "
-                    "from call to call"
-                )
-                kept.append(Fault(kind=FaultKind.KEPT_RESULT, detail=told))
         elif only_energy:
-            near = any(_apart(uv, one) <= NEARLY_THE_SAME for one in known.values())
+            near = any(difference(mine, one) <= NEARLY_THE_SAME for one in known.values())
             doubtful = doubtful or (None if near and motion != UNMOVED else motion)
             wrong = [] if motion != UNMOVED else wrong
         if wrong:
             told = f"{name} returned a different map from the check"
             return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong))
-    return JudgedCalls(kept=tuple(kept[:1]), doubtful=doubtful, repeated=repeated)
+    return JudgedCalls(doubtful=doubtful, repeated=repeated, apart=far)
 
 
-def _apart(uv: Complex, other: Complex) -> float:
-    """Return the distance of a map from another's sample, relative to its size."""
-    mine = sample(uv)
+def difference(mine: Complex, other: Complex) -> float:
+    """Return the distance between the samples of two maps, relative to the second one's size."""
     if mine.shape != other.shape:
         return math.inf
     return float(np.abs(mine - other).max() / max(np.abs(other).max(), 1e-300))

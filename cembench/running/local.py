@@ -64,13 +64,20 @@ from cembench.running.estimate import expected_bytes
 from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.judge import Promise
-from cembench.running.judging import Checked, JudgedCalls, sample
+from cembench.running.judging import (
+    SAME_MAP,
+    Checked,
+    JudgedCalls,
+    difference,
+    kept_from_call_to_call,
+    sample,
+)
 from cembench.running.kernel import kernel_seconds
-from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, WARM_UP
-from cembench.running.motion import UNMOVED
+from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, SECOND_CALL, WARM_UP
+from cembench.running.motion import NUMBERS_KEPT, UNMOVED, in_first_order
 from cembench.running.neighbours import counters, neighbours
 from cembench.running.plan import Task
-from cembench.running.process import Limits, ProcessEnd, run_limited, spawning
+from cembench.running.process import Limits, ProcessEnd, finds_all, run_limited, spawning
 from cembench.running.side_by_side import check_side_by_side
 from cembench.running.until_precise import affordable, cheapest, cost, lack
 from cembench.running.worker import PROGRAMS, Answer, Job, JobTask
@@ -84,6 +91,8 @@ USUAL_BUDGET = 1800.0
 #: By what share of the budget a plan may exceed it later than after the first round: prices
 #: scatter, and a cell that is left out cannot come back.
 _TOLERATED = 0.1
+#: Number of new processes that are asked, at most, how far maps of a randomised solver scatter.
+_MOST_ASKED = 3
 #: The largest answer that is read: what a worker keeps takes a few megabytes at most.
 LARGEST_ANSWER_BYTES = 2**24
 
@@ -109,6 +118,9 @@ class Options:
     #: Wall-clock seconds after which no cell goes on that has had a round; None: no limit.
     #: Cells with a fixed number of rounds have all of them.
     budget: float | None = None
+    #: Whether a budget that does not bring all cells to their first look is spent surface by
+    #: surface, so that the comparisons on the cheapest ones are complete; else cell by cell.
+    whole_surfaces: bool = False
     #: How often a process is repeated if the machine was busy; the quietest run counts.
     repeat_busy: int = 0
     #: Number of checks that run in parallel, sharing the memory. Timed processes run alone.
@@ -410,7 +422,9 @@ class _Run:
             left += _TOLERATED * (self.options.budget or 0.0)
         if sum(costs.values()) <= left:
             return
-        for label in sorted(open_.keys() - cheapest(costs, partners, left)):
+        surfaces = {label: task.cell.mesh_hash for label, task in open_.items()}
+        chosen = cheapest(costs, partners, left, surfaces if self.options.whole_surfaces else None)
+        for label in sorted(open_.keys() - chosen):
             self._save_measured(open_[label], "budget")
 
     def _until_precise(self, pending: Sequence[Task]) -> dict[str, Task]:
@@ -422,8 +436,11 @@ class _Run:
         }
 
     def _price(self, label: str) -> float:
-        """Return the expected seconds of another round of a cell."""
-        took = self.took.get(label)
+        """Return the expected seconds of another round of a cell.
+
+        Its first process in a sitting makes one call more than the others, and does not count.
+        """
+        took = self.took.get(label, [])[1:]
         return median(took) if took else cost(list(self.rounds[label].values()))
 
     def _seconds_left(self) -> float:
@@ -592,10 +609,10 @@ class Launcher:
     _times: Counter[str] = field(default_factory=Counter)
     #: For each cell, a call of its last process: its motion and a sample of its map.
     _last: dict[str, tuple[str, Path]] = field(default_factory=dict)
-    #: Seconds of each cell's checked call.
-    _checked_seconds: dict[str, float] = field(default_factory=dict)
-    #: Whether two new processes gave the same map of the same surface.
-    _repeats: dict[str, bool | None] = field(default_factory=dict)
+    #: Seconds of the first call of each cell's last process.
+    _first_seconds: dict[str, float] = field(default_factory=dict)
+    #: The largest difference between maps of the same surface by two new processes.
+    _scatter: dict[str, float] = field(default_factory=dict)
     #: Number of the server that forks the judges; no two launchers share one.
     number: int = 0
     _stopped: threading.Event = field(default_factory=threading.Event)
@@ -619,7 +636,7 @@ class Launcher:
         label = task.cell.label
         if label in other._last:
             self._last[label] = other._last[label]
-            self._checked_seconds[label] = other._checked_seconds[label]
+            self._first_seconds[label] = other._first_seconds[label]
 
     def stop(self) -> None:
         """End the running process, and every later one right after its start."""
@@ -653,20 +670,26 @@ class Launcher:
         if judged.outcome is None:
             return _unreadable("its map could not be judged"), None
         self._keep(task, UNMOVED, uv)
-        self._checked_seconds[task.cell.label] = max(answer.outcome.seconds, default=0.0)
+        self._first_seconds[task.cell.label] = max(answer.outcome.seconds, default=0.0)
         return judged.outcome, uv
 
     def time(self, task: Task, checked: Checked) -> Round | Outcome:
         """Return the timed calls of one process, or the outcome if it has none.
 
-        Their surfaces are moved, for all cells alike. Where calls are short, the first one, which
-        only warms up, gets a motion that a call of the process before has had: so what a fresh
-        process makes of it is compared with what one did that had been called before.
+        Their surfaces are moved and renumbered, for all cells alike. Where calls are short, the
+        first one, which only warms up, gets a motion that a call of the process before has had: so
+        what a fresh process makes of it is compared with what one did that had been called before.
+        A cell's first process makes another call that is not timed, whose surface keeps its
+        numbers: what is kept by the triangles shows in its map.
         """
         label = task.cell.label
+        is_first = not self._times[label]
         turn = f"{self.options.seed} {self._drawn} {self._times[label]}"
         self._times[label] += 1
-        motions = [f"{turn} {k}" for k in range(ENOUGH_CALLS + 1)]
+        ending = NUMBERS_KEPT if task.algorithm.target == "atlas" else ""
+        motions = [f"{turn} {k}{ending}" for k in range(ENOUGH_CALLS + 2)]
+        if is_first:
+            motions[1] = f"{turn} 1{NUMBERS_KEPT}"
         last = self._last.get(label)
         replays = last is not None and not self._is_long(task)
         if last is not None and replays:
@@ -678,6 +701,7 @@ class Launcher:
             2 * self.options.timeout,
             motions=tuple(motions),
             first_counts=not replays,
+            untimed=1 + is_first,
         )
         ended = monotonic()
         found, used = answer.round, answer.used
@@ -686,6 +710,7 @@ class Launcher:
         if not set(answer.motions) <= set(motions) or len(answer.names) != len(answer.motions):
             return _unreadable("it reports other calls than those requested")
         used.wall, used.cold = sum(found.calls), found.cold_seconds or 0.0
+        self._first_seconds[label] = found.cold_seconds or found.calls[0]
         wrong = impossible(used, found, began, ended)
         wrong = wrong or incomparable(used, answer.running, task.cell.threads)
         if wrong:
@@ -702,28 +727,68 @@ class Launcher:
         judged = self._judge_once(task, checked, told, known)
         if isinstance(judged, JudgedCalls) and judged.doubtful is not None and not judged.faults:
             # For this surface or method, rounding decides between several maps.
-            maps = self.scratch / "maps.npy"
-            (self.scratch / "uv.npy").replace(maps)
-            again = self._run(task, "again", self.options.timeout, motions=(judged.doubtful,))
-            uv = _read_uv(self.scratch / "uv.npy", task)
-            if uv is None:
-                return again.outcome or _unreadable("it holds no outcome")
+            fresh = self._again(task, judged.doubtful)
+            if isinstance(fresh, Outcome):
+                return fresh
             row = self.scratch / f"{file_name(label)}-again.npy"
             _remove(row)
-            np.save(row, sample(uv))
-            maps.replace(self.scratch / "uv.npy")
+            np.save(row, fresh)
             judged = self._judge_once(task, checked, told, known | {judged.doubtful: row})
         if isinstance(judged, Outcome):
             return judged
-        if judged.faults or judged.kept:
+        kept = judged.kept or self._kept_from_call_to_call(task, judged, told)
+        if judged.faults or kept:
             status: Status = "invalid" if judged.faults else "not_comparable"
-            return not_ok(status, *judged.faults, *judged.kept)
-        if UNMOVED in known:
-            self._repeats[label] = judged.repeated
-        number = random.SystemRandom().randrange(int(told.names[0] == WARM_UP), len(told.names))
-        rows = np.lib.format.open_memmap(self.scratch / "uv.npy", mode="r")
-        self._keep(task, told.motions[number], np.array(rows[number]))
+            return not_ok(status, *judged.faults, *kept)
+        # Of a cell's first process the call whose surface kept its numbers, else any timed one.
+        number = 1 if SECOND_CALL in told.names else self._any_timed(told)
+        self._keep(task, told.motions[number], self._row(task, told, number))
         return judged
+
+    def _any_timed(self, told: Answer) -> int:
+        return random.SystemRandom().randrange(int(told.names[0] == WARM_UP), len(told.names))
+
+    def _row(self, task: Task, told: Answer, number: int) -> NDArray[np.complex128]:
+        """Return the map of a call in the surface's own order."""
+        rows = np.lib.format.open_memmap(self.scratch / "uv.npy", mode="r")
+        return in_first_order(np.array(rows[number]), task.mesh, told.motions[number])
+
+    def _again(self, task: Task, motion: str) -> NDArray[np.complex128] | Outcome:
+        """Return a sample of the map that a new process makes of the surface in this motion."""
+        maps = self.scratch / "maps.npy"
+        (self.scratch / "uv.npy").replace(maps)
+        again = self._run(task, "again", self.options.timeout, motions=(motion,))
+        uv = _read_uv(self.scratch / "uv.npy", task)
+        maps.replace(self.scratch / "uv.npy")
+        if uv is None:
+            return again.outcome or _unreadable("it holds no outcome")
+        return sample(in_first_order(uv, task.mesh, motion))
+
+    def _kept_from_call_to_call(
+        self, task: Task, judged: JudgedCalls, told: Answer
+    ) -> tuple[Fault, ...]:
+        """Return the fault that the process before has kept something, if its maps show it.
+
+        Where the maps of both processes differ, new ones are asked how far theirs do.
+        """
+        label, motion = task.cell.label, told.motions[0]
+        if judged.apart is None or judged.faults or task.algorithm.program is not None:
+            return ()
+        if motion == UNMOVED:  # the check was a new process too
+            self._scatter[label] = judged.apart
+            return ()
+        for _ in range(_MOST_ASKED):
+            if kept_from_call_to_call(judged.apart, self._scatter.get(label, 0.0)) is None:
+                return ()
+            fresh = self._again(task, motion)
+            if isinstance(fresh, Outcome):
+                return ()
+            scatter = difference(sample(self._row(task, told, 0)), fresh)
+            self._scatter[label] = max(scatter, self._scatter.get(label, 0.0))
+            if scatter <= SAME_MAP:
+                break
+        fault = kept_from_call_to_call(judged.apart, self._scatter.get(label, 0.0))
+        return () if fault is None else (fault,)
 
     def _judge_once(
         self, task: Task, checked: Checked, told: Answer, known: Mapping[str, Path]
@@ -735,7 +800,6 @@ class Launcher:
             names=told.names,
             motions=told.motions,
             known=dict(known),
-            repeats=self._repeats.get(task.cell.label),
         )
         return answer.judged or answer.outcome or _unreadable("its maps could not be judged")
 
@@ -748,7 +812,7 @@ class Launcher:
 
     def _is_long(self, task: Task) -> bool:
         """Whether the first call may be timed; a motion used by another process is not timed."""
-        return self._checked_seconds.get(task.cell.label, 0.0) > LONG_CALL / 2
+        return self._first_seconds.get(task.cell.label, 0.0) > LONG_CALL
 
     def _judged(self, task: Task, what: JobTask, **more: Any) -> Answer:
         """Return the judgement of a map, by a process that never imported its algorithm."""
@@ -933,8 +997,9 @@ def _with_note(answer: Answer, left: int) -> Answer:
     """Add the notice that a checked call left processes behind."""
     if answer.outcome is None or not left:
         return answer
-    told = Notice(NoticeKind.PROCESSES_LEFT, f"left {left} processes behind, which were ended")
-    notes = (*answer.outcome.notes, told)
+    hidden = "" if finds_all() else "; others, with another environment, may live on"
+    told = f"left {left} processes behind, which were ended{hidden}"
+    notes = (*answer.outcome.notes, Notice(NoticeKind.PROCESSES_LEFT, told))
     return Answer(outcome=answer.outcome.model_copy(update={"notes": notes}))
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from time import monotonic
 from typing import Any
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.clock import Timing, measure
-from cembench.core.errors import NotThere
+from cembench.core.errors import NotThere, ParameterError
 from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.linear_algebra.work import Work, counting
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -42,9 +41,11 @@ from cembench.running.judging import Checked, judged_calls, judged_check
 from cembench.running.memory import Memory, memory_of_call
 from cembench.running.motion import UNMOVED, moved
 from cembench.running.processor import Processor, after_call, before_call
+from cembench.running.quality import better_parameters
 from cembench.running.returned import (
+    Returned,
+    finite,
     hash_of,
-    map_of,
     outcome_of_error,
     phases_fault,
     report_of,
@@ -55,21 +56,22 @@ ENOUGH_SECONDS = 0.3
 ENOUGH_CALLS = 20
 #: A first call longer than this, in seconds, is not repeated: a warm-up saves only tenths of one.
 LONG_CALL = 5.0
-#: Name of a first call that only warms up.
-WARM_UP = "the warm-up"
+#: Names of first calls that are not timed: the first warms up, a second is for comparison only.
+WARM_UP, SECOND_CALL = "the warm-up", "the second call"
 
 Complex = NDArray[np.complex128]
-Call = Callable[[TriangleMesh], tuple[Any, Timing]]
+Call = Callable[[TriangleMesh], tuple[Returned, Timing]]
 
 
 @dataclass
 class TimedCalls:
-    """The calls of one process in order; the first may be a warm-up."""
+    """The calls of one process in order; the first ones may not be timed."""
 
-    is_warmed_up: bool = False
+    #: Number of calls that are not timed.
+    untimed: int = 0
     motions: list[str] = field(default_factory=list)
     timings: list[Timing] = field(default_factory=list)
-    #: The map of each call, copied right after it.
+    #: The map of each call, copied while its clock ran.
     maps: list[Complex | Fault] = field(default_factory=list)
     #: CPU seconds at the begin and end of each call.
     before: list[Processor] = field(default_factory=list)
@@ -77,26 +79,33 @@ class TimedCalls:
     #: Whether a call changed the given surface.
     changed: bool = False
     began: float = field(default_factory=monotonic)
+    start: Processor = field(default_factory=after_call)
 
     @property
     def timed(self) -> list[Timing]:
-        """The calls without a warm-up."""
-        return self.timings[self.is_warmed_up :]
+        """The timed calls."""
+        return self.timings[self.untimed :]
 
     def names(self) -> list[str]:
         """Return the names of the calls."""
         count = len(self.timed)
         calls = [f"call {k} of {count}" for k in range(1, count + 1)]
-        return [WARM_UP, *calls] if self.is_warmed_up else calls
+        return [*(WARM_UP, SECOND_CALL)[: self.untimed], *calls]
 
-    def used(self) -> Used:
-        """Return the resources used by the calls without a warm-up."""
-        first = int(self.is_warmed_up)
+    def used(self, preparing: float = 0.0) -> Used:
+        """Return the resources used by the timed calls, and between all calls.
+
+        `preparing` is what it took to prepare a call before the algorithm was loaded.
+        """
+        first = self.untimed
         pairs = list(zip(self.before, self.after, strict=True))
         gaps = list(zip(self.after, self.before[1:], strict=False))
+        alone = gaps if first else [(self.start, self.before[0]), *gaps]
         return Used(
             wall=sum(t.total for t in self.timed),
             cold=self.timings[0].total if first else 0.0,
+            between=sum(b.thread - a.thread for a, b in alone),
+            preparing=preparing * len(alone),
             own=sum(b.process - a.process for a, b in pairs[first:]),
             others=sum(b.others - a.others for a, b in pairs[first:]),
             beside=sum(b.beside - a.beside for a, b in gaps),
@@ -125,28 +134,49 @@ def check_cell(
 def call_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
 ) -> tuple[Outcome, Complex | None]:
-    """Call once, like :func:`check_cell`, but leave the map to be judged elsewhere."""
+    """Call once, like :func:`check_cell`, but leave the map to be judged elsewhere.
+
+    If the algorithm suggests other parameters (``alternative`` in its extras), these are tried
+    after the measured call, and a notice says so where they are much better.
+    """
+    called, uv = _called(algorithm, mesh, cell)
+    suggested = called.extras.get("alternative")
+    if uv is None or algorithm.target == "atlas" or not isinstance(suggested, dict):
+        return called, uv
+    other = cell.model_copy(update={"parameters": cell.parameters | suggested})
+    try:
+        found = _called(algorithm, mesh, other)[1]
+    except ParameterError:  # these are no parameters of the algorithm
+        found = None
+    if found is None:
+        return called, uv
+    better = better_parameters(algorithm.name, mesh, uv, found, suggested)
+    return called.model_copy(update={"notes": (*called.notes, *better)}), uv
+
+
+def _called(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> tuple[Outcome, Complex | None]:
+    """Call once, and return the outcome without a judgement, and the map."""
     call = _call(algorithm, mesh, cell)
     program: dict[str, Any] = {}
     work: Work | None = None
     try:
         if isinstance(call, ProgramCalls):
-            found, timing = call(mesh, watched=True)
+            returned, timing = call(mesh, watched=True)
             memory = Memory(call.peak, call.peak)
             program = _about_program(call)
         else:
             with linear_algebra(cell.solves, cell.backend), counting() as work:
-                (found, timing), memory = memory_of_call(
+                (returned, timing), memory = memory_of_call(
                     lambda: _without_collector(lambda: call(mesh.fresh()))
                 )
     except BaseException as error:
         return outcome_of_error(error, mesh), None
     if algorithm.library is not None:
         program = {"program": ProgramRun(version=library_version(algorithm.library))}
-    uv = map_of(found, mesh, algorithm.target)
+    uv = finite(returned.uv, algorithm.target)
     if isinstance(uv, Fault):
         return _with_memory(not_ok("invalid", uv).model_copy(update=program), memory), None
-    report, problems = report_of(found)
+    report, problems = report_of(returned.result)
     seconds = phases_fault(timing)
     problems += [seconds] if seconds else []
     problems = [*_changes(mesh, cell), *problems]
@@ -183,17 +213,21 @@ def timed_calls(
     motions: Sequence[str] = (),
     *,
     first_counts: bool = True,
+    untimed: int = 1,
 ) -> tuple[Round, TimedCalls] | Outcome:
     """Time a call after a warm-up, or several calls if they are short.
 
-    With `first_counts`, a call of more than :data:`LONG_CALL` seconds is timed without a warm-up.
+    The first `untimed` calls are not timed: a warm-up, and perhaps another one. With
+    `first_counts`, a first call of more than :data:`LONG_CALL` seconds is timed, and no other.
     Each call gets the surface in a different motion; without `motions`, unmoved. The maps are
     judged after all timing. Returns an outcome if the algorithm raised or returned no map.
     """
     call = _call(algorithm, mesh, cell)
     try:
         with linear_algebra(cell.solves, cell.backend):
-            told = _timed(call, mesh, algorithm.target, motions, first_counts=first_counts)
+            told = _timed(
+                call, mesh, algorithm.target, motions, first_counts=first_counts, untimed=untimed
+            )
         timings = told.timed
         start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
     except BaseException as error:
@@ -212,7 +246,7 @@ def timed_calls(
         return not_ok("invalid", *problems)
     first = len(told.timings) - len(timings)
     found = _round(timings, told.before[first:], told.after[first:], isinstance(call, ProgramCalls))
-    cold = told.timings[0].total if told.is_warmed_up else None
+    cold = told.timings[0].total if told.untimed else None
     found = _program_round(found, call, len(timings), start)
     return found.model_copy(update={"cold_seconds": cold}), told
 
@@ -233,7 +267,13 @@ def _program_round(measured: Round, call: Call, calls: int, start: float | None)
 
 
 def _timed(
-    call: Call, mesh: TriangleMesh, target: str, motions: Sequence[str], *, first_counts: bool
+    call: Call,
+    mesh: TriangleMesh,
+    target: str,
+    motions: Sequence[str],
+    *,
+    first_counts: bool,
+    untimed: int,
 ) -> TimedCalls:
     """Make the calls; record their maps and their times."""
     told = TimedCalls()
@@ -241,30 +281,49 @@ def _timed(
     def once() -> None:
         number = len(told.timings)
         motion = motions[number] if motions else UNMOVED
-        given = moved(mesh, motion)
         gc.collect()
         gc.disable()
         try:
+            # Made after the collection, so that no finaliser or callback could see it.
+            given = moved(mesh, motion)
             told.before.append(before_call())
-            found, timing = call(given)
+            returned, timing = call(given)
             told.after.append(after_call())
         finally:
             gc.enable()
         told.motions.append(motion)
         told.timings.append(timing)
-        told.maps.append(map_of(found, given, target))
+        told.maps.append(finite(returned.uv, target))
         told.changed |= not _is_as(given, moved(mesh, motion))
 
     once()
     if told.timings[0].total > LONG_CALL and first_counts:
         return told
-    told.is_warmed_up = True
+    told.untimed = untimed
     gc.collect()
     gc.freeze()  # a second collection scans only new objects; the others stay out of the caches
+    while len(told.timings) < untimed:
+        once()
     while len(told.timed) < ENOUGH_CALLS and sum(t.total for t in told.timed) < ENOUGH_SECONDS:
         once()
     gc.unfreeze()
     return told
+
+
+def preparing_seconds(mesh: TriangleMesh) -> float:
+    """Return the CPU seconds that it takes to prepare a call, in this thread.
+
+    Called before an algorithm is loaded: what takes more between the calls is its work.
+    """
+
+    def once() -> float:
+        before = after_call()
+        gc.collect()
+        given = moved(mesh, "preparing")
+        _is_as(given, moved(mesh, "preparing"))
+        return before_call().thread - before.thread
+
+    return min(once(), once())  # the first one also loads what it needs
 
 
 def _is_as(mesh: TriangleMesh, other: TriangleMesh) -> bool:
@@ -286,24 +345,17 @@ def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
         return ProgramCalls(algorithm, mesh, arguments, cell.threads)
     lacking = missing(algorithm)
 
-    def call(given: TriangleMesh) -> tuple[Any, Timing]:
+    def call(given: TriangleMesh) -> tuple[Returned, Timing]:
         if lacking:
             raise NotThere(lacking)
-        return measure(lambda: _read(algorithm.function(given, **arguments)))
+        return measure(
+            lambda: Returned.of(algorithm.function(given, **arguments), given, algorithm.target)
+        )
 
     return call
 
 
-def _read(found: Any) -> Any:
-    """Return an algorithm's result after reading its map, so that lazy work is timed too."""
-    with suppress(BaseException):  # reported when the result is examined
-        _ = found.uv
-    with suppress(BaseException):
-        _ = found.corners
-    return found
-
-
-def _without_collector(call: Callable[[], tuple[Any, Timing]]) -> tuple[Any, Timing]:
+def _without_collector(call: Callable[[], tuple[Returned, Timing]]) -> tuple[Returned, Timing]:
     gc.collect()
     gc.disable()
     try:

@@ -1,10 +1,14 @@
-"""Move a surface slightly, so that results kept from earlier calls do not fit it.
+"""Move and renumber a surface, so that results kept from earlier calls do not fit it.
 
 Every timed call gets the surface in a different motion: a rotation, a shift, a tiny scale, and a
 stretch by a millionth. A rigid motion does not change the conformal map, so a kept map would still
 be right. A stretch changes it by about as much as the stretch itself: far more than rounding, and
-far less than any table shows. Vertices, triangles and their order stay the same, and so does the
-work.
+far less than any table shows.
+
+It is renumbered too: vertices, triangles and the corners within triangles are rotated cyclically,
+by random numbers. A matrix or factor that was kept for other numbers is useless, even as a
+preconditioner, and what was kept by the triangles is not found. What was near in memory stays near,
+and so the work stays the same.
 """
 
 from __future__ import annotations
@@ -17,9 +21,13 @@ from numpy.typing import NDArray
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: Name of the identity motion.
 UNMOVED = ""
+#: How the name of a motion ends that keeps the numbers of vertices and triangles. Call k of a round
+#: (from 0, untimed ones included) has the motion "TURN k", where TURN is the round's `motions`.
+NUMBERS_KEPT = " (numbers kept)"
 #: Relative stretch, largest against smallest length; it reveals kept results.
 STRETCH = 1e-6
 #: Largest angle in radians, shift as a share of the surface's size, and relative change of scale;
@@ -52,9 +60,19 @@ def motion(name: str) -> tuple[Real, Real]:
     return scale * rotation @ (np.eye(3) + STRETCH * stretch), SHIFT * rng.uniform(-1, 1, 3)
 
 
+def numbering(name: str, n: int, m: int) -> tuple[int, int, int]:
+    """Return how far a named motion rotates the numbers of vertices, triangles and corners."""
+    if name == UNMOVED or name.endswith(NUMBERS_KEPT):
+        return 0, 0, 0
+    seed = int.from_bytes(hashlib.sha256(f"numbers {name}".encode()).digest()[:8], "little")
+    vertices, triangles, corners = np.random.default_rng(seed).integers(0, (n, m, 3))
+    return int(vertices), int(triangles), int(corners)
+
+
 def moved(mesh: TriangleMesh, name: str) -> TriangleMesh:
-    """Return a moved copy of the surface; for :data:`UNMOVED`, a plain copy."""
-    F = mesh.F.copy()
+    """Return a moved and renumbered copy of the surface; for :data:`UNMOVED`, a plain copy."""
+    vertices, triangles, corners = numbering(name, mesh.n, mesh.m)
+    F = np.roll((mesh.F + vertices) % mesh.n, (triangles, corners), axis=(0, 1))
     if name == UNMOVED:
         V = mesh.V.copy()
     else:
@@ -62,6 +80,16 @@ def moved(mesh: TriangleMesh, name: str) -> TriangleMesh:
         low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
         centre = low + (high - low) / 2
         V = (mesh.V - centre) @ matrix.T + (centre + float((high - low).max()) * shift)
+    V = np.roll(V, vertices, axis=0)
     V.setflags(write=False)
     F.setflags(write=False)
     return type(mesh).trusted(V, F, mesh.name, mesh.notices)
+
+
+def in_first_order(uv: Complex, mesh: TriangleMesh, name: str) -> Complex:
+    """Return the map of a moved surface in the surface's own order of vertices.
+
+    The surface of an atlas, which has a point for each corner, is never renumbered.
+    """
+    vertices, _, _ = numbering(name, mesh.n, mesh.m)
+    return np.roll(uv, -vertices)

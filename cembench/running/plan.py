@@ -11,12 +11,13 @@ from typing import Any, TypeVar
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
 from cembench.linear_algebra.backends import default_backend
-from cembench.mesh.datasets import recognised
+from cembench.mesh.datasets import is_fetched, surface_file
 from cembench.mesh.files import checked, read_mesh, read_repaired
 from cembench.mesh.reading import READERS, is_named_like_a_mesh, read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
+from cembench.results.paper.profiles import as_printed
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.running.sources import hash_of, sources_of
 
@@ -76,7 +77,9 @@ def plan_cells(
 
     In `parameters`, the key ``name`` sets a parameter of every algorithm that has it, and
     ``algorithm.name`` of that one only. `standing` is keyed by the surfaces' names; surfaces not in
-    it are not the paper's.
+    it are not the paper's. On the paper's own models algorithms have the parameters with which the
+    paper ran them (:func:`~cembench.results.paper.profiles.as_printed`), unless `parameters` sets
+    others.
 
     Raises
     ------
@@ -91,7 +94,7 @@ def plan_cells(
     for name in names:
         if names.count(name) > 1:
             raise MeshError(f"two different surfaces are called {name!r}; rename one of the files.")
-    arguments = distribute_parameters(algorithms, parameters)
+    distribute_parameters(algorithms, parameters)  # refuses what no algorithm has
     sources = {a.name: sources_of(a) for a in algorithms}
     tasks = []
     for mesh in meshes:
@@ -102,7 +105,10 @@ def plan_cells(
                 f"{mesh.name} is a {type(mesh).__name__}, which none of the chosen algorithms "
                 f"accepts: {chosen}."
             )
-        facts = mesh_facts(mesh, standing.get(mesh.name, PaperRole()))
+        role = standing.get(mesh.name, PaperRole())
+        facts = mesh_facts(mesh, role)
+        given = as_printed(role.origin, algorithms) | dict(parameters)
+        arguments = distribute_parameters(algorithms, given)
         for taker in takers:
             cell = Cell(
                 algorithm=taker.name,
@@ -196,10 +202,7 @@ def gather_surfaces(
     found = [
         read_mesh_for(path, algorithms, read_repaired(path)[0] if mend else None) for path in files
     ]
-    standing = {
-        mesh.name: paper_role_of_file(registry, path, mesh)
-        for path, mesh in zip(files, found, strict=True)
-    }
+    standing = {mesh.name: paper_role_of(registry, mesh) for mesh in found}
     found += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
     return found, standing | paper_roles(registry, names)
 
@@ -243,7 +246,7 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
 
 
 def surface_named(registry: Registry, name: str, kind: type[M], faces: int | None = None) -> M:
-    """Return the surface of this kind that a name refers to: a mesh file or a registered surface.
+    """Return the surface of this kind that a name refers to: generated, public, or in a file.
 
     Raises
     ------
@@ -254,12 +257,30 @@ def surface_named(registry: Registry, name: str, kind: type[M], faces: int | Non
     if name in registry.surfaces and not Path(name).is_file():
         made = generate_surface(registry, name, faces)
         return made if isinstance(made, kind) else kind.from_arrays(made.V, made.F, name=made.name)
-    if not Path(name).suffix and not Path(name).exists():
+    return read_mesh(file_named(registry, name), kind)
+
+
+def file_named(registry: Registry, name: str) -> Path:
+    """Return the file that a name refers to: a path, or a public surface that was fetched.
+
+    Raises
+    ------
+    MeshError
+        It is neither, or the public surface is not here yet.
+
+    """
+    path = Path(name)
+    if path.suffix or path.exists():
+        return path
+    dataset = registry.datasets.get(name)
+    if dataset is None:
         raise MeshError(
             f"{name!r} is neither a file nor a registered surface; known surfaces: "
             f"{', '.join(sorted(registry.surfaces)) or 'none'}."
         )
-    return read_mesh(Path(name), kind)
+    if not is_fetched(dataset):
+        raise MeshError(f"the public surface {name!r} is not here yet: cembench fetch {name}.")
+    return surface_file(dataset)
 
 
 def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole]:
@@ -268,8 +289,8 @@ def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole
     return {name: PaperRole(row, "stand-in") for name, row in rows.items() if row}
 
 
-def paper_role_of_file(registry: Registry, path: Path, mesh: TriangleMesh) -> PaperRole:
-    """Return the role in the paper of a surface read from a file."""
-    dataset = recognised(registry.datasets.values(), path, mesh.hash)
-    row = dataset.paper_row if dataset else ""
+def paper_role_of(registry: Registry, mesh: TriangleMesh) -> PaperRole:
+    """Return the role in the paper of a surface that was not generated; it is known by its mesh."""
+    rows = {d.mesh_hash: d.paper_row for d in registry.datasets.values() if d.mesh_hash}
+    row = rows.get(mesh.hash, "")
     return PaperRole(row, "model") if row else PaperRole()

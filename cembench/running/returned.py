@@ -12,6 +12,7 @@ import json
 import math
 import operator
 import traceback
+from dataclasses import dataclass
 from itertools import islice
 from numbers import Real
 from typing import Any
@@ -42,40 +43,70 @@ MOST_ITERATIONS = 2**53
 MOST_ENERGIES = 100_000
 MOST_PHASES = 100
 MOST_EXTRAS_BYTES = 1_000_000
+#: What a result's class must leave to `object`: how attributes are looked up.
+_OF_OBJECT = ("__getattribute__", "__getattr__")
+
+Complex = NDArray[np.complex128]
 
 
-def map_of(found: Any, mesh: TriangleMesh, target: str = "disk") -> NDArray[np.complex128] | Fault:
-    """Return a copy of the map, or a fault: wrong type or shape, or not finite.
+@dataclass(frozen=True)
+class Returned:
+    """What a call returned: a plain copy of its map, or the fault in it, and the object itself."""
 
-    The map of an atlas has an entry for each corner, (3 m,).
+    uv: Complex | Fault
+    #: Never read after a timed call; a checked call's iterations, energies and extras are in it.
+    result: Any
+
+    @classmethod
+    def of(cls, found: Any, mesh: TriangleMesh, target: str = "disk") -> Returned:
+        """Copy the map that a call on this mesh returned."""
+        return cls(_copied(found, mesh, target), found)
+
+
+def _copied(found: Any, mesh: TriangleMesh, target: str) -> Complex | Fault:
+    """Return the values of a map as a new plain array, or a fault: wrong type or shape.
+
+    This is done while the clock runs, and the map is read once: whatever an object computes when it
+    is looked at takes part of the call's time, and later changes have no effect. The map of an
+    atlas has an entry for each corner, (3 m,).
     """
     required, shape = (Atlas, (mesh.m, 3)) if target == "atlas" else (Parameterization, (mesh.n,))
-    if not isinstance(found, required):
+    if not issubclass(type(found), required):
         article = "an" if required is Atlas else "a"
         told = f"it returned a {_type_of(found)}, not {article} {required.__name__}"
         return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=told)
+    own = [name for name in _OF_OBJECT if any(name in vars(c) for c in type(found).__mro__[:-1])]
+    if own:
+        told = f"its class {_type_of(found)} defines {own[0]}; return a plain {required.__name__}"
+        return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=told)
     try:
-        uv = found.corners if isinstance(found, Atlas) else found.uv
+        uv = found.corners if required is Atlas else found.uv
     except BaseException as error:
         return Fault(
             kind=FaultKind.RAISED, detail=f"its uv cannot be read: {describe_error(error)}"
         )
-    plain = (
-        np.asarray(uv) if isinstance(uv, np.ndarray) else None
-    )  # drops the methods of a subclass
+    # What `__class__` says is not asked; without its type, an array has no methods of its own.
+    plain = np.asarray(uv) if issubclass(type(uv), np.ndarray) else None
     if plain is None or plain.shape != shape or plain.dtype != np.complex128:
         got = _type_of(uv) if plain is None else f"{plain.dtype} {plain.shape}"
         told = f"uv is {got}; required is complex128 {shape}"
         return Fault(kind=FaultKind.WRONG_SHAPE, detail=shortened(told))
-    bad = np.flatnonzero(~np.isfinite(plain))
-    if len(bad):
-        places = "corners" if isinstance(found, Atlas) else "vertices"
-        told = f"uv is NaN or infinite at {len(bad)} {places}, the first being {bad[0]}"
-        return Fault(kind=FaultKind.NOT_FINITE, detail=told)
-    return np.array(plain, dtype=np.complex128).ravel()
+    return np.array(plain, dtype=np.complex128, order="C").ravel()
 
 
-def hash_of(uv: NDArray[np.complex128]) -> str:
+def finite(uv: Complex | Fault, target: str = "disk") -> Complex | Fault:
+    """Return a copied map, or the fault that it is not finite."""
+    if isinstance(uv, Fault):
+        return uv
+    bad = np.flatnonzero(~np.isfinite(uv))
+    if not len(bad):
+        return uv
+    places = "corners" if target == "atlas" else "vertices"
+    told = f"uv is NaN or infinite at {len(bad)} {places}, the first being {bad[0]}"
+    return Fault(kind=FaultKind.NOT_FINITE, detail=told)
+
+
+def hash_of(uv: Complex) -> str:
     """Return the SHA-256 of a map's bytes."""
     return hashlib.sha256(uv.tobytes()).hexdigest()
 

@@ -71,17 +71,34 @@ def affordable(
     return _within(widest, costs, partners, seconds)
 
 
-def cheapest(costs: Mapping[str, float], partners: Mapping[str, str], seconds: float) -> set[str]:
+def cheapest(
+    costs: Mapping[str, float],
+    partners: Mapping[str, str],
+    seconds: float,
+    surfaces: Mapping[str, str] | None = None,
+) -> set[str]:
     """Return the cells that reach their first look in the remaining seconds, the cheapest first.
 
-    Parameters are those of :func:`affordable`; a cell's partner is measured with it.
+    Parameters are those of :func:`affordable`; a cell's partner is measured with it. With
+    `surfaces`, the surface of each cell, the cheapest surfaces come first, each with all its cells.
     """
+    chosen: set[str] = set()
+    groups: dict[str, list[str]] = {}
+    for label, surface in (surfaces or {}).items():
+        groups.setdefault(surface, []).append(label)
+    for price, group in sorted(
+        (sum(costs[one] for one in group), group) for group in groups.values()
+    ):
+        if price > seconds:
+            break
+        chosen.update(group)
+        seconds -= price
 
-    def price(label: str) -> float:
+    def price_beside(label: str) -> float:
         return sum(costs[one] for one in {label, partners.get(label, label)})
 
-    ordered = sorted(costs, key=lambda label: (price(label), label))
-    return _within(ordered, costs, partners, seconds)
+    ordered = sorted(costs.keys() - chosen, key=lambda label: (price_beside(label), label))
+    return chosen | _within(ordered, costs, partners, seconds)
 
 
 def _within(

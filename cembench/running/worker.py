@@ -27,7 +27,7 @@ from cembench.running.comparable import Used
 from cembench.running.external.call import use_folder
 from cembench.running.judge import Promise
 from cembench.running.judging import Checked, JudgedCalls, judged_calls, judged_check
-from cembench.running.measure import call_cell, timed_calls
+from cembench.running.measure import call_cell, preparing_seconds, timed_calls
 from cembench.running.motion import moved
 from cembench.running.process import die_with_parent, limit_memory
 from cembench.running.processor import keep_orphans
@@ -66,13 +66,14 @@ class Job(BaseModel):
     #: Motions of the surface for the calls, and whether a long first call is timed.
     motions: tuple[str, ...] = ()
     first_counts: bool = True
+    #: Number of calls before the timed ones.
+    untimed: int = 1
     #: Input of judging: the outcome of a check, or the names of the rows of `uv_file`.
     promise: Promise = Promise()
     called: Outcome | None = None
     names: tuple[str, ...] = ()
-    #: Samples of maps from other processes (``.npy``) by motion, and whether these repeat.
+    #: Samples of maps from other processes (``.npy``) by motion.
     known: dict[str, Path] = {}
-    repeats: bool | None = None
     memory_bytes: int | None = None
     #: Id of the parent process; this process ends with it.
     parent: int
@@ -138,13 +139,21 @@ def _again(job: Job) -> Answer:
 
 def _time(job: Job) -> Answer:
     began, mesh = monotonic(), _mesh(job)
+    preparing = preparing_seconds(mesh)
     algorithm = load_algorithm(job.cell.algorithm, job.plugins)
-    found = timed_calls(algorithm, mesh, job.cell, job.motions, first_counts=job.first_counts)
+    found = timed_calls(
+        algorithm,
+        mesh,
+        job.cell,
+        job.motions,
+        first_counts=job.first_counts,
+        untimed=job.untimed,
+    )
     if isinstance(found, Outcome):
         return Answer(outcome=found)
     measured, told = found
     np.save(job.uv_file, np.stack([uv for uv in told.maps if not isinstance(uv, Fault)]))
-    used = told.used()
+    used = told.used(preparing)
     used.began = began
     if algorithm.program is not None:
         used.own = 0.0  # writing and reading the files is not part of the program's wall-clock time
@@ -163,7 +172,7 @@ def _judge_calls(job: Job) -> Answer:
     named = list(zip(job.names, job.motions, rows, strict=True))
     known = {motion: np.load(file) for motion, file in job.known.items()}
     try:
-        judged = judged_calls(job.promise, mesh, job.checked, named, known, repeats=job.repeats)
+        judged = judged_calls(job.promise, mesh, job.checked, named, known)
     except MemoryError as error:
         return Answer(outcome=outcome_of_error(error, mesh))
     return Answer(judged=judged)

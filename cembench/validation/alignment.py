@@ -44,6 +44,8 @@ def distance(z: Complex, w: Complex, *, moebius: bool) -> float:
 
     Root mean square, relative to the radius of w; infinite if they cannot be aligned.
     """
-    onto = (closest_moebius if moebius else closest_similarity)(z, w)
     radius = float(np.sqrt((np.abs(w - w.mean()) ** 2).mean()))
+    if not radius:
+        return float("inf")
+    onto = (closest_moebius if moebius else closest_similarity)(z, w)
     return float(np.sqrt((np.abs(onto(z) - w) ** 2).mean())) / radius

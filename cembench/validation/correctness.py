@@ -303,6 +303,8 @@ def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFind
 def _largest_difference(first: CheckedMap, second: CheckedMap) -> float:
     """Return the largest relative difference of figures that motion, numbering and scale keep."""
     mine, other = all_metrics(first.mesh, _uv(first)), all_metrics(second.mesh, _uv(second))
+    if not (mine["image_area"] and other["image_area"]):
+        return np.inf  # a map to a point or a line
     apart = [
         abs(mine[name] - other[name]) / max(abs(mine[name]), 1e-300) for name in _INVARIANT[1:]
     ]
@@ -323,7 +325,8 @@ def _order(series: RefinementSeries, errors: Sequence[float]) -> float:
 
 
 def _relative_energy(mapped: CheckedMap) -> float:
-    return _figure(mapped, "conformal_energy") / abs(_figure(mapped, "image_area"))
+    area = abs(_figure(mapped, "image_area"))
+    return _figure(mapped, "conformal_energy") / area if area else np.inf
 
 
 def _figure(mapped: CheckedMap, name: str) -> float:

@@ -20,6 +20,7 @@ from cembench.report.document import (
 )
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
+from cembench.results.comparison import NOT_DETECTED
 from cembench.results.record_rows import row
 from cembench.results.records import Record
 from cembench.results.store import Store
@@ -149,7 +150,7 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
         rows=tuple(rows),
         caption="Ratios of this algorithm's figure to the baseline's: below 1 is better. Equal "
         "means within 1 %. The interval of E_C and angles is over the surfaces, that of the "
-        "seconds over the rounds.",
+        f"seconds over the rounds. {NOT_DETECTED}",
     )
 
 

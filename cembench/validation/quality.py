@@ -19,7 +19,14 @@ from statistics import median
 from pydantic import BaseModel, ConfigDict
 
 from cembench.core.notices import NoticeKind, of_kind
-from cembench.results.comparison import Comparison, compare, compare_ratios, paired_ratios
+from cembench.results.comparison import (
+    Comparison,
+    compare,
+    compare_ratios,
+    confirmed,
+    measured_ratios,
+    paired_ratios,
+)
 from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.external_words import solve_words
 from cembench.results.intervals import Interval, median_interval
@@ -202,12 +209,11 @@ def sides(ratios: Sequence[float]) -> PairedComparison:
 
 def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
     """Return the speed comparison over all surfaces on which both were timed."""
-    by_surface = [paired_ratios(ours, theirs) for ours, theirs in pairs]
-    by_surface = [ratios for ratios in by_surface if ratios]
-    by_round = [_median_ratio(ratios) for ratios in zip(*by_surface, strict=False)]
+    by_round = _by_round([paired_ratios(ours, theirs) for ours, theirs in pairs])
     if not by_round:
         return None
-    found = compare_ratios(by_round)
+    measured = _by_round([measured_ratios(ours, theirs) for ours, theirs in pairs])
+    found = confirmed(compare_ratios(by_round), measured)
     low, high = (found.interval.low, found.interval.high) if found.interval else (None, None)
     return Speed(
         ratio=found.ratio,
@@ -217,6 +223,12 @@ def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
         rounds=len(by_round),
         p=found.p,
     )
+
+
+def _by_round(by_surface: Sequence[Sequence[float]]) -> list[float]:
+    """Return the median ratio over the surfaces that have ratios, for each round."""
+    known = [ratios for ratios in by_surface if ratios]
+    return [_median_ratio(ratios) for ratios in zip(*known, strict=False)]
 
 
 def folds_on(records: Sequence[Record]) -> list[str]:

@@ -26,8 +26,8 @@ _COMPARED: dict[type[TriangleMesh], tuple[tuple[str, dict[str, Any]], ...]] = {
         ("catenoid-sheet", {}),
         ("cylinder-sheet", {}),
         ("cone", {}),
-        ("cowboy-hat", {}),
-        ("nefertiti", {}),
+        ("cowboy-hat-stand-in", {}),
+        ("nefertiti-stand-in", {}),
     ),
     HoledMesh: (
         ("catenoid-ring", {}),

@@ -10,6 +10,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cembench.report.render.grid import GridColumn, figures, grid, names, words
+from cembench.results.comparison import NOT_DETECTED
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import GrowthComparison
@@ -33,7 +34,10 @@ def validation_text(validation: Validation) -> RenderableType:
         if stage == "scaling" and validation.growth:
             parts += [Text(), growth_table(validation.growth)]
     style = "bold green" if validation.passed else "bold red"
-    return Group(*parts, Text(), Text(f"{validation.title}: {sentence(validation)}.", style=style))
+    parts += [Text(), Text(f"{validation.title}: {sentence(validation)}.", style=style)]
+    if any(against.speed is not None for against in validation.against):
+        parts.append(Text(NOT_DETECTED, style="dim"))
+    return Group(*parts)
 
 
 def _finding_lines(finding: ValidationFinding) -> Iterator[RenderableType]:

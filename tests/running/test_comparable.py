@@ -7,8 +7,16 @@ from cembench.registry import load_registry
 from cembench.results.records import Fault, FaultKind, Round
 from cembench.running.comparable import Used, impossible, incomparable, is_cold
 from cembench.running.judge import Promise
-from cembench.running.judging import Checked, judged_calls, sample
-from cembench.running.motion import STRETCH, UNMOVED, motion, moved
+from cembench.running.judging import Checked, judged_calls, kept_from_call_to_call, sample
+from cembench.running.motion import (
+    NUMBERS_KEPT,
+    STRETCH,
+    UNMOVED,
+    in_first_order,
+    motion,
+    moved,
+    numbering,
+)
 from cembench.running.plan import generate_surface
 from cembench.running.returned import hash_of
 
@@ -31,6 +39,10 @@ MORE, AHEAD = FaultKind.MORE_CORES, FaultKind.WORKS_AHEAD
         (Used(wall=1.0, own=0.9, beside=0.2), (), 1, [AHEAD]),
         (Used(wall=1.0, own=0.9, beside=0.2), (), 2, []),
         (Used(wall=1.0, own=0.9, disturbed=4, looked=5), (), 1, [AHEAD]),
+        (Used(wall=1.0, own=0.9, between=0.4), (), 1, []),
+        (Used(wall=1.0, own=0.9, between=0.9, cold=1.0), (), 1, []),
+        (Used(wall=1.0, own=0.9, between=0.7, preparing=0.1), (), 1, []),
+        (Used(wall=1.0, own=0.9, between=0.9, preparing=0.1), (), 2, [AHEAD]),
     ],
 )
 def test_more_cores_than_allowed_and_work_beside_the_calls_are_found(used, running, threads, kinds):
@@ -73,18 +85,37 @@ def test_a_motion_is_seeded_tiny_and_no_rigid_one():
     assert stretches[0] / stretches[-1] - 1 == pytest.approx(STRETCH, rel=0.1)
     assert np.abs(matrix - np.eye(3)).max() < 0.02
     assert np.abs(shift).max() <= 0.01
-    surface = moved(MESH, "a")
+    surface = moved(MESH, f"a{NUMBERS_KEPT}")
     assert surface.hash != MESH.hash
     np.testing.assert_array_equal(surface.F, MESH.F)
     assert not np.shares_memory(surface.F, MESH.F)
     assert moved(MESH, UNMOVED).hash == MESH.hash
 
 
-def judged(maps, known=None, repeats=None, **promise):
+def test_a_renumbered_surface_is_the_same_surface_with_all_numbers_changed():
+    surface = moved(MESH, "a")
+    vertices, triangles, corners = numbering("a", MESH.n, MESH.m)
+    assert min(vertices, triangles) > 0
+    assert numbering("b", MESH.n, MESH.m) != (vertices, triangles, corners)
+    plain = motion("a")[0]
+    np.testing.assert_allclose(
+        np.roll(surface.V, -vertices, axis=0) - surface.V.mean(axis=0),
+        (MESH.V - MESH.V.mean(axis=0)) @ plain.T,
+        atol=1e-14,
+    )
+    back = np.roll((surface.F - vertices) % MESH.n, (-triangles, -corners), axis=(0, 1))
+    np.testing.assert_array_equal(back, MESH.F)
+    assert type(MESH)(surface.V, surface.F).m == MESH.m  # it passes all checks
+    np.testing.assert_array_equal(in_first_order(np.roll(FLAT, vertices), MESH, "a"), FLAT)
+
+
+def judged(maps, known=None, **promise):
+    """Judge maps that are given in the surface's own order."""
     checked = Checked(uv_hash=hash_of(FLAT), relative_energy=0.0)
+    maps = [(name, np.roll(uv, numbering(name, MESH.n, MESH.m)[0])) for name, uv in maps]
     named = [(f"call {k}", motion, uv) for k, (motion, uv) in enumerate(maps, start=1)]
     known = {name: sample(uv) for name, uv in (known or {}).items()}
-    return judged_calls(Promise(**promise), MESH, checked, named, known, repeats=repeats)
+    return judged_calls(Promise(**promise), MESH, checked, named, known)
 
 
 def turned(by):
@@ -92,9 +123,10 @@ def turned(by):
 
 
 def test_the_map_of_another_shape_is_a_kept_one_unless_no_coordinates_count():
-    assert [f.kind for f in judged([("a", FLAT)]).kept] == [FaultKind.KEPT_RESULT]
-    assert judged([("a", turned(1e-6)), ("b", turned(1e-6))]).kept
-    assert judged([("a", FLAT), ("b", FLAT)], combinatorial=True).kept == ()
+    a, b = f"a{NUMBERS_KEPT}", f"b{NUMBERS_KEPT}"
+    assert [f.kind for f in judged([(a, FLAT)]).kept] == [FaultKind.KEPT_RESULT]
+    assert judged([(a, turned(1e-6)), (b, turned(1e-6))]).kept
+    assert judged([(a, FLAT), (b, FLAT)], combinatorial=True).kept == ()
     assert judged([("a", turned(1e-6)), ("b", turned(2e-6))]).kept == ()
 
 
@@ -103,10 +135,19 @@ def test_the_same_surface_has_the_same_map_to_rounding_in_every_process():
     assert judged([("a", turned(1e-6))], {"a": turned(1e-6 + 1e-12)}).repeated is True
     found = judged([("a", turned(1e-6))], {"a": turned(0.1)})
     assert (found.repeated, found.kept) == (False, ())
-    found = judged([("a", turned(1e-6))], {"a": turned(3e-6)}, repeats=True)
-    assert [f.kind for f in found.kept] == [FaultKind.KEPT_RESULT]
-    found = judged([("a", turned(1e-6))], {"a": turned(3e-6)}, repeats=True, is_program=True)
-    assert found.kept == ()
+    assert found.apart == pytest.approx(0.1, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("apart", "scatter", "is_kept"),
+    [
+        *((1e-9, 0.0, False), (1e-6, 0.0, True), (1e-6, 1e-8, True)),
+        *((1e-6, 3e-7, False), (5e-2, 1e-3, True), (5e-3, 1e-3, False)),
+    ],
+)
+def test_maps_of_used_processes_may_differ_as_far_as_those_of_fresh_ones(apart, scatter, is_kept):
+    found = kept_from_call_to_call(apart, scatter)
+    assert (found is not None and found.kind is FaultKind.KEPT_RESULT) == is_kept
 
 
 def test_a_worse_map_is_doubtful_until_a_fresh_process_has_made_it_too():

@@ -170,7 +170,7 @@ def test_a_timed_call_that_returns_a_worse_map_makes_the_cell_invalid(tmp_path, 
     (record,) = run_tasks(tasks_of(name), Store(tmp_path))
     outcome = record.outcome
     assert (outcome.status, outcome.rounds) == ("invalid", ())
-    assert outcome.cause.startswith("in round 1 of 1: call 1 of ")
+    assert outcome.cause.startswith("in round 1 of 1: the second call ")
     assert "returned a different map from the check" in outcome.cause
     assert cause in outcome.cause
     assert tuple(fault.kind for fault in outcome.faults)[:2] == kinds

@@ -9,6 +9,7 @@ from cembench.core.clock import phase
 from cembench.results.records import FaultKind
 from cembench.running.measure import Checked, check_cell, time_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.returned import Returned
 from cembench.running.worker import Answer
 
 MESH = flat_disk(100)
@@ -37,6 +38,22 @@ class Sub(Parameterization):
     """A result that cannot be read."""
 
     uv = property(lambda self: 1 / 0, lambda self, value: None)
+
+
+class Own(Parameterization):
+    """A result that decides itself what its attributes are."""
+
+    def __getattribute__(self, name):
+        return object.__getattribute__(self, name)
+
+
+class Lies:
+    """It says that it is an array."""
+
+    __class__ = np.ndarray
+
+    def __array__(self, dtype=None, copy=None):
+        return FLAT
 
 
 class MuteError(Exception):
@@ -91,6 +108,8 @@ def result(**about):
         (lambda: None, FaultKind.NOT_A_PARAMETERIZATION, "returned a NoneType"),
         (lambda: endless(), FaultKind.NOT_A_PARAMETERIZATION, "returned a generator"),
         (lambda: Sub(FLAT), FaultKind.RAISED, "its uv cannot be read: ZeroDivisionError"),
+        (lambda: Own(FLAT), FaultKind.NOT_A_PARAMETERIZATION, "Own defines __getattribute__"),
+        (lambda: Parameterization(Lies()), FaultKind.WRONG_SHAPE, "uv is Lies; required is"),
         (lambda: Parameterization(list(FLAT)), FaultKind.WRONG_SHAPE, "uv is list"),
         (lambda: Parameterization(FLAT.astype(object)), FaultKind.WRONG_SHAPE, "uv is object"),
         (lambda: Parameterization(FLAT * np.nan), FaultKind.NOT_FINITE, "NaN or infinite"),
@@ -157,6 +176,30 @@ def test_an_array_with_methods_of_its_own_is_taken_for_what_it_holds():
     outcome = outcome_of(lambda: Parameterization(FLAT.view(Hostile)))
     assert (outcome.status, outcome.cause) == ("ok", None)
     assert outcome.uv_hash == outcome_of(result()).uv_hash
+
+
+def test_a_map_is_read_once_and_copied_so_later_changes_have_no_effect():
+    looks = []
+
+    class Counted(Parameterization):
+        """It counts how often its map is read."""
+
+        @property
+        def uv(self):
+            looks.append(True)
+            return held
+
+        @uv.setter
+        def uv(self, value):
+            """It is held elsewhere."""
+
+    held = np.asfortranarray(np.stack([FLAT, FLAT]).T)[:, 0].view(Hostile)
+    returned = Returned.of(Counted(None), MESH)
+    np.ndarray.fill(held, 0)
+    assert len(looks) == 1
+    assert type(returned.uv) is np.ndarray
+    assert returned.uv.flags.c_contiguous
+    np.testing.assert_array_equal(returned.uv, FLAT)
 
 
 def phases(*names):

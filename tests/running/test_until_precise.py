@@ -159,6 +159,20 @@ def test_a_run_ends_near_its_budget(tmp_path, monkeypatch, budget, scatter, look
     assert all(rounds[r.cell.label] <= reference[r.cell.mesh] for r in records)
 
 
+def test_surface_by_surface_more_surfaces_are_complete_in_the_same_time(tmp_path, monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(local, "monotonic", clock)
+    complete = {}
+    for whole in (False, True):
+        options = Options(budget=240, whole_surfaces=whole)
+        store = Store(tmp_path / str(whole))
+        records = run_tasks(many_cells(), store, options, None, timed_by(clock))
+        few = {r.cell.mesh for r in records if len(r.outcome.rounds) < 7}
+        complete[whole] = {r.cell.mesh for r in records} - few
+    assert complete[True] == {f"disk-{faces}" for faces in (100, 200, 300, 400, 500)}
+    assert complete[False] < complete[True], complete
+
+
 def test_a_fixed_number_of_rounds_is_not_cut_by_the_budget(tmp_path):
     chosen = [load_registry().algorithm("cem")]
     tasks = plan_cells(chosen, [flat_disk(100)], {}, MeasurementSettings(repeats=6))
@@ -234,6 +248,18 @@ def test_before_the_first_look_the_cheapest_go_on_with_their_reference():
         {"alone", "cem", "cheap", "middle"},
         set(costs),
     ]
+
+
+def test_surface_by_surface_the_cheapest_surface_is_complete_before_the_next():
+    costs = {"cem a": 1.0, "fdm a": 9.0, "cem b": 2.0, "fdm b": 20.0, "ldm b": 3.0}
+    partners = {"fdm a": "cem a", "fdm b": "cem b", "ldm b": "cem b"}
+    surfaces = {label: label[-1] for label in costs}
+    chosen = [cheapest(costs, partners, seconds, surfaces) for seconds in (9, 10, 15, 35)]
+    assert chosen[0] == {"cem a", "cem b", "ldm b"}  # what is left goes to the next surface
+    assert chosen[1] == {"cem a", "fdm a"}
+    assert chosen[2] == {"cem a", "fdm a", "cem b", "ldm b"}
+    assert chosen[3] == set(costs)
+    assert "fdm a" not in cheapest(costs, partners, 9.5)  # cell by cell
 
 
 @pytest.mark.parametrize(("again", "processes"), [(0, 7), (1, 14)])

@@ -1,7 +1,11 @@
+from io import StringIO
+
 import pytest
+from rich.console import Console
 
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
+from cembench.validation.terminal import validation_text
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
 
 
@@ -61,6 +65,15 @@ def test_equal_and_undecided():
         "valid; E_C equal to CEM's within 1 % on all 6 surfaces (median ratio 1.00, 95 % interval "
         "1.00-1.00); neither faster nor slower than CEM for sure (0.97-1.05 times its seconds)"
     )
+
+
+@pytest.mark.parametrize("speed", [None, (0.55, 0.53, 0.58, "faster")])
+def test_beside_a_speed_stands_what_is_not_detected(speed):
+    shown = StringIO()
+    Console(file=shown, width=80).print(
+        validation_text(validation(against=(against(speed=speed),)))
+    )
+    assert ("written to deceive" in shown.getvalue()) == (speed is not None)
 
 
 def test_several_baselines_are_named():

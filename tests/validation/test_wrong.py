@@ -24,6 +24,7 @@ CAUGHT_BY = {
     "crashes-without-interior": "awkward meshes",
     "mirrored": "orientation",
     "off-circle": "boundary",
+    "point": "orientation",
     "fold": "folds",
     "by-number": "another numbering",
     "by-axis": "rotation, shift, scale",

@@ -104,6 +104,11 @@ def mirrored(mesh: DiskMesh) -> Parameterization:
     return Parameterization(np.conj(right(mesh)))
 
 
+@algorithm("point", title="All in one point", target="disk")
+def point(mesh: DiskMesh) -> Parameterization:
+    return Parameterization(np.zeros(mesh.n, complex))
+
+
 @algorithm("off-circle", title="A thousandth off the circle", target="disk")
 def off_circle(mesh: DiskMesh) -> Parameterization:
     return Parameterization(1.001 * right(mesh))

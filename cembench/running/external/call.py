@@ -32,6 +32,7 @@ from cembench.running.external.exchange import largest_output, read_output, writ
 from cembench.running.external.faults import ProgramFault
 from cembench.running.external.present import missing
 from cembench.running.external.small_mesh import small_mesh
+from cembench.running.returned import Returned
 
 #: Phase name for the wall clock of a program.
 PHASE = "process"
@@ -79,9 +80,7 @@ class ProgramCalls:
     bytes: tuple[int, int] = (0, 0)
     peak: int | None = None
 
-    def __call__(
-        self, mesh: TriangleMesh, *, watched: bool = False
-    ) -> tuple[Parameterization | Atlas, Timing]:
+    def __call__(self, mesh: TriangleMesh, *, watched: bool = False) -> tuple[Returned, Timing]:
         """Run the program once on this surface; return its map and its wall-clock timing.
 
         With `watched` its memory is measured, which is not done in timed calls.
@@ -98,7 +97,8 @@ class ProgramCalls:
         self.own.append(self._own_seconds(ended.printed))
         self.walls.append(ended.seconds)
         self.peak = ended.peak
-        return found, Timing(total=ended.seconds, phases={PHASE: ended.seconds})
+        timing = Timing(total=ended.seconds, phases={PHASE: ended.seconds})
+        return Returned.of(found, mesh, self.algorithm.target), timing
 
     def own_seconds(self, last: int) -> tuple[float, ...]:
         """Return the solve times that the last calls printed; empty if one printed none."""

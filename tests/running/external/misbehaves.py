@@ -1,5 +1,6 @@
 """A program that maps a flat disk by its own coordinates, or breaks one promise: MODE IN OUT."""
 
+import hashlib
 import os
 import signal
 import subprocess
@@ -55,6 +56,12 @@ def main(mode, given, left, *more):
             uv = [(x, -y) for x, y in uv]
         case "six-digits":
             uv = [(round(x, 6), round(y, 6)) for x, y in uv]
+        case "keeps":
+            kept = Path(more[0]) / f"kept-{hashlib.sha256(str(F).encode()).hexdigest()}"
+            if not kept.exists():
+                time.sleep(0.3)
+                kept.touch()
+            uv = on_the_disk(V)
         case "normalised":
             uv = on_the_disk(V)
         case "unit-square":

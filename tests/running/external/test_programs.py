@@ -20,6 +20,7 @@ from cembench.results.verify import Depth, verify
 from cembench.running.local import Options, map_once, run_tasks
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.validation.quality import compare_speed
 
 SCRIPT = Path(__file__).with_name("misbehaves.py")
 MESH = flat_disk(600)
@@ -145,6 +146,14 @@ def test_comparisons_take_the_solve_time_and_never_the_wall_clock():
     assert compare(ours, theirs).ratio == pytest.approx(2.0)
     told = timed(*[Round(calls=(0.5,), start_seconds=0.3, own_seconds=(0.1,))] * 6)
     assert compare(told, theirs).ratio == pytest.approx(1.0)
+    # By its own word it is five times faster, by our clock twice as slow: that decides nothing.
+    boasts = timed(*[Round(calls=(0.5,), start_seconds=0.3, own_seconds=(0.02,))] * 6)
+    found = compare(boasts, theirs)
+    assert (found.ratio, found.verdict, found.p) == (pytest.approx(0.2), "undecided", 1.0)
+    assert compare(theirs, boasts).verdict == "undecided"
+    assert compare_speed([(boasts, theirs)]).verdict == "undecided"
+    fast = timed(*[Round(calls=(0.35,), start_seconds=0.3, own_seconds=(0.02,))] * 6)
+    assert compare(fast, theirs).verdict == compare_speed([(fast, theirs)]).verdict == "faster"
     # Its start takes as long as all of it: there is no solve time to compare.
     assert compare(timed(*[Round(calls=(0.5,), start_seconds=0.5)] * 6), theirs) is None
 
@@ -190,6 +199,15 @@ def test_a_run_records_programs_and_atlases_and_leaves_no_folder(tmp_path):
     assert not verify(store, Depth.everything).disagreements
     again, _ = run_tasks(tasks, store)
     assert again.started_at == record.started_at
+
+
+def test_what_a_program_keeps_on_disk_by_the_triangles_is_of_no_use_to_timed_calls(tmp_path):
+    task = task_of("keeps", str(tmp_path))
+    (record,) = run_tasks([task], Store(tmp_path / "run"))
+    (found,) = record.outcome.rounds
+    assert record.outcome.status == "ok", record.outcome.cause
+    assert min(found.calls) > 0.3
+    assert list(tmp_path.glob("kept-*"))
 
 
 def test_an_atlas_has_islands_seams_and_folds_of_each():
