@@ -13,15 +13,10 @@ import argparse
 import csv
 import json
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
-from statistics import median
-
-import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.pages import ROOT, fill
-from cembench.results.many import average_interval
+from cembench.results.many import arithmetic, geometric, rate_interval
 
 README = ROOT / "README.md"
 #: A policy of solving, the table of its averages, and the kept report that README quotes.
@@ -29,13 +24,7 @@ POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
 REPORTS = {"reuse": ROOT / "reports/standard", "backslash": ROOT / "reports/paper"}
 #: The readings that are shown, by the beginning of their rows.
 MEAN, GEOMETRIC = "mean rate (as the paper)", "geometric mean of ratios - 1"
-#: The same of ratios t / t_CEM, along the last axis.
-AVERAGES: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
-    MEAN: lambda ratios: ratios.mean(axis=-1) - 1,
-    GEOMETRIC: lambda ratios: np.exp(np.log(ratios).mean(axis=-1)) - 1,
-}
-#: Rounds of a cell without which rounds say nothing of an average.
-FEWEST_ROUNDS = 6
+AVERAGES = {MEAN: arithmetic, GEOMETRIC: geometric}
 
 
 def averages(file: Path) -> dict[str, dict[str, str]]:
@@ -68,10 +57,7 @@ def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
     """Return the interval of an average in words; nothing where cells have too few rounds."""
     if not records.exists():
         return ""
-    by_surface = ratios(records, algorithm, policy)
-    if not by_surface or median(map(len, by_surface)) < FEWEST_ROUNDS:
-        return ""
-    found = average_interval(by_surface, AVERAGES[reading])
+    found = rate_interval(ratios(records, algorithm, policy), AVERAGES[reading])
     return f" ({found.low:.1f} to {found.high:.1f})" if found else ""
 
 

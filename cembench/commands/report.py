@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -46,6 +47,7 @@ def make_report(
     from cembench.report.write_report import write_report
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
+    from cembench.running.environment import usable_cores
 
     sound_records(Store(run), Depth.everything if verify else Depth.sample)
     folder = output or run / "report"
@@ -62,7 +64,8 @@ def make_report(
             if not err.is_terminal and done < total:
                 err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
 
-        return write_report(run, folder, command or told, progress), folder
+        aside = usable_cores() > 1
+        return write_report(run, folder, command or told, progress, aside=aside), folder
 
 
 def show_report(report: Report, folder: Path) -> None:
@@ -78,11 +81,25 @@ def show_report(report: Report, folder: Path) -> None:
 
 def summary(report: Report, folder: Path) -> dict[str, Any]:
     """Return a report's contents for JSON output."""
-    from cembench.report.document import Claim, Gap, figures_of, sections_of, tables_of
+    from cembench.report.document import (
+        VERDICTS,
+        Claim,
+        Gap,
+        figures_of,
+        plain,
+        sections_of,
+        tables_of,
+    )
 
     items = [item for _, section in sections_of(report) for item in section.items]
     claims = {item.name: item.verdict for item in items if isinstance(item, Claim)}
+    counts = Counter(claims.values())
+    found = report.findings
     return {
+        "title": report.title,
+        "paper": asdict(report.paper) if report.paper else None,
+        "findings": [plain(sentence) for sentence in found.sentences] if found else [],
+        "suspects": list(found.suspects) if found else [],
         "report": str(folder),
         "html": str(folder / "index.html"),
         "markdown": str(folder / "report.md"),
@@ -91,7 +108,7 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
         "figures": [figure.name for figure in figures_of(report)],
         "gaps": {item.title: item.why for item in items if isinstance(item, Gap)},
         "claims": claims,
-        "verdicts": dict(Counter(claims.values())),
+        "verdicts": {verdict: counts[verdict] for verdict in VERDICTS if counts[verdict]},
     }
 
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any, Literal, TypeAlias
 
+from cembench.results.paper import Citation
+
 #: Origin of a number; a table never mixes two origins in a column without a mark.
 Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
 
@@ -30,6 +32,17 @@ ORIGINS: Mapping[Origin, tuple[str, str]] = {
 Verdict = Literal[
     "holds", "holds in part", "does not hold here", "not tested here", "too few rounds"
 ]
+#: All verdicts, failing ones first, with their words for one claim and for several.
+VERDICTS: Mapping[Verdict, tuple[str, str]] = {
+    "does not hold here": ("does not hold here", "do not hold here"),
+    "holds in part": ("holds in part", "hold in part"),
+    "holds": ("holds", "hold"),
+    "too few rounds": ("has too few rounds", "have too few rounds"),
+    "not tested here": ("is not tested here", "are not tested here"),
+}
+
+#: Heading of the suspect maps at the head of a report.
+SUSPECTS = "Mean angle errors over three times those of the other algorithms"
 
 
 @dataclass(frozen=True)
@@ -160,6 +173,11 @@ class Claim:
     verdict: Verdict
     remark: str = ""
 
+    @property
+    def title(self) -> str:
+        """The anchor in words, for links."""
+        return self.name.replace("-", " ")
+
 
 @dataclass(frozen=True)
 class Gap:
@@ -199,14 +217,32 @@ class Finding:
     words: str
 
 
+#: A sentence in parts; a claim is a link to itself.
+Sentence: TypeAlias = "tuple[str | Claim, ...]"
+
+
 @dataclass(frozen=True)
 class Findings:
     """The key findings of a run, for the head of its report.
 
-    `picture` and `plot` also occur in the report.
+    Parameters
+    ----------
+    sentences : tuple of Sentence
+        The headline, then further sentences.
+    suspects : tuple of str
+        Maps that are far worse than the others on their surface.
+    table : Table or None
+        The run's own figures, by surface and algorithm; not for the paper's run.
+    figures : tuple of Finding
+        Key figures.
+    picture, plot : Figure or None
+        They also occur in the report.
+
     """
 
-    sentence: str
+    sentences: tuple[Sentence, ...]
+    suspects: tuple[str, ...] = ()
+    table: Table | None = None
     figures: tuple[Finding, ...] = ()
     picture: Figure | None = None
     plot: Figure | None = None
@@ -217,7 +253,7 @@ class Report:
     """A whole report.
 
     `command` makes the report again; `facts` are shown at its head (machine, date, versions, cells
-    by status), as pairs of texts.
+    by status), as pairs of texts. `paper` is the paper that the report is about, if any.
     """
 
     title: str
@@ -227,6 +263,7 @@ class Report:
     #: Records by key, as rows (cembench.results.record_rows), that the values link to.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
+    paper: Citation | None = None
 
 
 def missing(why: str, text: str = "-") -> Value:
@@ -237,6 +274,11 @@ def missing(why: str, text: str = "-") -> Value:
 def words(text: str) -> Value:
     """Return an entry that is not a number."""
     return Value(text)
+
+
+def plain(sentence: Sentence) -> str:
+    """Return a sentence as text without links."""
+    return "".join(part if isinstance(part, str) else part.title for part in sentence)
 
 
 def count(number: int) -> Value:
@@ -274,6 +316,8 @@ def sections_of(report: Report) -> Iterator[tuple[int, Section]]:
 
 def tables_of(report: Report) -> Iterator[Table]:
     """Yield all tables in reading order."""
+    if report.findings is not None and report.findings.table is not None:
+        yield report.findings.table
     for _, section in sections_of(report):
         yield from (item for item in section.items if isinstance(item, Table))
 

@@ -10,7 +10,10 @@ from __future__ import annotations
 import csv
 import io
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple
@@ -20,12 +23,14 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure as Canvas
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 from PIL import Image
 
 from cembench.core.atomic import write_bytes, write_text
 from cembench.report.document import Figure
 from cembench.report.palette import PLAIN, SeriesStyle
+from cembench.running.process_pool import process_pool
 
 #: How a series is drawn: points, joined points, a staircase, or bars side by side or stacked.
 Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
@@ -97,6 +102,8 @@ class Plot:
     columns: int = 2
 
 
+#: The files of a plot: its formats, the first of which is the one to show.
+FORMS = ("png", "svg", "pdf")
 #: Size of a panel in inches; resolution of the PNG in dots per inch.
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
 #: A logarithmic axis that spans less than this factor has ticks at 2 and 5 too.
@@ -128,24 +135,45 @@ _NO_DATE = {
 }
 
 
+#: What draws plots into a folder instead of this process; see :func:`drawn_aside`.
+_ASIDE: ContextVar[Callable[[Plot, Path], object] | None] = ContextVar("_ASIDE", default=None)
+
+
+@contextmanager
+def drawn_aside() -> Iterator[None]:
+    """Draw the plots of this block in another process; their files are complete at its end."""
+    with process_pool(1) as pool:
+        drawn: list[Future[None]] = []
+        token = _ASIDE.set(lambda plot, place: drawn.append(pool.submit(_draw_into, plot, place)))
+        try:
+            yield
+        finally:
+            _ASIDE.reset(token)
+        for one in drawn:
+            one.result()
+
+
 def write_plot(plot: Plot, folder: Path) -> Figure:
     """Draw a plot into ``folder/figures``; return the report's figure with its files and data."""
     place = folder / "figures"
-    files = []
-    for form, content in _drawn(plot).items():
-        write_bytes(place / f"{plot.name}.{form}", content)
-        files.append(PurePosixPath("figures", f"{plot.name}.{form}"))
+    draw = _ASIDE.get() or _draw_into
+    draw(plot, place)
     write_text(place / f"{plot.name}.csv", data_of(plot))
     return Figure(
         name=plot.name,
         title=plot.title,
-        files=tuple(files),
+        files=tuple(PurePosixPath("figures", f"{plot.name}.{form}") for form in FORMS),
         caption=plot.caption,
         data=PurePosixPath("figures", f"{plot.name}.csv"),
         plot=plotly_of(plot),
         alternative=plot.alternative,
         paper=plot.paper,
     )
+
+
+def _draw_into(plot: Plot, place: Path) -> None:
+    for form, content in _drawn(plot).items():
+        write_bytes(place / f"{plot.name}.{form}", content)
 
 
 def data_of(plot: Plot) -> str:
@@ -174,15 +202,14 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
         single = 1.35 if columns == 1 else 1.0
         size = (columns * WIDTH * single, rows * (HEIGHT + tall) + 0.35)
-        canvas = Canvas(figsize=size, dpi=DPI, layout="constrained", facecolor="white")
+        canvas = Canvas(figsize=size, dpi=DPI, facecolor="white")
         FigureCanvasAgg(canvas)
         for k, panel in enumerate(plot.panels):
             _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
         _draw_legend(canvas)
-        canvas.draw_without_rendering()  # lays out the parts, once for all formats
-        canvas.set_layout_engine("none")
+        ConstrainedLayoutEngine().execute(canvas)  # once: a canvas would repeat it in each format
         contents = {}
-        for form in ("png", "svg", "pdf"):
+        for form in FORMS:
             buffer = io.BytesIO()
             canvas.savefig(buffer, format=form, metadata=_NO_DATE[form])
             contents[form] = buffer.getvalue()

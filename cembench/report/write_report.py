@@ -13,6 +13,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 from cembench.core import folders
@@ -23,15 +24,21 @@ from cembench.report.content.report import Progress, build_report
 from cembench.report.document import Report
 from cembench.report.export import export_rows
 from cembench.report.export_format import Format
+from cembench.report.plots import drawn_aside
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv
 
 
 def write_report(
-    run: Path, folder: Path, command: str, progress: Progress = lambda *_: None
+    run: Path,
+    folder: Path,
+    command: str,
+    progress: Progress = lambda *_: None,
+    *,
+    aside: bool = False,
 ) -> Report:
-    """Write the report of a run in all its forms.
+    """Write the report of a run in all its forms; with `aside`, another process draws its plots.
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -52,15 +59,16 @@ def write_report(
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
-            report = _write_all(evidence, draft, command, progress)
+            with drawn_aside() if aside else nullcontext():
+                report = build_report(evidence, draft, command, progress)
+            _write_all(report, evidence, draft)
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
     return report
 
 
-def _write_all(evidence: Evidence, folder: Path, command: str, progress: Progress) -> Report:
-    report = build_report(evidence, folder, command, progress)
+def _write_all(report: Report, evidence: Evidence, folder: Path) -> None:
     export_rows(list(evidence.rows.values()), folder / "records.csv", Format.csv)
     write_tables_csv(report, folder)
     write_markdown(report, folder)
@@ -68,4 +76,3 @@ def _write_all(evidence: Evidence, folder: Path, command: str, progress: Progres
     from cembench.report.render.html import write_html  # needs the extra
 
     write_html(report, folder)
-    return report

@@ -5,7 +5,7 @@ Each function answers a different question:
 - :func:`corrected`: verdicts of which *any* is wrong with probability at most 5 % (Holm).
 - :func:`sign_test`: whether one algorithm wins on more surfaces than chance allows.
 - :func:`average_interval`: how much an average would vary on other surfaces of this kind and in
-  other rounds.
+  other rounds; :func:`rate_interval` is that of an average speedup, if it has enough rounds.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import comb
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.results.comparison import Comparison
-from cembench.results.intervals import ERROR, LEVEL, Interval
+from cembench.results.intervals import DEFAULT_ROUNDS, ERROR, LEVEL, Interval
 
 #: Number of bootstrap draws of an average.
 DRAWS = 2000
@@ -111,3 +112,30 @@ def average_interval(
         figures[here] = np.median(values[drawn], axis=1)
     low, high = np.quantile(average(np.exp(figures)), [(1 - level) / 2, (1 + level) / 2])
     return Interval(float(low), float(high))
+
+
+def arithmetic(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the arithmetic means along the last axis, as the paper averages."""
+    mean: NDArray[np.float64] = ratios.mean(axis=-1)
+    return mean
+
+
+def geometric(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the geometric means along the last axis."""
+    mean: NDArray[np.float64] = np.exp(np.log(ratios).mean(axis=-1))
+    return mean
+
+
+def rate_interval(
+    surfaces: Sequence[Sequence[float]],
+    average: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+) -> Interval | None:
+    """Return the interval of an average rate of speedup, the average of t / t_CEM, minus one.
+
+    The arguments are those of :func:`average_interval`; None also if most surfaces have fewer
+    rounds than an interval of their own needs.
+    """
+    if not surfaces or median(map(len, surfaces)) < DEFAULT_ROUNDS:
+        return None
+    found = average_interval(surfaces, average)
+    return found and Interval(found.low - 1, found.high - 1)

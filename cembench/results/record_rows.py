@@ -92,6 +92,7 @@ def row(record: Record) -> dict[str, Any]:
         "status": outcome.status,
         "cause": outcome.cause,
         **outcome.metrics,
+        "folded_before_repair": outcome.folded_before_repair,
         "boundaries": [boundary.model_dump() for boundary in outcome.boundaries],
         "iterations": outcome.iterations,
         "seconds": outcome.median_seconds,

@@ -11,6 +11,8 @@ from cembench.report.document import (
     Claim,
     Column,
     Figure,
+    Finding,
+    Findings,
     Gallery,
     Gap,
     Report,
@@ -20,6 +22,7 @@ from cembench.report.document import (
     Value,
     missing,
 )
+from cembench.results.paper import CITATION
 
 ALGORITHMS = ("cem", "qiem", "fdm", "ldm")
 SURFACES = ("Foot", "Chinese Lion", "Bourbon Bottle")
@@ -78,7 +81,30 @@ def sample_report(folder):
             for k, s in enumerate(surfaces)
             for a in ALGORITHMS
         },
+        findings=Findings(
+            (
+                ("CEM against QIEM: printed 8.5; here 7.0.",),
+                ("Of 4 claims, 1 does not hold here: ", CLAIMS[2], "; 1 holds."),
+            ),
+            suspects=(f"FDM on {HOSTILE}: 70.3 degrees, the other algorithms' median is 2.4",),
+            table=_own(surfaces),
+            figures=(Finding("14 of 16", "cells ended with a valid map"),),
+        ),
+        paper=CITATION,
     )
+
+
+def _own(surfaces):
+    """A table of surfaces by two groups of algorithms."""
+    columns = (
+        Column("surface", numeric=False),
+        *(Column(a, group) for group in ("angle", "folds") for a in ALGORITHMS),
+    )
+    rows = tuple(
+        (Value(s), *(Value(f"{k + n}", k + n, "surface", _key(s, "cem")) for n in range(8)))
+        for k, s in enumerate(surfaces)
+    )
+    return Table("own", "All surfaces", columns, rows)
 
 
 def _key(surface, algorithm):

@@ -71,6 +71,7 @@ def ok(algorithm, mesh, seconds):
         metrics=all_metrics(mesh, found.uv),
         iterations=found.iterations,
         energy_history=found.energy_history,
+        extras=found.extras,
         peak_memory_bytes=10**8,
         memory_increase_bytes=10**7,
     )

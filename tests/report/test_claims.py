@@ -8,12 +8,20 @@ from cembench.surfaces.spherical_cap import spherical_cap
 from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.conformal.metrics import all_metrics, dilatations
 from cembench.registry import load_registry
-from cembench.report.content.claims import CLAIMS, claims, efficiency, iteration, premises, start
+from cembench.report.content.claims import (
+    CLAIMS,
+    accuracy,
+    claims,
+    efficiency,
+    iteration,
+    premises,
+    start,
+)
 from cembench.report.content.claims.premises import spectrum_of_iteration
 from cembench.report.content.claims.verdicts import verdict_of
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
-from cembench.results.records import Cell, Outcome, Record
+from cembench.results.records import Cell, Outcome, Record, Round
 from tests import gallery
 from tests.report.small_run import write_run
 
@@ -52,6 +60,27 @@ def test_every_claim_has_a_verdict_of_its_own_figures(found):
     assert found["circular-holes"].verdict == "not tested here"
 
 
+def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
+    clean = "Before the repair, 0 triangles are folded on 0 of 3 surfaces; in the maps that are "
+    assert found["no-folding"].figures.startswith(clean)
+    vase = next(s for s in evidence.surfaces if s.paper_row == "Chinese Vase")
+
+    def with_folds(record):
+        is_it = record.cell.mesh_hash == vase.mesh_hash and record.cell.algorithm == "cem"
+        extras = {"folded_before_repair": 119, "fold_repairs": 1} if is_it else {}
+        outcome = record.outcome.model_copy(update={"extras": record.outcome.extras | extras})
+        return record.model_copy(update={"outcome": outcome})
+
+    records = tuple(map(with_folds, evidence.records))
+    claim = accuracy.no_folding(replace(evidence, records=records), {})
+    told = f"119 triangles are folded on 1 of 3 surfaces ({vase.title}: 119)"
+    assert claim.figures == (
+        f"Before the repair, {told}; in the maps that are compared, 0 triangles are folded on 0 of "
+        "3 surfaces."
+    )
+    assert claim.verdict == "holds in part"
+
+
 def test_where_cem_is_always_faster_the_claim_holds(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     for record in store.records():
@@ -61,6 +90,71 @@ def test_where_cem_is_always_faster_the_claim_holds(tmp_path):
     assert claim.verdict == "holds"
     assert "None is a model of the paper itself" in claim.remark
     assert "this project's implementations" in claim.remark
+
+
+def with_seconds(evidence, seconds_of):
+    """The run's cells under "reuse" with other rounds; `seconds_of` takes a record."""
+    records = []
+    for record in evidence.records:
+        if record.outcome.rounds and record.cell.solves == "reuse":
+            rounds = tuple(Round(sitting="s", calls=(t,)) for t in seconds_of(record))
+            outcome = record.outcome.model_copy(update={"rounds": rounds})
+            records.append(record.model_copy(update={"outcome": outcome}))
+    return replace(evidence, records=tuple(records))
+
+
+#: Seconds of a round with which CEM is faster than all others.
+FASTER = {"cem": 1.0, "qiem": 8.0, "fdm": 18.0, "ldm": 5.0}
+
+
+def test_a_claim_on_speed_is_decided_on_the_surfaces_that_have_the_rounds(evidence):
+    """One round on one of two models, as where a budget ends, is counted and decides nothing."""
+    few = {"Chinese Vase": 1}
+
+    def seconds_of(record):
+        of = FASTER.get(record.cell.algorithm, 1.0)
+        return [of] * few.get(record.mesh.paper_row, 6)
+
+    claim = efficiency.always_faster(with_seconds(evidence, seconds_of), {})
+    assert claim.verdict == "holds"
+    assert "FDM: 1 of 1, lowest rate 17.00, sign test over surfaces p = 1" in claim.figures
+    assert claim.figures.count("; too few rounds on 1 more") == 2  # QIEM failed there
+    average = efficiency.average_rates(with_seconds(evidence, seconds_of), {})
+    assert average.verdict == "holds in part"  # 7 for QIEM, where 8.5 is stated
+    assert "FDM: mean 17.0, geometric 17.0 (n = 1; too few rounds on 1 more)" in average.figures
+    few["Liu's Neutral Face"] = 5
+    none = efficiency.always_faster(with_seconds(evidence, seconds_of), {})
+    assert none.verdict == "too few rounds"
+    assert "FDM: 0 of 0; too few rounds on 2" in none.figures
+
+
+def test_a_surface_on_which_the_interval_holds_equal_times_does_not_support_the_claim(evidence):
+    def seconds_of(record):
+        of = FASTER.get(record.cell.algorithm, 1.0)
+        shaky = record.cell.algorithm == "ldm" and record.mesh.paper_row == "Chinese Vase"
+        return [1.1, 1.2, 0.5, 1.3, 0.6, 1.4, 1.2] if shaky else [of] * 7
+
+    claim = efficiency.always_faster(with_seconds(evidence, seconds_of), {})
+    assert claim.verdict == "holds in part"
+    assert "LDM: 1 of 2, lowest rate 0.20" in claim.figures
+    assert "too few rounds" not in claim.figures
+
+
+def test_seconds_on_large_surfaces_need_rounds_too(evidence):
+    def large(rounds):
+        def seconds_of(record):
+            return [0.5] * rounds[record.mesh.paper_row]
+
+        few = with_seconds(evidence, seconds_of)
+        grown = [r.model_copy(update={"mesh": r.mesh.model_copy(update={"faces": 200_000})})
+                 for r in few.records]  # fmt: skip
+        return efficiency.less_than_one_second(replace(few, records=tuple(grown)), {})
+
+    some = large({"Chinese Vase": 1, "Liu's Neutral Face": 6, "": 1})
+    assert some.verdict == "holds"
+    assert some.figures.endswith("with 200,000: 0.500 s; too few rounds on 2 more.")
+    none = large({"Chinese Vase": 1, "Liu's Neutral Face": 1, "": 1})
+    assert none.verdict == "too few rounds"
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """What the head of a report says of a run."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -15,6 +16,10 @@ from cembench.report.content.claims.efficiency import (
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.figures.performance_profile import shown_series
 from cembench.report.content.findings import findings
+from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
+from cembench.report.content.report import is_of_the_paper
+from cembench.report.document import VERDICTS, Claim, plain
+from cembench.results import paper
 from tests.report.small_run import write_run
 
 
@@ -37,10 +42,14 @@ def without(evidence, dropped):
     return Evidence(evidence.store, kept, evidence.exhibits)
 
 
+def words_of(found):
+    return [plain(sentence) for sentence in found.sentences]
+
+
 def test_the_fastest_is_named_among_maps_as_good_with_an_interval(evidence):
     on_one = without(evidence, lambda r: r.mesh.paper_row != "Liu's Neutral Face")
     found = findings(on_one, {}, [])
-    assert found.sentence.startswith("On one surface, of ")
+    assert words_of(found)[0].startswith("On one surface, ")
     times, angles, ended = found.figures
     # Invented seconds are equal in all rounds: the interval is the figure itself.
     interval = times.words.rpartition("95 % interval ")[2]
@@ -53,28 +62,186 @@ def test_the_fastest_is_named_among_maps_as_good_with_an_interval(evidence):
 
 def test_of_few_rounds_no_winner_is_named(evidence):
     def first_round(record):
-        outcome = replace_rounds(record.outcome)
+        outcome = record.outcome.model_copy(update={"rounds": record.outcome.rounds[:1]})
         return record.model_copy(update={"outcome": outcome})
-
-    def replace_rounds(outcome):
-        return outcome.model_copy(update={"rounds": outcome.rounds[:1]})
 
     on_one = without(evidence, lambda r: r.mesh.paper_row != "Liu's Neutral Face")
     few = replace(on_one, records=tuple(map(first_round, on_one.records)))
     found = findings(few, {}, [])
-    assert "these rounds do not show which of the two" in found.sentence
+    assert any("these rounds do not show which of the two" in words for words in words_of(found))
     assert "1 round: too few for an interval" in found.figures[0].words
     timed = (always_faster, average_rates, average_savings, more_than_80_percent)
     tested = [claim(few, {}) for claim in (*timed, table_2_follows)]
     verdicts = [claim.verdict for claim in tested]
     assert verdicts[:4] == ["too few rounds"] * 4
     assert verdicts[4] != "too few rounds"  # of the printed tables alone
-    assert "4 have too few rounds" in findings(few, {}, tested).figures[-1].words
+    assert "4 have too few rounds" in words_of(findings(few, {}, tested))[1]
 
 
-def test_a_run_in_which_nothing_ended_ok_has_no_findings(evidence):
+def test_a_run_in_which_nothing_ended_ok_names_nobody(evidence):
     failed = without(evidence, lambda r: r.outcome.status == "ok")
-    assert findings(failed, {}, []) is None
+    found = findings(failed, {}, [])
+    assert words_of(found) == ["No map to the disk to compare."]
+    assert [figure.number for figure in found.figures] == [f"0 of {len(failed.records)}"]
+
+
+def claim_with(verdict, name):
+    return Claim(name, "sentence", "place", "test", "figures", verdict)
+
+
+def test_all_verdicts_are_counted_failing_ones_first_and_linked():
+    verdicts = ["holds", "too few rounds", "holds in part", "holds", "not tested here"]
+    claims = [claim_with(v, f"a-{k}") for k, v in enumerate([*verdicts, "does not hold here"])]
+    counted = verdicts_counted(claims)
+    assert plain(counted) == (
+        "Of 6 claims of the paper, 1 does not hold here: a 5; 1 holds in part: a 2; 2 hold; "
+        "1 has too few rounds; 1 is not tested here."
+    )
+    assert [part for part in counted if isinstance(part, Claim)] == [claims[5], claims[2]]
+    every = [claim_with(v, f"{v}-{k}") for v in VERDICTS for k in range(3)]
+    numbers = re.findall(r"(\d+) (?:do|hold|have|are)", plain(verdicts_counted(every)))
+    assert sum(map(int, numbers)) == len(every)
+
+
+def test_the_papers_own_claim_stands_beside_what_was_measured(evidence):
+    told = claim_of_the_paper(evidence)
+    # Invented: QIEM takes 8 s on one model, FDM 3 and 6, LDM 0.5 and 1; CEM 1, as `backslash` 2.
+    assert told.startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; here ")
+    rates = re.findall(r"(-?\d+\.\d)(?:, | \()", told.partition("here ")[2])
+    assert list(map(float, rates)) == pytest.approx([7, 3.5, -0.25, 3, 1.25, -0.625], abs=0.06)
+    assert 0 < told.index("(reuse)") < told.index("(backslash)")
+    assert told.endswith("here over 2 stand-ins, too few for an interval (6 rounds on 6 models).")
+
+
+def test_the_papers_own_claim_has_intervals_over_enough_models(evidence):
+    def on(record, k, model):
+        cell = record.cell.model_copy(update={"mesh": model, "mesh_hash": model})
+        facts = record.mesh.model_copy(update={"paper_row": model, "origin": "model"})
+        slow = k if cell.algorithm == "fdm" else 1
+        rounds = tuple(
+            r.model_copy(update={"calls": (slow * r.seconds,)}) for r in record.outcome.rounds
+        )
+        outcome = record.outcome.model_copy(update={"rounds": rounds})
+        return record.model_copy(update={"cell": cell, "mesh": facts, "outcome": outcome})
+
+    vase = without(evidence, lambda r: r.mesh.paper_row != "Chinese Vase")
+    records = [r for r in vase.records if r.cell.solves == "reuse" and r.outcome.status == "ok"]
+    models = list(paper.table(1))[:6]
+    six = tuple(on(r, 1 + k / 10, model) for k, model in enumerate(models) for r in records)
+    told = claim_of_the_paper(replace(evidence, records=six))
+    mean, low, high = re.search(r"here not measured, (\S+) \((\S+) to (\S+)\), -0.5", told).groups()
+    assert float(mean) == pytest.approx(2.75, abs=0.06)
+    assert float(low) < float(mean) < float(high)
+    assert told.endswith("here over 6 of its models, with 95 % intervals over models and rounds.")
+
+
+def with_angles(evidence, **angles):
+    """A run over surfaces of the user's own, with these mean angle errors; None: no valid map."""
+    ended = [r for r in evidence.records if r.outcome.status == "ok" and r.cell.solves == "reuse"]
+    known = {r.cell.algorithm: r for r in ended}
+    records = []
+    for name, errors in angles.items():
+        base = known[name.replace("_", "-")]
+        for k, error in enumerate(errors):
+            cell = base.cell.model_copy(update={"mesh": f"mine-{k}", "mesh_hash": f"{k}"})
+            facts = base.mesh.model_copy(update={"paper_row": "", "origin": "surface"})
+            metrics = base.outcome.metrics | {"angle_error_mean_deg": error}
+            status = {"status": "ok" if error else "failed", "metrics": metrics}
+            outcome = base.outcome.model_copy(update=status)
+            update = {"cell": cell, "mesh": facts, "outcome": outcome}
+            records.append(base.model_copy(update=update))
+    return replace(evidence, records=tuple(records), exhibits=())
+
+
+#: CEM beside another: lower on one of nine surfaces, within 1 % on five, median ratio 1.009.
+NEARLY = [0.94, 1.004, 1.006, 1.008, 1.009, 1.015, 1.02, 1.02, 1.03]
+
+
+def test_smallest_is_said_only_of_an_interval_without_one(evidence):
+    head, counts, *_ = words_of(findings(with_angles(evidence, cem=NEARLY, fdm=[1.0] * 9), {}, []))
+    assert head.startswith("On 9 surfaces, FDM and CEM have equally good angle errors; CEM's are ")
+    assert "median 1.009)" in head
+    assert (
+        "CEM has the smallest angle errors on 1 of 9 surfaces and is within 1 % of the best on 5"
+        in counts
+    )
+    worse = with_angles(evidence, cem=[1.1 + k / 100 for k in range(9)], fdm=[1.0] * 9)
+    head = words_of(findings(worse, {}, []))[0]
+    assert head.startswith(
+        "On 9 surfaces, FDM has the smallest angle errors; CEM's are 1.140 times "
+    )
+    low, high = re.search(r"over surfaces (\S+) to (\S+);", head).groups()
+    assert 1.1 < float(low) < 1.14 < float(high) < 1.18
+
+
+def test_an_algorithm_with_one_wrecked_map_is_not_shown_to_be_worse(evidence):
+    wrecked = {"fdm": [1.0] * 9, "cem": [1.14] * 9, "ldm": [1.0] * 8 + [30.0]}
+    found = findings(with_angles(evidence, **wrecked), {}, [])
+    assert words_of(found)[0].startswith(
+        "On 9 surfaces, FDM has the smallest angle errors (not decided against LDM); CEM's are "
+    )
+    assert found.suspects == ("LDM on mine-8: 30 degrees, the other algorithms' median is 1.07",)
+
+
+def test_few_surfaces_have_no_interval_and_nobody_is_the_best(evidence):
+    head = words_of(findings(with_angles(evidence, cem=[1.1] * 5, fdm=[1.0] * 5), {}, []))[0]
+    assert "equally good" in head
+    assert "too few surfaces for an interval" in head
+    far = words_of(findings(with_angles(evidence, cem=[3.0] * 5, fdm=[1.0] * 5), {}, []))
+    assert far[0].startswith("On 5 surfaces, FDM has the lowest angle errors on average; ")
+    assert far[2].startswith("No two algorithms have angle errors of at most 1.25 times")
+
+
+def test_an_algorithm_without_most_maps_is_left_out_and_named(evidence):
+    gaps = with_angles(evidence, cem=[1.0] * 8 + [None], fdm=[1.0] * 9, ldm=[1.0] * 9)
+    head = words_of(findings(gaps, {}, []))[0]
+    assert head.startswith("On 9 surfaces, FDM and LDM have ")
+    assert head.endswith("Left out, with too few maps: CEM.")
+
+
+def test_the_table_of_the_own_surfaces_has_a_row_each_and_gaps_with_a_cause(evidence):
+    run = with_angles(evidence, cem=[1.5, None], lscm=[1.25, 2.0])
+    table = findings(run, {}, []).table
+    heads = [(column.group, column.title) for column in table.columns[2:]]
+    assert heads[:2] == [
+        ("mean angle error, degrees", "CEM"),
+        ("mean angle error, degrees", "LSCM *"),
+    ]
+    assert list(dict(heads)) == ["mean angle error, degrees", "E_C", "seconds", "folds"]
+    assert [row[0].text for row in table.rows] == ["mine-0", "mine-1"]
+    assert [value.number for value in table.rows[0][2:4]] == [1.5, 1.25]
+    assert table.rows[1][2].text == "failed"
+    assert any("does not map to the disk" in note for note in table.notes)
+
+
+@pytest.mark.parametrize(
+    ("models", "stand_ins", "others", "of_paper"),
+    [
+        (4, 0, 5, False),
+        (8, 0, 1, False),
+        (2, 0, 0, True),
+        (0, 2, 1, True),
+        (3, 17, 1, True),
+        (1, 1, 2, False),
+        (7, 20, 0, True),
+    ],
+)
+def test_a_run_is_of_the_paper_or_of_the_users_own_surfaces(
+    evidence, models, stand_ins, others, of_paper
+):
+    surfaces = with_angles(evidence, cem=[1.0] * (models + stand_ins + others)).records
+    origins = ["model"] * models + ["stand-in"] * stand_ins + ["surface"] * others
+    records = tuple(
+        record.model_copy(
+            update={
+                "mesh": record.mesh.model_copy(
+                    update={"origin": o, "paper_row": "" if o == "surface" else "Foot"}
+                )
+            }
+        )
+        for record, o in zip(surfaces, origins, strict=True)
+    )
+    assert is_of_the_paper(replace(evidence, records=records)) is of_paper
 
 
 def test_variants_tried_on_fewer_surfaces_are_left_out_of_a_profile(tmp_path):
@@ -90,8 +257,6 @@ def test_variants_tried_on_fewer_surfaces_are_left_out_of_a_profile(tmp_path):
 
 def test_the_head_says_how_many_times_are_unstable(evidence):
     timed = sum(bool(record.outcome.rounds) for record in evidence.records)
-    assert f" of {timed} times " in findings(evidence, {}, []).sentence
-    assert (
-        " unstable (95 % interval wider than 10% of the figure)"
-        in findings(evidence, {}, []).sentence
-    )
+    last = words_of(findings(evidence, {}, []))[-1]
+    assert f" of {timed} times " in last
+    assert " unstable (95 % interval wider than 10% of the figure)" in last

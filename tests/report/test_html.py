@@ -22,6 +22,7 @@ from cembench.report.document import Column, Figure, Report, Section, Table, Tex
 from cembench.report.pictures import with_transparent_background
 from cembench.report.render import html
 from cembench.report.render.html import write_html
+from cembench.results.paper import CITATION
 from tests.report.sample_report import HOSTILE, sample_report
 
 VOID = {"meta", "link", "img", "br"}
@@ -81,7 +82,8 @@ def test_it_is_one_file_that_names_no_other_place(sample):
         assert element.get("src", "data:").startswith("data:")
         target = element.get("href", "#")
         beside = "class" in element and element["class"] == "beside"
-        assert target.startswith(("#", "data:")) or (beside and "://" not in target)
+        cited = target == CITATION.address  # a link; nothing is loaded from there
+        assert target.startswith(("#", "data:")) or cited or (beside and "://" not in target)
 
 
 def test_its_policy_lets_only_its_own_scripts_run_and_no_request_leave(sample):
@@ -103,6 +105,17 @@ def test_every_link_within_leads_somewhere_and_no_anchor_stands_twice(sample):
     inner = {e["href"][1:] for e in sample.all("a") if e["href"].startswith("#")}
     assert inner <= set(anchors)
     assert any(name.startswith("record-") for name in inner)
+
+
+def test_the_head_has_the_paper_the_verdicts_linked_the_suspects_and_the_own_table(sample):
+    (about,) = sample.all("p", **{"class": "about"})
+    assert all(part in about["words"] for part in (CITATION.authors, CITATION.title, CITATION.doi))
+    (head,) = sample.all("div", **{"class": "findings"})
+    order = ("printed 8.5", "1 does not hold here: claim 2; 1 holds.", "70.3", "All surfaces", "14")
+    places = [head["words"].index(words) for words in order]
+    assert places == sorted(places)
+    (link,) = sample.all("a", href="#claim-2")
+    assert link["words"] == "claim 2"
 
 
 def test_it_has_a_language_a_title_and_words_for_every_picture(sample):

@@ -4,7 +4,8 @@ import subprocess
 import pytest
 
 from cembench.report.document import Column, Table, Value, tables_of
-from cembench.report.render.latex import escape, table_lines
+from cembench.report.render.latex import escape, table_lines, write_latex
+from tests.report.sample_report import sample_report
 
 PDFLATEX = shutil.which("pdflatex")
 needs_latex = pytest.mark.skipif(not PDFLATEX, reason="pdflatex is not installed")
@@ -44,6 +45,31 @@ def test_a_long_table_is_continued():
     text = "\n".join(table_lines(Table("long", "Long", (Column("k"),), rows)))
     assert text.count(r"\begin{table}") == 3
     assert text.count(r"\label{tab:long}") == 1
+
+
+def test_a_wide_table_is_continued_after_a_group_with_its_first_columns():
+    groups = [(group, a) for group in ("angle", "E", "seconds") for a in "abcdefgh"]
+    columns = (Column("surface", numeric=False), *(Column(a, group) for group, a in groups))
+    row = (Value("Foot"), *(Value(f"{k}", k) for k in range(24)))
+    lines = table_lines(Table("wide", "Wide", columns, (row,), "Once."))
+    rows = [line for line in lines if line.startswith("Foot")]
+    assert rows == [
+        f"Foot & {' & '.join(map(str, part))} \\\\" for part in (range(16), range(16, 24))
+    ]
+    assert "\n".join(lines).count("Once.") == 1
+    assert "\n".join(lines).count(r"\label{tab:wide}") == 1
+
+
+def test_the_head_has_the_paper_and_links_to_claims(tmp_path):
+    report = sample_report(tmp_path)
+    text = write_latex(report, tmp_path).read_text()
+    assert rf"\href{{{report.paper.address}}}{{doi:{report.paper.doi}}}" in text
+    assert r"1 does not hold here: \hyperlink{claim:claim-2}{claim 2}; 1 holds." in text
+    assert r"\hypertarget{claim:claim-2}{}" in text
+    assert (
+        text.index(r"\input{tables/own}") < text.index("14 of 16") < text.index(r"\tableofcontents")
+    )
+    assert (tmp_path / "tables" / "own.tex").is_file()
 
 
 @needs_latex

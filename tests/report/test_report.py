@@ -8,6 +8,8 @@ import pytest
 from rich.console import Console
 
 from cembench.core.errors import RecordError
+from cembench.report import plots
+from cembench.report.content import inspection
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import facts
 from cembench.report.document import (
@@ -15,13 +17,16 @@ from cembench.report.document import (
     Gap,
     Table,
     figures_of,
+    plain,
     sections_of,
     tables_of,
 )
 from cembench.report.render.terminal_report import paper_tables
 from cembench.report.write_report import write_report
 from cembench.results.merging import merge
+from cembench.results.paper import CITATION
 from cembench.results.store import Store
+from tests.limits import tree
 from tests.report.small_run import write_run
 
 
@@ -52,7 +57,7 @@ def test_the_papers_figures_are_there_or_a_gap_names_the_command(written):
     for k in range(1, 15):
         assert f"Figure {k}" in there or f"Figure {k}" in gaps
     assert {"Figure 1", "Figure 3", "Figure 8", "Figure 9", "Figure 12"} <= there
-    assert "cembench run --surfaces left-hand -a cem" in gaps["Figure 2"].command
+    assert "cembench run --surfaces left-hand-stand-in -a cem" in gaps["Figure 2"].command
     assert gaps["Figure 13"].command.startswith("cembench morph --run ")
 
 
@@ -94,10 +99,34 @@ def test_links_of_the_markdown_lead_somewhere(written):
     _, folder = written
     records = (folder / "records.md").read_text()
     for page in [folder / "report.md", *(folder / "pages").iterdir()]:
-        for target in re.findall(r"\]\(([^)]+)\)", page.read_text()):
+        text = page.read_text()
+        for target in re.findall(r"\]\(([^)]+)\)", text):
             path, _, anchor = target.partition("#")
-            assert (page.parent / path).is_file(), (page, target)
-            assert not anchor or f'<a id="{anchor}">' in records
+            if path == CITATION.address:
+                continue
+            assert not path or (page.parent / path).is_file(), (page, target)
+            assert not anchor or f'<a id="{anchor}">' in (records if path else text)
+
+
+def test_the_first_screen_of_every_form_has_the_paper_and_all_verdicts(written):
+    report, folder = written
+    claims = items_of(report, Claim)
+    counted = plain(report.findings.sentences[1])
+    numbers = [int(number) for number in re.findall(r"\b\d+\b(?= (?:do|hold|ha|is|are))", counted)]
+    assert counted.startswith(f"Of {len(claims)} claims of the paper, ")
+    assert sum(numbers) == len(claims)
+    assert report.findings.table is None
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(paper_tables(report))
+    forms = [(folder / name).read_text() for name in ("index.html", "report.md", "report.tex")]
+    for text in (console.export_text(), *forms):
+        head = " ".join(text.split())
+        assert CITATION.authors in head
+        assert f"doi:{CITATION.doi}" in head
+        assert "CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; here " in head
+        assert f"Of {len(claims)} claims of the paper, " in head
+    failing = next(part for part in report.findings.sentences[1] if isinstance(part, Claim))
+    assert f'<a href="#{failing.name}">{failing.title}</a>' in forms[0]
 
 
 def test_the_terminal_shows_four_tables_in_80_columns(written):
@@ -156,12 +185,21 @@ def test_a_run_of_other_surfaces_alone_has_a_report(tmp_path):
     assert {section.name for section in report.sections} == {"summary", "results", "surfaces"}
     assert not list(items_of(report, Gap))
     assert not list(items_of(report, Claim))
+    assert report.paper is None
+    assert report.findings.table.name == "own-surfaces"
+    assert (
+        "| surface | faces | mean angle error, degrees QIEM |"
+        in ((tmp_path / "out" / "report.md").read_text().partition("## Results")[0])
+    )
     tables = list(items_of(report, Table))
     assert not any(column.title == "printed" for table in tables for column in table.columns)
     assert "cells ended with a valid map" in report.findings.figures[-1].words
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(paper_tables(report))
-    assert "flat-disk" in console.export_text()
+    text = console.export_text()
+    assert max(map(len, text.splitlines())) <= 80
+    assert any(line.split()[:2] == ["flat-disk", "QIEM"] for line in text.splitlines())
+    assert re.search(r"^ +FDM +timeout +timeout +timeout +timeout", text, re.M)
 
 
 def test_no_run_and_no_record_are_errors_and_nothing_is_written(cli):
@@ -201,7 +239,11 @@ def test_the_verb_says_where_the_report_is(cli, small_run):
     assert (cli.folder / found["html"]).is_file()
     assert found["claims"]["delaunay"] == "holds"
     assert "table-4" in found["tables"]
-    assert "[1/5] surface Chinese Vase" in err
+    assert found["paper"]["doi"] == CITATION.doi
+    assert found["findings"][0].startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; ")
+    assert sum(found["verdicts"].values()) == len(found["claims"])
+    assert next(iter(found["verdicts"])) == "does not hold here"
+    assert "[1/4] surface Chinese Vase" in err
 
 
 def test_of_a_cell_measured_twice_the_later_record_counts(tmp_path):
@@ -233,6 +275,50 @@ def test_other_parameters_are_a_series_of_their_own(tmp_path):
     assert evidence.series_of("cem").label == "CEM"
 
 
+def fdm_record(store, mesh_name, origin, public_program):
+    """Save FDM's record on a surface of this origin with this reading; return its key."""
+    old = next(r for r in store.records() if r.cell.algorithm == "fdm")
+    parameters = {"public_program": public_program, "tolerance": 1e-5}
+    cell = old.cell.model_copy(
+        update={"mesh": mesh_name, "mesh_hash": mesh_name, "parameters": parameters}
+    )
+    facts = old.mesh.model_copy(update={"origin": origin})
+    store.save(old.model_copy(update={"cell": cell, "mesh": facts}), None, {"id": "machine"})
+    return cell.key
+
+
+def labels_of(store):
+    """The label of the series of each cell of FDM that has parameters."""
+    evidence = Evidence.of(store.folder)
+    found = {}
+    for surface in evidence.surfaces:
+        for series in evidence.series:
+            record = evidence.find(surface, series) if series.algorithm == "fdm" else None
+            if record is not None and record.cell.parameters:
+                found[record.cell.key] = dict(series.variant)["public_program"]
+    return found
+
+
+def test_a_model_run_as_printed_is_in_the_column_of_the_other_surfaces(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    model = fdm_record(store, "own", "model", public_program=True)
+    other = fdm_record(store, "other", "stand-in", public_program=False)
+    assert labels_of(store) == {model: "False", other: "False"}
+
+
+def test_both_readings_on_a_model_are_two_columns(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    public = fdm_record(store, "own", "model", public_program=True)
+    corrected = fdm_record(store, "own", "model", public_program=False)
+    assert labels_of(store) == {public: "True", corrected: "False"}
+
+
+def test_a_reading_asked_for_everywhere_is_one_column(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    keys = [fdm_record(store, o, o, public_program=True) for o in ("model", "stand-in")]
+    assert labels_of(store) == dict.fromkeys(keys, "True")
+
+
 def test_a_store_keeps_surfaces_and_knows_a_wrong_one(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     record = store.records()[0]
@@ -255,15 +341,13 @@ def test_runs_that_are_merged_bring_their_surfaces(tmp_path):
     assert sorted(p.name for p in (tmp_path / "both" / "meshes").iterdir()) == sorted(names)
 
 
-@pytest.mark.usefixtures("quick_drawing")
-def test_reproduce_is_a_run_and_its_report(cli, monkeypatch):
-    monkeypatch.setattr("cembench.results.paper.profiles.surfaces_of", lambda *_: ["nefertiti"])
-    code, out, _ = cli("reproduce", "-o", "here")
-    assert code == 0
-    assert all(f"Table {k}: " in out for k in (1, 2, 3, 4))
-    assert max(map(len, out.splitlines()[:-1])) <= 80
-    assert out.splitlines()[-1] == f"Report: {cli.folder / 'here/report/index.html'}"
-    assert (cli.folder / "here/report/report.tex").is_file()
+def test_another_process_draws_the_same_plots(small_run, written, monkeypatch, tmp_path):
+    drawn = []
+    monkeypatch.setattr(plots, "_drawn", lambda plot: drawn.append(plot))
+    monkeypatch.setattr(inspection, "SIDE", 48)
+    write_report(small_run, tmp_path / "report", "cembench report run", aside=True)
+    assert tree(tmp_path / "report") == tree(written[1])
+    assert drawn == []
 
 
 def test_the_head_says_until_when_it_was_measured(evidence):

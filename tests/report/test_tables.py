@@ -91,6 +91,12 @@ def test_a_surface_page_compares_disks_in_a_common_gauge_and_gives_free_boundari
     assert energies["CEM"].number > 0
 
 
+def test_a_surface_page_has_the_folds_before_the_repair(evidence):
+    table = figures_table(evidence, evidence.surfaces[0], "here")
+    column = [c.title for c in table.columns].index("folds before")
+    assert {row[column].text for row in table.rows if row[2].text == "ok"} == {"0"}
+
+
 def test_a_record_older_than_a_figure_has_a_gap_there(evidence):
     record = next(r for r in evidence.records if r.outcome.status == "ok")
     kept = dict(record.outcome.metrics)
@@ -235,3 +241,4 @@ def test_how_sure_the_speedups_are_alone_together_and_over_surfaces(evidence):
     assert by_title["over surfaces", "sign test"][place].number == 2 * 0.5**surfaces
     assert by_title["over surfaces", "95 % interval"][place].why == "fewer than 6 surfaces"
     assert "Holm" in table.caption
+    assert "written to deceive is not detected" in table.caption

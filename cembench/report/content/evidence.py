@@ -23,6 +23,7 @@ from cembench.results import record_rows as frame
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
+from cembench.results.paper.profiles import as_elsewhere
 from cembench.results.records import Cell, MeshOrigin, Record
 from cembench.results.store import Store
 
@@ -179,9 +180,9 @@ class Evidence:
         parameters: dict[tuple[str, Variant], Mapping[str, Any]] = {}
         for record in self.records:
             name = record.cell.algorithm
-            choice = _variant(record.cell)
+            choice = self._variants[record.cell.key]
             variants.setdefault(name, Counter())[choice] += 1
-            parameters[name, choice] = record.cell.parameters
+            parameters.setdefault((name, choice), record.cell.parameters)
             about[name] = record
         titles = Counter(record.title for record in about.values())
         found = []
@@ -206,9 +207,32 @@ class Evidence:
     @cached_property
     def _index(self) -> dict[tuple[str, str, Variant, str], Record]:
         return {
-            (r.cell.mesh_hash, r.cell.algorithm, _variant(r.cell), r.cell.solves): r
+            (r.cell.mesh_hash, r.cell.algorithm, self._variants[r.cell.key], r.cell.solves): r
             for r in self.records
         }
+
+    @cached_property
+    def _variants(self) -> dict[str, Variant]:
+        """The choice of parameters of each cell, by its key.
+
+        A cell on a model of the paper with the parameters as printed belongs to the series that
+        other surfaces have with the usual ones, unless the run has that choice there too.
+        """
+        given = {r.cell.key: _variant(r.cell, r.cell.parameters) for r in self.records}
+        chosen = {
+            (r.cell.algorithm, given[r.cell.key], m)
+            for r in self.records
+            for m in (r.cell.mesh_hash, r.mesh.origin)
+        }
+        found = {}
+        for r in self.records:
+            name, own = r.cell.algorithm, given[r.cell.key]
+            usual = _variant(r.cell, as_elsewhere(name, r.cell.parameters))
+            separate = (name, usual, r.cell.mesh_hash) in chosen or any(
+                (name, own, origin) in chosen for origin in ("stand-in", "surface")
+            )
+            found[r.cell.key] = own if r.mesh.origin != "model" or separate else usual
+        return found
 
     @cached_property
     def styles(self) -> dict[str, SeriesStyle]:
@@ -316,8 +340,8 @@ def _place(algorithm: str) -> int:
     return paper.ALGORITHMS.index(algorithm) if known else len(paper.ALGORITHMS)
 
 
-def _variant(cell: Cell) -> Variant:
-    chosen = [(name, str(value)) for name, value in sorted(cell.parameters.items())]
+def _variant(cell: Cell, parameters: Mapping[str, Any]) -> Variant:
+    chosen = [(name, str(value)) for name, value in sorted(parameters.items())]
     return (*chosen, ("backend", cell.backend), ("threads", str(cell.threads)))
 
 
@@ -331,7 +355,7 @@ def _latest(records: Sequence[Record]) -> list[Record]:
     best: dict[tuple[str, str, Variant, str], Record] = {}
     for record in records:
         cell = record.cell
-        key = (cell.mesh_hash, cell.algorithm, _variant(cell), cell.solves)
+        key = (cell.mesh_hash, cell.algorithm, _variant(cell, cell.parameters), cell.solves)
         rank = (record.outcome.status == "ok", record.started_at)
         if key not in best or (best[key].outcome.status == "ok", best[key].started_at) < rank:
             best[key] = record

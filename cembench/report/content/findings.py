@@ -1,139 +1,161 @@
-"""The findings at the head of a report: one sentence and three figures."""
+"""The findings at the head of a report: sentences, suspect maps and key figures."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import exp, log
 
-import numpy as np
-
-from cembench.report.content.as_good import as_good
-from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
+from cembench.report.content.as_good import AS_GOOD, DEGREES
+from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
-from cembench.report.document import Claim, Figure, Finding, Findings
-from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
-from cembench.results.records import Record
+from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
+from cembench.report.content.own_table import own_table
+from cembench.report.content.standings import (
+    NEAR,
+    AngleRatio,
+    Field,
+    Standing,
+    compare_angles,
+    compare_seconds,
+    field_of,
+    listed,
+)
+from cembench.report.document import Claim, Figure, Finding, Findings, Sentence
+from cembench.results.comparison import Comparison
+from cembench.results.outliers import outlier_lines
+from cembench.results.paper import ALGORITHMS
 from cembench.results.stability import stability_words
-
-
-@dataclass(frozen=True)
-class _Standing:
-    """An algorithm that mapped every surface, with its seconds and angle errors by surface."""
-
-    series: AlgorithmSeries
-    records: tuple[Record, ...]
-
-    @property
-    def seconds(self) -> float:
-        return exp(float(np.mean([log(r.outcome.median_seconds or 1.0) for r in self.records])))
-
-    @property
-    def angles(self) -> list[float]:
-        return [float(r.outcome.metrics["angle_error_mean_deg"] or np.inf) for r in self.records]
-
-    @property
-    def angle(self) -> float:
-        return float(np.mean(self.angles))
 
 
 def findings(
     evidence: Evidence, inspections: Mapping[str, Inspection], claims: Sequence[Claim]
-) -> Findings | None:
-    """Return the fastest of the equally good algorithms, the best angles, and the success.
+) -> Findings:
+    """Return the head of a report.
 
-    Only maps to the disk under the run's first policy are compared, on the surfaces that all of the
-    algorithms mapped. None if nothing ended ok.
+    With `claims`, those of the paper, it opens with the paper's own claim and all verdicts.
+    Without, the run is over the user's own surfaces: it has their table. Then, for maps to the disk
+    under the run's first policy: whose angle errors are the smallest, and who is the fastest of
+    those that are as good.
     """
-    standings, n = _standings(evidence)
-    if not standings:
-        return None
-    best = min(standings, key=lambda s: s.angle)
-    good = [s for s in standings if as_good(s.angles, _best_angles(standings))] or [best]
-    ranked = sorted(good, key=lambda s: s.seconds)
-    on = "one surface" if n == 1 else f"{n} surfaces"
+    field = field_of(evidence, evidence.policies[0])
+    sentences: list[Sentence] = []
+    if claims:
+        sentences = [(claim_of_the_paper(evidence),), verdicts_counted(claims)]
+    told = field_words(field) if field else ["No map to the disk to compare."]
+    if claims and field:
+        told[0] = _beside_the_paper(field, told[0])
+    told.append(stability_words(evidence.records))
+    sentences += [(words,) for words in told if words]
+    best = field.standings[0].label if field else REFERENCE
+    return Findings(
+        tuple(sentences),
+        tuple(outlier_lines(evidence.records)),
+        None if claims else own_table(evidence),
+        (*(field_figures(field) if field else ()), _ended(evidence)),
+        _picture(evidence, inspections, best),
+    )
+
+
+def _beside_the_paper(field: Field, sentence: str) -> str:
+    """Return a sentence with the algorithms that are not in the paper in front, if any."""
+    extra = [s.label for s in field.standings if s.series.algorithm not in ALGORITHMS]
+    if not extra:
+        return sentence
+    are = "is" if len(extra) == 1 else "are"
+    start = f"With {listed(extra)}, which {are} not in the paper: "
+    return start + sentence[0].lower() + sentence[1:]
+
+
+def field_words(field: Field) -> list[str]:
+    """Return sentences on whose angle errors are the smallest, and who is the fastest."""
+    best, *others = field.standings
+    out = f" Left out, with too few maps: {listed(field.left_out)}." if field.left_out else ""
+    if not others:
+        return [f"Only {best.label} mapped {_on(field)}: there is nothing to compare it with.{out}"]
+    counts = [f"{_counts(field, best, others[0])}."] if field.n > 1 else []
+    return [_angles(field, best, others) + out, *counts, _fastest(field)]
+
+
+def _on(field: Field) -> str:
+    if field.n < field.surfaces:
+        return f"the {field.n} of {field.surfaces} surfaces that all of them mapped"
+    return "one surface" if field.n == 1 else f"{field.n} surfaces"
+
+
+def _angles(field: Field, best: Standing, others: Sequence[Standing]) -> str:
+    """Return a sentence that names the smallest angle errors, or those that are as good."""
+    second = others[0]
+    found = compare_angles(second, best)
+    unsure = [s for s in others if not compare_angles(s, best).is_sure]
+    equal = [s for s in unsure if s in field.good]
+    if found.is_sure:
+        head = f"{best.label} has the smallest angle errors"
+        if unsure:
+            head += f" (not decided against {listed([s.label for s in unsure])})"
+    elif equal:
+        head = f"{listed([best.label, *(s.label for s in equal)])} have equally good angle errors"
+    else:
+        head = f"{best.label} has the lowest angle errors on average"
+    ratio = f"{second.label}'s are {found.mean:.3f} times {best.label}'s{_certainty(field, found)}"
+    return f"On {_on(field)}, {head}; {ratio}."
+
+
+def _certainty(field: Field, found: AngleRatio) -> str:
+    """Return the interval over surfaces of a ratio, and its median, in brackets."""
+    if field.n == 1:
+        return ""
+    interval = (
+        f"95 % interval over surfaces {found.interval.low:.3f} to {found.interval.high:.3f}"
+        if found.interval
+        else "too few surfaces for an interval"
+    )
+    return f" ({interval}; median {found.median:.3f})"
+
+
+def _counts(field: Field, *standings: Standing) -> str:
+    """Return on how many surfaces angle errors are the smallest, or nearly."""
+    return "; ".join(
+        f"{s.label} has the smallest angle errors on {field.near(s, 0)} of {field.n} surfaces and "
+        f"is within {100 * NEAR:.0f} % of the best on {field.near(s, NEAR)}"
+        for s in standings
+    )
+
+
+def _fastest(field: Field) -> str:
+    """Return a sentence that names the fastest of the algorithms with good angles."""
+    within = f"at most {AS_GOOD} times the smallest, or {DEGREES}° larger, on every surface"
+    good = field.good
+    if len(good) < 2:
+        return f"No two algorithms have angle errors of {within}: no fastest of them is named."
+    names = listed([s.label for s in good[:2]])
+    compared = compare_seconds(good[1], good[0])
+    fastest = (
+        f"{good[0].label} is the fastest"
+        if compared is not None and compared.verdict == "slower"
+        else f"{names} are the fastest (these rounds do not show which of the two)"
+    )
+    larger = [s.label for s in field.standings if s not in good]
+    less = f" (not {listed(larger)})" if larger else ""
+    return f"Of {len(good)} algorithms with angle errors of {within}{less}, {fastest}."
+
+
+def field_figures(field: Field) -> list[Finding]:
+    """Return the key figures: the fastest against the next, and the best angles."""
     figures = []
-    sentence = f"Only {best.series.label} mapped {on}: there is nothing to compare it with."
-    if len(ranked) > 1:
-        first, second = ranked[:2]
-        compared = _compared(second, first)
-        if compared is not None:
-            figures.append(_times(first, second, compared))
-        sure = compared is not None and compared.verdict == "slower"
-        names = f"{first.series.label} and {second.series.label}"
-        fastest = (
-            f"{first.series.label} is the fastest"
-            if sure
-            else f"{names} are the fastest (these rounds do not show which of the two)"
-        )
-        rest = len(standings) - len(good)
-        less = f" ({rest} with larger angle errors left out)" if rest else ""
-        sentence = f"On {on}, of {len(good)} algorithms with equally good angles{less}, {fastest}"
-        sentence += f"; {best.series.label} has the smallest angle errors."
-    elif len(standings) > 1:
-        sentence = (
-            f"On {on}, {best.series.label} has the smallest angle errors, and no other algorithm "
-            "comes close."
-        )
+    good, best = field.good, field.standings[0]
+    compared = compare_seconds(good[1], good[0]) if len(good) > 1 else None
+    if compared is not None:
+        figures.append(_times(good[0], good[1], compared))
     figures.append(
         Finding(
             f"{best.angle:.2f}°",
-            f"mean angle error of {best.series.label}, the smallest of {len(standings)}",
+            f"mean angle error of {best.label}, the lowest of {len(field.standings)}"
+            + (" (geometric mean over surfaces)" if field.n > 1 else ""),
         )
     )
-    figures.append(_holding(claims) if claims else _ended(evidence))
-    sentence = f"{sentence} {stability_words(evidence.records)}"
-    return Findings(sentence, tuple(figures), _picture(evidence, inspections, best.series.label))
+    return figures
 
 
-def _best_angles(standings: Sequence[_Standing]) -> list[float]:
-    return [min(column) for column in zip(*(s.angles for s in standings), strict=True)]
-
-
-def _standings(evidence: Evidence) -> tuple[list[_Standing], int]:
-    """Return the main series that mapped the surfaces that most mapped, and their number."""
-    policy = evidence.policies[0]
-    held: dict[str, dict[str, Record]] = {}
-    for series in evidence.disk_series:
-        if not series.main:
-            continue
-        for surface in evidence.surfaces:
-            record = evidence.find(surface, series, policy)
-            if record is not None and _has_figures(record):
-                held.setdefault(series.label, {})[surface.mesh_hash] = record
-    if not held:
-        return [], 0
-    most = max(len(records) for records in held.values())
-    full = {label: records for label, records in held.items() if len(records) == most}
-    common = set.intersection(*(set(records) for records in full.values()))
-    order = [s.mesh_hash for s in evidence.surfaces if s.mesh_hash in common]
-    named = {series.label: series for series in evidence.disk_series}
-    if not order:
-        return [], 0
-    return [
-        _Standing(named[label], tuple(records[key] for key in order))
-        for label, records in full.items()
-    ], len(order)
-
-
-def _has_figures(record: Record) -> bool:
-    outcome = record.outcome
-    known = outcome.metrics.get("angle_error_mean_deg") is not None
-    return outcome.status == "ok" and bool(outcome.median_seconds) and known
-
-
-def _compared(slower: _Standing, faster: _Standing) -> Comparison | None:
-    """Compare two algorithms by the geometric mean over surfaces of the ratios in each round."""
-    ratios = [paired_ratios(a, b) for a, b in zip(slower.records, faster.records, strict=True)]
-    rounds = min(map(len, ratios))
-    if not rounds:
-        return None
-    together = np.log([found[:rounds] for found in ratios]).mean(axis=0)
-    return compare_ratios(np.exp(together).tolist())
-
-
-def _times(first: _Standing, second: _Standing, compared: Comparison) -> Finding:
+def _times(first: Standing, second: Standing, compared: Comparison) -> Finding:
     interval = compared.interval
     told = (
         f"95 % interval {interval.low:.2f} to {interval.high:.2f}"
@@ -142,18 +164,7 @@ def _times(first: _Standing, second: _Standing, compared: Comparison) -> Finding
     )
     return Finding(
         f"{compared.ratio:.2f} times",
-        f"the speed of {second.series.label}, the next fastest, is reached by "
-        f"{first.series.label}; {told}",
-    )
-
-
-def _holding(claims: Sequence[Claim]) -> Finding:
-    counts = Counter(claim.verdict for claim in claims)
-    tested = len(claims) - counts["not tested here"] - counts["too few rounds"]
-    partly = f"; {counts['holds in part']} in part" if counts["holds in part"] else ""
-    few = f"; {counts['too few rounds']} have too few rounds" if counts["too few rounds"] else ""
-    return Finding(
-        f"{counts['holds']} of {tested}", f"tested claims of the paper hold{partly}{few}"
+        f"the speed of {second.label}, the next fastest, is reached by {first.label}; {told}",
     )
 
 

@@ -34,6 +34,8 @@ class Quantity:
         Printed digits after the decimal point.
     timed : bool
         Whether it depends on the stability of the times.
+    title : str
+        Heading of the measured column.
 
     """
 
@@ -44,6 +46,7 @@ class Quantity:
     column: tuple[int, str] | None = None
     digits: int = 2
     timed: bool = False
+    title: str = "here"
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,7 @@ def table_beside(
     for quantity in quantities:
         if quantity.column is not None:
             columns.append(Column("printed", quantity.heading))
-        columns.append(Column("here", quantity.heading))
+        columns.append(Column(quantity.title, quantity.heading))
     rows = [_row(evidence, surface, quantities, policy) for surface in surfaces]
     counted = [
         r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.stand_ins_left_out
@@ -184,7 +187,8 @@ def _places(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> dic
     for row in rows:
         for column, value in zip(columns, row, strict=True):
             if value.why:
-                where = f"{row[0].text} / {column.group}"
+                paired = column.title in ("printed", "here")
+                where = f"{row[0].text} / {column.group if paired else column.title}"
                 found.setdefault(value.why, []).append(where)
     return {why: f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in found.items()}
 

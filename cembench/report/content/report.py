@@ -38,6 +38,7 @@ from cembench.report.content.table_3 import table_3
 from cembench.report.content.table_4 import table_4
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
+from cembench.results.paper import CITATION
 from cembench.results.records import MeshOrigin
 
 #: Receives progress: a text, the number of finished steps, and their total.
@@ -54,7 +55,7 @@ PICTURES = (
 )
 
 
-PAPER = "Conformal surface parameterizations: the paper's tables and figures, measured"
+PAPER = f"{CITATION.title}: its claims, tables and figures, measured"
 #: Names of plots for the head, the first that is there: accuracy against time, or its profiles.
 FIRST_PLOTS = ("accuracy-against-time", "accuracy-profiles")
 
@@ -70,17 +71,19 @@ def build_report(
     evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
 ) -> Report:
     """Compute the contents of a run's report, and draw its figures into `folder`."""
-    many = is_many(evidence)
+    of_paper = is_of_the_paper(evidence)
+    many = is_many(evidence) and not of_paper
     shown = hardest(evidence, evidence.policies[0]) if many else evidence.surfaces
-    n = len(shown) + 2
+    n = len(shown) + 1
     inspections: dict[str, Inspection] = {}
+    pages = []
     for k, surface in enumerate(shown):
         progress(f"surface {surface.title}", k, n)
-        inspections[surface.mesh_hash] = inspect_surface(evidence, surface, folder)
-    progress("tables, plots and claims", n - 2, n)
-    of_paper = not many and bool(evidence.models)
+        seen = inspections[surface.mesh_hash] = inspect_surface(evidence, surface, folder)
+        pages.append(_page(evidence, surface, seen, folder))
+    progress("tables, plots and claims", n - 1, n)
     tested = claims(evidence, inspections) if of_paper else []
-    beyond = _beyond_the_paper(evidence, folder, by_surface=not many)
+    beyond = _beyond_the_paper(evidence, folder, by_surface=not many, of_paper=of_paper)
     first = _first_plot(beyond)
     sections = [] if many else [_summary(evidence, of_paper=of_paper)]
     machines = machines_section(evidence)
@@ -100,24 +103,32 @@ def build_report(
     else:
         sections.append(_own(evidence, inspections, folder, beyond))
     sections += exhibit_sections(evidence, folder)
-    progress("pages of the surfaces", n - 1, n)
     if many:
         sections.append(Section("not-ok", "Cells without a valid map", (not_ok(evidence),)))
-    sections.append(_pages(evidence, shown, inspections, folder))
+    sections.append(Section("surfaces", "Surfaces", (), tuple(pages)))
     progress("done", n, n)
-    found = (
-        many_findings(evidence, evidence.policies[0])
-        if many
-        else findings(evidence, inspections, tested)
-    )
+    found = many_findings(evidence) if many else findings(evidence, inspections, tested)
     return Report(
         title=PAPER if of_paper else _title_of_own_surfaces(evidence),
-        findings=replace(found, plot=first) if found else None,
+        findings=replace(found, plot=first),
         command=command,
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
         records=evidence.rows,
+        paper=CITATION if of_paper else None,
     )
+
+
+def is_of_the_paper(evidence: Evidence) -> bool:
+    """Whether a run was made for the paper, and not over surfaces of the user's own.
+
+    It was if all of its surfaces are models of the paper or stand-ins for them, or, with a stand-in
+    among them, more than half. Nine meshes of which eight are public models of the paper are the
+    user's own run: it has no claims, and no gaps for the other models.
+    """
+    models, others = len(evidence.models), len(evidence.others)
+    has_stand_in = any(surface.origin == "stand-in" for surface in evidence.models)
+    return models > others if has_stand_in else not others
 
 
 def _precision_words(evidence: Evidence) -> str:
@@ -255,11 +266,13 @@ def _pictures(
     ]
 
 
-def _beyond_the_paper(evidence: Evidence, folder: Path, *, by_surface: bool) -> Section:
+def _beyond_the_paper(
+    evidence: Evidence, folder: Path, *, by_surface: bool, of_paper: bool
+) -> Section:
     # Over many surfaces, the profile of the time stands beside those of accuracy.
     profiles = [performance_profile(evidence)] if by_surface else []
     items = _drawn([*profiles, accuracy_against_time(evidence), time_by_phase(evidence)], folder)
-    if not evidence.models:  # otherwise it is below Table 2
+    if not of_paper:  # otherwise it is below Table 2
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
     if has_both_policies(evidence):
@@ -309,18 +322,10 @@ def _first_plot(section: Section) -> Figure | None:
     return next((f for f in figures if f.name in FIRST_PLOTS), figures[0] if figures else None)
 
 
-def _pages(
-    evidence: Evidence,
-    shown: Sequence[MeasuredSurface],
-    inspections: Inspections,
-    folder: Path,
-) -> Section:
-    pages = []
-    for surface in shown:
-        page, plot = surface_page(evidence, surface, inspections[surface.mesh_hash])
-        items = (*page.items, *_drawn([plot], folder))
-        pages.append(Section(page.name, page.title, items, page.sections, page.page))
-    return Section("surfaces", "Surfaces", (), tuple(pages))
+def _page(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, folder: Path) -> Section:
+    page, plot = surface_page(evidence, surface, seen)
+    items = (*page.items, *_drawn([plot], folder))
+    return Section(page.name, page.title, items, page.sections, page.page)
 
 
 def _drawn(plots: Sequence[Plot | None], folder: Path) -> list[Item]:

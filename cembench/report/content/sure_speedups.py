@@ -7,22 +7,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
+from cembench.report.content.evidence import (
+    REFERENCE,
+    AlgorithmSeries,
+    Evidence,
+    MeasuredSurface,
+)
 from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
-from cembench.results.comparison import Comparison, compare, paired_ratios
-from cembench.results.many import FEWEST_SURFACES, average_interval, corrected, sign_test
+from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
+from cembench.results.many import (
+    FEWEST_SURFACES,
+    average_interval,
+    corrected,
+    geometric,
+    sign_test,
+)
 
 CAPTION = (
     "'One by one': the number of surfaces on which the 95 % interval of the ratio within rounds "
     "excludes 1. 'Together': the number when all of the {n} verdicts of this table must be right "
     "with 95 % (Holm). 'Over surfaces': whether CEM wins on more surfaces than by chance "
     "(two-sided sign test), and the geometric mean of t / t_CEM with a 95 % interval over surfaces "
-    "and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. Each model counts "
-    "once, and is preferred over its stand-in."
+    "and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
+    f"{NOT_DETECTED}"
 )
+ONCE = " Each model counts once, and is preferred over its stand-in."
 
 
 @dataclass(frozen=True)
@@ -58,31 +69,41 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
             title=f"Certainty of the speedups{in_policy(evidence, policy)}",
             columns=columns,
             rows=tuple(rows),
-            caption=CAPTION.format(n=number),
+            caption=CAPTION.format(n=number) + (ONCE if evidence.stand_ins_left_out else ""),
         )
     ]
+
+
+def paired_rounds(
+    evidence: Evidence,
+    series: AlgorithmSeries,
+    policy: str,
+    surfaces: Sequence[MeasuredSurface],
+) -> list[tuple[Comparison, list[float]]]:
+    """Return the comparison with CEM and the ratios of the rounds, for surfaces that have both."""
+    found = []
+    for surface in surfaces:
+        record = evidence.find(surface, series, policy)
+        base = evidence.base(record) if record is not None else None
+        one = compare(record, base) if record is not None and base is not None else None
+        if record is not None and base is not None and one is not None and one.rounds:
+            found.append((one, paired_ratios(record, base)))
+    return found
 
 
 def _compared(evidence: Evidence, series: AlgorithmSeries, policy: str) -> _Compared | None:
     if series.algorithm == REFERENCE or not series.main:
         return None
-    found, ratios = [], []
-    for surface in (*evidence.one_per_model, *evidence.others):
-        record = evidence.find(surface, series, policy)
-        base = evidence.base(record) if record is not None else None
-        one = compare(record, base) if record is not None and base is not None else None
-        if record is None or base is None or one is None or not one.rounds:
-            continue
-        found.append(one)
-        ratios.append(paired_ratios(record, base))
-    return _Compared(series, found, ratios) if found else None
+    surfaces = (*evidence.one_per_model, *evidence.others)
+    found = paired_rounds(evidence, series, policy, surfaces)
+    return _Compared(series, *zip(*found, strict=True)) if found else None
 
 
 def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
     figures = [one.ratio for one in compared.found]
     wins, losses = sum(r > 1 for r in figures), sum(r < 1 for r in figures)
-    p, mean = sign_test(wins, losses), float(_geometric(np.array(figures)))
-    interval = average_interval(compared.ratios, _geometric)
+    p, mean = sign_test(wins, losses), float(geometric(np.array(figures)))
+    interval = average_interval(compared.ratios, geometric)
     return (
         words(compared.series.label),
         count(len(figures)),
@@ -102,8 +123,3 @@ def _verdicts(found: Sequence[Comparison]) -> list[Value]:
     counts = Counter(one.verdict for one in found)
     faster, slower = counts["slower"], counts["faster"]  # the verdict is about the other algorithm
     return [count(faster), count(slower), count(len(found) - faster - slower)]
-
-
-def _geometric(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
-    mean: NDArray[np.float64] = np.exp(np.log(ratios).mean(axis=-1))
-    return mean

@@ -90,6 +90,7 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
         Column("±%"),
         Column("iterations"),
         *(Column(metric.heading) for metric in _METRICS),
+        Column("folds before"),
         Column("memory", unit="MiB"),
     ]
     rows, causes = [], []
@@ -122,8 +123,9 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
         "modulus of the Beltrami coefficient, averaged over the surface's area. E_C of a disk map "
         "changes under Moebius maps of the disk. 'E_C, gauge' is E_C in the common gauge, with the "
         "area-weighted mean at 0; compare that one between methods. area SD is the standard "
-        "deviation of log area ratios, for disk maps in the same gauge. Memory is the increase "
-        "during the call.",
+        "deviation of log area ratios, for disk maps in the same gauge. 'folds before' counts the "
+        "folded triangles of the map as the method made it, before the repair that all methods "
+        "share. Memory is the increase during the call.",
         tuple(dict.fromkeys(causes)),
     )
 
@@ -156,6 +158,8 @@ def _line(
         number = outcome.metrics.get(metric.name)
         lacking = "infinite" if metric.name in outcome.metrics else _absent(record, metric)
         cells.append(value(number, metric.text(number), lacking))
+    folded = outcome.folded_before_repair
+    cells.append(value(folded, str(folded), "not counted by the algorithm"))
     memory = outcome.memory_increase_bytes
     mib = None if memory is None else memory / 2**20
     cells.append(value(mib, f"{mib or 0:,.0f}"))

@@ -32,6 +32,7 @@ from plotly.io.json import to_json_plotly
 from cembench.core.atomic import write_text
 from cembench.report.document import (
     ORIGINS,
+    SUSPECTS,
     Claim,
     Column,
     Figure,
@@ -41,6 +42,7 @@ from cembench.report.document import (
     Section,
     Table,
     Value,
+    Verdict,
     csv_of,
     figures_of,
     galleries_of,
@@ -58,10 +60,10 @@ from cembench.report.pictures import (
 
 FILE = "index.html"
 #: The sign before each verdict, so that it does not rely on colour alone.
-VERDICTS: Mapping[str, str] = {
-    "holds": "✓",
-    "holds in part": "◐",
+SIGNS: Mapping[Verdict, str] = {
     "does not hold here": "✗",
+    "holds in part": "◐",
+    "holds": "✓",
     "too few rounds": "…",
     "not tested here": "○",
 }
@@ -369,7 +371,12 @@ def environment() -> jinja2.Environment:
         "stopped": lambda title: title if title.endswith((".", "?", "!")) else f"{title}.",
         "address": lambda file: quote(str(file)),
     }
-    environment.globals |= {"ORIGINS": ORIGINS, "VERDICTS": VERDICTS, "Counter": Counter}
+    environment.globals |= {
+        "ORIGINS": ORIGINS,
+        "SIGNS": SIGNS,
+        "SUSPECTS": SUSPECTS,
+        "Counter": Counter,
+    }
     return environment
 
 

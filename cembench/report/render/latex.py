@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import unicodedata
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 
 from cembench.core.atomic import write_text
 from cembench.report.document import (
+    SUSPECTS,
     Claim,
     Column,
     Figure,
@@ -21,6 +23,7 @@ from cembench.report.document import (
     Item,
     Report,
     Section,
+    Sentence,
     Table,
     Text,
     marked,
@@ -44,6 +47,8 @@ _CHARACTERS = {
 }  # fmt: skip
 #: Maximum rows of a table on a page; longer tables are continued.
 ROWS = 38
+#: Maximum columns of a table on a page; wider ones are continued after a group of columns.
+COLUMNS = 18
 #: Characters above which a column of text is wrapped, and its share of the line width.
 LONG = 36
 
@@ -71,7 +76,7 @@ def write_latex(report: Report, folder: Path) -> Path:
         _write(folder / tex_of(table), table_lines(table))
     lines = [f"% Made by: {escape(report.command)}", PREAMBLE]
     lines += [rf"\title{{{escape(report.title)}}}", r"\author{}", r"\date{}"]
-    lines += [r"\begin{document}", r"\maketitle", *_findings(report)]
+    lines += [r"\begin{document}", r"\maketitle", *_head(report)]
     lines += [rf"Made by \texttt{{{escape(report.command)}}}."]
     lines += [r"\begin{description}"]
     lines += [rf"\item[{escape(name)}] {escape(words)}" for name, words in report.facts]
@@ -84,15 +89,38 @@ def write_latex(report: Report, folder: Path) -> Path:
     return path
 
 
-def _findings(report: Report) -> list[str]:
-    found = report.findings
+def _head(report: Report) -> list[str]:
+    """Return the paper that the report is about, and the findings."""
+    lines, paper, found = [], report.paper, report.findings
+    if paper is not None:
+        doi = rf"\href{{{paper.address}}}{{doi:{escape(paper.doi)}}}"
+        about = rf"{escape(paper.authors)}. \emph{{{escape(paper.title)}}}. {escape(paper.place)}."
+        lines += [f"{about} {doi}", ""]
     if found is None:
-        return []
-    lines = [rf"\textbf{{{escape(found.sentence)}}}", r"\begin{itemize}"]
-    lines += [
-        rf"\item \textbf{{{escape(one.number)}}} {escape(one.words)}" for one in found.figures
-    ]
-    return [*lines, r"\end{itemize}"]
+        return lines
+    for k, sentence in enumerate(found.sentences):
+        told = _sentence(sentence)
+        lines += [rf"\textbf{{{told}}}" if k == 0 else told, ""]
+    if found.suspects:
+        lines += [rf"\textbf{{{SUSPECTS}}}", *_itemized(map(escape, found.suspects))]
+    if found.table is not None:
+        lines.append(rf"\input{{{tex_of(found.table).with_suffix('')}}}")
+    figures = (rf"\textbf{{{escape(one.number)}}} {escape(one.words)}" for one in found.figures)
+    return [*lines, *_itemized(figures)]
+
+
+def _itemized(lines: Iterable[str]) -> list[str]:
+    items = [rf"\item {line}" for line in lines]
+    return [r"\begin{itemize}", *items, r"\end{itemize}"] if items else []
+
+
+def _sentence(sentence: Sentence) -> str:
+    return "".join(
+        escape(part)
+        if isinstance(part, str)
+        else rf"\hyperlink{{claim:{part.name}}}{{{escape(part.title)}}}"
+        for part in sentence
+    )
 
 
 def escape(text: str) -> str:
@@ -146,7 +174,8 @@ def _title(figure: Figure) -> str:
 def _claim(claim: Claim) -> list[str]:
     parts = [("Test", claim.test), ("Found", claim.figures), ("Remark", claim.remark)]
     lines = [
-        rf"\subsubsection*{{{escape(claim.verdict)}: {escape(claim.name)}}}",
+        rf"\hypertarget{{claim:{claim.name}}}{{}}",
+        rf"\subsubsection*{{{escape(claim.verdict)}: {escape(claim.title)}}}",
         rf"\begin{{quote}}``{escape(claim.sentence)}'' ({escape(claim.place)})\end{{quote}}",
         r"\begin{description}",
     ]
@@ -183,16 +212,15 @@ def _printable(figure: Figure) -> str:
 
 def table_lines(table: Table) -> list[str]:
     """Return the table as floats, which need the packages booktabs and graphicx."""
-    body = table.rows[: len(table.rows) - table.footer_rows]
-    footer = table.rows[len(body) :]
-    portions = [body[k : k + ROWS] for k in range(0, len(body), ROWS)] or [()]
     lines = [r"% needs \usepackage{booktabs,graphicx}"]
-    for k, portion in enumerate(portions):
+    portions = [part for columns in _by_columns(table) for part in _by_rows(columns)]
+    for k, part in enumerate(portions):
         last = k == len(portions) - 1
         more = " (continued)" if k else ""
-        rows = [_row(table, row) for row in portion]
-        if last and footer:
-            rows += [r"\midrule", *(_row(table, row) for row in footer)]
+        body = part.rows[: len(part.rows) - part.footer_rows]
+        rows = [_row(part, row) for row in body]
+        if part.footer_rows:
+            rows += [r"\midrule", *(_row(part, row) for row in part.rows[len(body) :])]
         lines += [
             r"\begin{table}[htbp]",
             r"\centering\small",
@@ -200,9 +228,9 @@ def table_lines(table: Table) -> list[str]:
             "" if k else rf"\label{{tab:{table.name}}}",
             # At most as wide as the line, never enlarged.
             r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%",
-            rf"\begin{{tabular}}{{{_alignment(table)}}}",
+            rf"\begin{{tabular}}{{{_alignment(part)}}}",
             r"\toprule",
-            *_heads(table.columns),
+            *_heads(part.columns),
             r"\midrule",
             *rows,
             r"\bottomrule",
@@ -212,6 +240,38 @@ def table_lines(table: Table) -> list[str]:
         lines += [rf"\par\footnotesize {escape(remark)}" for remark in remarks if remark]
         lines.append(r"\end{table}")
     return lines
+
+
+def _by_rows(table: Table) -> list[Table]:
+    """Return a table in portions of :data:`ROWS` rows, the footer below the last."""
+    last = len(table.rows) - table.footer_rows
+    body, footer = table.rows[:last], table.rows[last:]
+    portions = [body[k : k + ROWS] for k in range(0, last, ROWS)] or [()]
+    return [
+        *(replace(table, rows=rows, footer_rows=0) for rows in portions[:-1]),
+        replace(table, rows=(*portions[-1], *footer)),
+    ]
+
+
+def _by_columns(table: Table) -> list[Table]:
+    """Return a table in portions of whole groups, each with the columns that have no group."""
+    numbered = list(enumerate(table.columns))
+    common = [k for k, column in numbered if not column.group]
+    portions: list[list[int]] = [[]]
+    for group, members in groupby(numbered, lambda one: one[1].group):
+        places = [k for k, _ in members] if group else []
+        if portions[-1] and len(common) + len(portions[-1]) + len(places) > COLUMNS:
+            portions.append([])
+        portions[-1] += places
+    chosen = [sorted([*common, *places]) for places in portions]
+    return [
+        replace(
+            table,
+            columns=tuple(table.columns[k] for k in places),
+            rows=tuple(tuple(row[k] for k in places) for row in table.rows),
+        )
+        for places in chosen
+    ]
 
 
 def _alignment(table: Table) -> str:

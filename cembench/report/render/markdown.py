@@ -8,6 +8,7 @@ from typing import Any
 
 from cembench.core.atomic import write_text
 from cembench.report.document import (
+    SUSPECTS,
     Claim,
     Figure,
     Gallery,
@@ -15,6 +16,7 @@ from cembench.report.document import (
     Item,
     Report,
     Section,
+    Sentence,
     Table,
     Text,
     Value,
@@ -31,7 +33,7 @@ _SPECIAL = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#"})
 def write_markdown(report: Report, folder: Path) -> Path:
     """Write ``report.md`` and the files it links to; return its path."""
     pages: list[Section] = []
-    lines = [f"# {escape(report.title)}", "", *_findings(report)]
+    lines = [f"# {escape(report.title)}", "", *_head(report)]
     lines += [f"Made by `{report.command}`.", ""]
     lines += [f"- **{escape(name)}**: {escape(words)}" for name, words in report.facts]
     lines += ["", "Numbers link to their records; every record is a line of [records.csv]"]
@@ -53,12 +55,30 @@ def escape(text: str) -> str:
     return text.translate(_SPECIAL).replace("\n", " ")
 
 
-def _findings(report: Report) -> list[str]:
-    found = report.findings
+def _head(report: Report) -> list[str]:
+    """Return the paper that the report is about, and the findings."""
+    lines, paper, found = [], report.paper, report.findings
+    if paper is not None:
+        about = f"{paper.authors}. *{escape(paper.title)}*. {paper.place}."
+        lines += [f"{about} [doi:{paper.doi}]({paper.address})", ""]
     if found is None:
-        return []
-    figures = [f"- **{escape(one.number)}** {escape(one.words)}" for one in found.figures]
-    return [f"**{escape(found.sentence)}**", "", *figures, ""]
+        return lines
+    for k, sentence in enumerate(found.sentences):
+        told = _sentence(sentence)
+        lines += [f"**{told}**" if k == 0 else told, ""]
+    if found.suspects:
+        lines += [f"**{SUSPECTS}**", "", *(f"- {escape(line)}" for line in found.suspects), ""]
+    if found.table is not None:
+        title = f"## {escape(found.table.title)}"
+        lines += [title, "", *table_lines(found.table, PurePosixPath()), ""]
+    return [*lines, *(f"- **{escape(f.number)}** {escape(f.words)}" for f in found.figures), ""]
+
+
+def _sentence(sentence: Sentence) -> str:
+    return "".join(
+        escape(part) if isinstance(part, str) else f"[{escape(part.title)}](#claim-{part.name})"
+        for part in sentence
+    )
 
 
 def _page(section: Section) -> PurePosixPath:
@@ -115,7 +135,9 @@ def _named(figure: Figure) -> str:
 
 def _claim(claim: Claim, title: str) -> list[str]:
     return [
-        f"{title} {claim.verdict}: {escape(claim.name)}",
+        f'<a id="claim-{claim.name}"></a>',
+        "",
+        f"{title} {claim.verdict}: {escape(claim.title)}",
         "",
         f"> {escape(claim.sentence)} ({escape(claim.place)})",
         "",

@@ -312,6 +312,8 @@ def figures_table(record: Record) -> Table:
         if metric.name in outcome.metrics:
             text = metric.text(outcome.metrics[metric.name], precise=True)
             rows.append((metric.title, f"{text} {metric.unit}".rstrip()))
+    if outcome.folded_before_repair is not None:
+        rows.append(("folded before repair", str(outcome.folded_before_repair)))
     if outcome.iterations:
         rows.append(("iterations", str(outcome.iterations)))
     if outcome.seconds:

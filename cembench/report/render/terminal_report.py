@@ -8,7 +8,16 @@ from rich.console import Group, RenderableType
 from rich.padding import Padding
 from rich.text import Text
 
-from cembench.report.document import ORIGINS, Column, Report, Table, Value, marked, tables_of
+from cembench.report.document import (
+    ORIGINS,
+    Column,
+    Report,
+    Table,
+    Value,
+    marked,
+    plain,
+    tables_of,
+)
 from cembench.report.render.grid import GridColumn, grid, names
 
 #: Tables that `report` and `reproduce` show, and those shown if these are missing.
@@ -19,9 +28,9 @@ WIDTH, NAME = 80, 12
 
 
 def paper_tables(report: Report) -> RenderableType:
-    """Return the findings and the paper's four tables, printed figures above measured ones.
+    """Return the head and the paper's four tables, printed figures above measured ones.
 
-    A run without the paper's surfaces has no such tables.
+    A run over the user's own surfaces has its own table instead.
     """
     tables = {table.name: table for table in tables_of(report)}
     chosen = [
@@ -29,7 +38,7 @@ def paper_tables(report: Report) -> RenderableType:
         for name in (n if n in tables else f"{n}-other-surfaces" for n in SHOWN)
         if name in tables
     ]
-    parts: list[RenderableType] = _findings(report)
+    parts = _head(report)
     for table in chosen:
         parts += [Text(table.title, style="bold"), _folded(table)]
         notes = [note for note in table.notes if note != table.absent]
@@ -43,14 +52,41 @@ def paper_tables(report: Report) -> RenderableType:
     return Group(*parts, Text(f"{'; '.join(marks)}; † misprint; ! unstable", style="dim"))
 
 
-def _findings(report: Report) -> list[RenderableType]:
+def _head(report: Report) -> list[RenderableType]:
+    """Return the title, the paper that the report is about, and the findings."""
     parts: list[RenderableType] = [Text(report.title, style="bold")]
-    if report.findings is not None:
-        parts.append(Text(report.findings.sentence))
-        for found in report.findings.figures:
-            line = Text.assemble((found.number, "bold"), f"  {found.words}")
+    if report.paper is not None:
+        parts.append(Text(f"{report.paper.authors}. {report.paper.place}. doi:{report.paper.doi}"))
+    found = report.findings
+    if found is not None:
+        parts += [Text(f"\n{plain(sentence)}") for sentence in found.sentences]
+        parts.append(Text(""))
+        parts += [Text(f"! {line}", style="yellow") for line in found.suspects]
+        if found.table is not None:
+            parts += [_by_surface(found.table), Text("")]
+        for figure in found.figures:
+            line = Text.assemble((figure.number, "bold"), f"  {figure.words}")
             parts.append(Padding(line, (0, 0, 0, 2)))
     return [*parts, Text("")]
+
+
+def _by_surface(table: Table) -> RenderableType:
+    """Return a table of surfaces by groups of algorithms with a row for each of both."""
+    grouped = [(k, column) for k, column in enumerate(table.columns) if column.group]
+    groups = list(dict.fromkeys(column.group for _, column in grouped))
+    algorithms = list(dict.fromkeys(column.title for _, column in grouped))
+    places = {(column.title, column.group): k for k, column in grouped}
+    lines: list[list[str | Text]] = [
+        [
+            row[0].text if k == 0 else "",
+            algorithm,
+            *(_entry(row[places[algorithm, group]]) for group in groups),
+        ]
+        for row in table.rows
+        for k, algorithm in enumerate(algorithms)
+    ]
+    heads = [GridColumn(group, figures=True, wraps=True) for group in groups]
+    return grid([names("surface", 24), names("algorithm", 24), *heads], lines, title=table.title)
 
 
 def _folded(table: Table) -> RenderableType:
@@ -91,6 +127,10 @@ def _width(table: Table, group: str) -> int:
 def _cell(columns: Sequence[Column], row: Sequence[Value], group: str, kind: str) -> Text:
     for column, value in zip(columns, row, strict=True):
         if column.group == group and column.title == kind:
-            lacking = value.number is None and value.record
-            return Text(marked(value, column), style="bold red" if lacking else "")
+            return _entry(value, marked(value, column))
     return Text("")
+
+
+def _entry(value: Value, text: str = "") -> Text:
+    lacking = value.number is None and value.record
+    return Text(text or value.text, style="bold red" if lacking else "")

@@ -7,6 +7,7 @@ for Conformal Parameterizations", Tables 1-4, twenty models each.
 from __future__ import annotations
 
 import csv
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from types import MappingProxyType
@@ -15,7 +16,30 @@ from typing import TypeAlias
 #: Columns by name.
 Row: TypeAlias = "MappingProxyType[str, float | None]"
 
-SOURCE = "An Efficient Energy Minimization for Conformal Parameterizations, Tables 1-4"
+
+@dataclass(frozen=True)
+class Citation:
+    """Where a paper was published; `place` is the journal with volume, year and pages."""
+
+    title: str
+    authors: str
+    place: str
+    doi: str
+
+    @property
+    def address(self) -> str:
+        """The address that the doi resolves to."""
+        return f"https://doi.org/{self.doi}"
+
+
+#: The paper whose tables these are, as in docs/bibliography.md.
+CITATION = Citation(
+    title="An Efficient Energy Minimization for Conformal Parameterizations",
+    authors="Mei-Heng Yueh, Wen-Wei Lin, Chin-Tien Wu, Shing-Tung Yau",
+    place="Journal of Scientific Computing 73 (2017), 203-227",
+    doi="10.1007/s10915-017-0414-y",
+)
+SOURCE = f"{CITATION.title}, Tables 1-4"
 
 #: The algorithms of the tables under their names in cembench, in the order of the columns.
 ALGORITHMS = ("qiem", "fdm", "ldm", "cem")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,8 @@ from cembench.core.errors import RegistryError
 from cembench.results import paper
 
 if TYPE_CHECKING:
-    from cembench.registry import Registry
+    from cembench.registry import Algorithm, Registry
+    from cembench.results.records import MeshOrigin
 
 #: Number of smallest models in `quick`, and the most triangles in `standard`.
 QUICK_MODELS = 8
@@ -76,12 +77,36 @@ def algorithms_of(profile: Profile, registry: Registry) -> list[str]:
     return registry.usual_algorithms
 
 
-def paper_parameters(algorithms: Iterable[str]) -> dict[str, Any]:
-    """Return the parameters that reproduce the paper's tables, in the form `plan_cells` takes.
+#: How the paper ran an algorithm on its own models where that is not the default: by algorithm, the
+#: parameters with their value there and elsewhere. The printed figures of FDM contain an error of
+#: its public program; see docs/paper_models.md.
+AS_PRINTED: Mapping[str, Mapping[str, tuple[Any, Any]]] = {"fdm": {"public_program": (True, False)}}
 
-    The printed figures of FDM contain an error of its public program; see docs/paper_models.md.
 
-    >>> paper_parameters(["cem", "fdm"])
-    {'fdm.public_program': True}
+def as_printed(origin: MeshOrigin, algorithms: Iterable[Algorithm]) -> dict[str, Any]:
+    """Return the parameters with which the paper ran these algorithms on a surface.
+
+    They are in the form that `plan_cells` takes, and belong to cells on the paper's own models:
+    on a stand-in, or another surface, there are none.
     """
-    return {"fdm.public_program": True} if "fdm" in algorithms else {}
+    if origin != "model":
+        return {}
+    return {
+        f"{algorithm.name}.{name}": there
+        for algorithm in algorithms
+        for name, (there, _) in AS_PRINTED.get(algorithm.name, {}).items()
+        if name in {parameter.name for parameter in algorithm.parameters}
+    }
+
+
+def as_elsewhere(algorithm: str, parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a cell's parameters with those of :data:`AS_PRINTED` as on other surfaces.
+
+    >>> as_elsewhere("fdm", {"max_iterations": 5, "public_program": True})
+    {'max_iterations': 5, 'public_program': False}
+    """
+    changed = AS_PRINTED.get(algorithm, {})
+    return {
+        name: changed[name][1] if name in changed and value == changed[name][0] else value
+        for name, value in parameters.items()
+    }

@@ -6,8 +6,9 @@ from cembench.results import paper
 from cembench.results.paper.profiles import (
     Profile,
     algorithms_of,
+    as_elsewhere,
+    as_printed,
     models,
-    paper_parameters,
     surfaces_of,
 )
 
@@ -58,9 +59,17 @@ def test_quick_takes_the_paper_s_algorithms_and_the_others_all():
     assert set(paper.ALGORITHMS) < set(paper.table(1)["Foot"])
 
 
-def test_where_the_paper_is_reproduced_fdm_is_the_public_program():
-    given = paper_parameters(["cem", "fdm"])
-    fdm = load_registry().algorithm("fdm")
+def test_on_the_paper_s_own_models_fdm_is_the_public_program():
+    cem, fdm = (load_registry().algorithm(name) for name in ("cem", "fdm"))
     assert fdm.arguments({})["public_program"] is False
-    assert given == {"fdm.public_program": True}
-    assert paper_parameters(["cem"]) == {}
+    assert as_printed("model", [cem, fdm]) == {"fdm.public_program": True}
+    assert as_printed("model", [cem]) == {}
+    for origin in ("stand-in", "surface"):
+        assert as_printed(origin, [cem, fdm]) == {}
+
+
+def test_a_parameter_as_printed_is_undone_and_others_stay():
+    usual = {"public_program": False, "tolerance": 1e-3}
+    assert as_elsewhere("fdm", {"public_program": True, "tolerance": 1e-3}) == usual
+    assert as_elsewhere("fdm", usual) == usual
+    assert as_elsewhere("cem", {"public_program": True}) == {"public_program": True}

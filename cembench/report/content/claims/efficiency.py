@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from cembench.report.content.averages import (
 )
 from cembench.report.content.claims.verdicts import (
     OURS,
+    lacking_words,
     tested_on,
     timed_verdict,
     under,
@@ -26,24 +28,60 @@ from cembench.report.content.claims.verdicts import (
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.printed_beside_measured import significant
-from cembench.report.content.table_2 import measured_rates
 from cembench.report.document import Claim, Verdict
 from cembench.results import paper
+from cembench.results.comparison import Comparison, compare, seconds_interval
 from cembench.results.many import sign_test
-from cembench.results.records import DEFAULT_ROUNDS, Record
+from cembench.results.records import DEFAULT_ROUNDS
 
 Inspections = Mapping[str, Inspection]
 #: A figure agrees with the paper's if it reaches this share of it.
 ABOUT = 0.9
 
 
-def _compared(evidence: Evidence) -> Iterator[tuple[str, str, list[float]]]:
-    """Yield name, label and rates of each algorithm under each policy that has any."""
+@dataclass(frozen=True)
+class _Compared:
+    """An algorithm compared with CEM under one policy, on one surface for each model."""
+
+    algorithm: str
+    label: str
+    #: Those with an interval.
+    found: Sequence[Comparison]
+    #: Number of surfaces with too few rounds for an interval.
+    lacking: int
+
+    @property
+    def rates(self) -> list[float]:
+        """The rates of speedup (Eq. 33)."""
+        return [one.speedup for one in self.found]
+
+    @property
+    def faster(self) -> int:
+        """Number of surfaces on which CEM is faster: the interval excludes equal times."""
+        return sum(one.verdict == "slower" for one in self.found)
+
+    @property
+    def lacking_words(self) -> str:
+        """On how many surfaces it could not be decided."""
+        return lacking_words(self.lacking, len(self.found))
+
+
+def _compared(evidence: Evidence) -> Iterator[_Compared]:
+    """Yield each algorithm under each policy that was measured with CEM on some model."""
     for policy in evidence.policies:
         for algorithm in COMPARED:
-            rates, _ = measured_rates(evidence, algorithm, policy)
-            if rates:
-                yield algorithm, f"{algorithm.upper()}{under(policy, evidence)}", rates
+            series = evidence.series_of(algorithm)
+            records = [
+                evidence.find(surface, series, policy) if series else None
+                for surface in evidence.one_per_model
+            ]
+            pairs = [(record, evidence.base(record)) for record in records if record is not None]
+            found = [compare(record, base) for record, base in pairs if base is not None]
+            timed = [one for one in found if one is not None]
+            sure = [one for one in timed if one.interval is not None]
+            if timed:
+                label = f"{algorithm.upper()}{under(policy, evidence)}"
+                yield _Compared(algorithm, label, sure, len(timed) - len(sure))
 
 
 def _tally(
@@ -53,50 +91,50 @@ def _tally(
 ) -> tuple[str, Verdict]:
     """Return the figures of the average rates, and the verdict on them."""
     found = list(_compared(evidence))
-    words = [f"{label}: {told(rates)} (n = {len(rates)})" for _, label, rates in found]
-    held = sum(holds(algorithm, rates) for algorithm, _, rates in found)
-    verdict = timed_verdict(held, len(found), _timed(evidence))
-    return "; ".join(words) or "No pair of times in this run.", verdict
-
-
-def _timed(evidence: Evidence) -> list[Record]:
-    """Return the records whose seconds the averages use."""
-    return [
-        record
-        for record in evidence.records
-        if record.cell.algorithm in (REFERENCE, *COMPARED) and record.mesh.paper_row
+    words = [
+        f"{c.label}: {told(c.rates) if c.rates else 'no average'} (n = {len(c.rates)}"
+        f"{c.lacking_words})"
+        for c in found
     ]
+    held = sum(holds(c.algorithm, c.rates) for c in found if c.rates)
+    lacking = sum(c.lacking for c in found)
+    verdict = timed_verdict(held, sum(bool(c.rates) for c in found), lacking)
+    return "; ".join(words) or "No pair of times in this run.", verdict
 
 
 def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
     """Test the claim that CEM is faster than QIEM, FDM and LDM on every model."""
-    held = tested = 0
+    found = list(_compared(evidence))
     parts = []
-    for _, label, rates in _compared(evidence):
-        faster = sum(rate > 0 for rate in rates)
-        held, tested = held + faster, tested + len(rates)
-        told = f"lowest rate {min(rates):.2f}, sign test over surfaces p = "
-        told += f"{sign_test(faster, len(rates) - faster):.2g}"
-        parts.append(f"{label}: {faster} of {len(rates)}, {told}")
+    for c in found:
+        told = f"{c.label}: {c.faster} of {len(c.rates)}"
+        if c.rates:
+            p = sign_test(sum(r > 0 for r in c.rates), sum(r <= 0 for r in c.rates))
+            told += f", lowest rate {min(c.rates):.2f}, sign test over surfaces p = {p:.2g}"
+        parts.append(told + c.lacking_words)
     rows = [
         evidence.row(record)
         for record in evidence.records
         if record.cell.algorithm in COMPARED and record.mesh.paper_row
     ]
-    alone = sum(row["verdict"] == "slower" for row in rows)
     sure = sum(row["verdict_corrected"] == "slower" for row in rows)
     return Claim(
         "always-faster",
         "According to Table 2, CEM algorithm always has a better efficiency than QIEM/FDM/LDM",
         "Section 5, below Eq. (33)",
-        "The rate of speedup (Eq. 33) is above 0 for every model and each of the three algorithms.",
+        "The rate of speedup (Eq. 33) is above 0 for every model and each of the three algorithms, "
+        "and so is its 95 % interval.",
         (
-            f"rates above 0: {'; '.join(parts)}. The 95 % interval excludes equality in {alone} "
-            f"cells, and in {sure} also when corrected for all comparisons of the run (Holm)."
+            f"rates surely above 0: {'; '.join(parts)}. When corrected for all comparisons of the "
+            f"run (Holm), the interval excludes equality in {sure} cells."
         )
         if parts
         else "No pair of times in this run.",
-        timed_verdict(held, tested, _timed(evidence)),
+        timed_verdict(
+            sum(c.faster for c in found),
+            sum(len(c.rates) for c in found),
+            sum(c.lacking for c in found),
+        ),
         f"{tested_on(evidence.one_per_model)} {OURS} An interval needs {DEFAULT_ROUNDS} rounds.",
     )
 
@@ -170,23 +208,26 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
     """Test the claim that CEM maps more than 100,000 triangles in less than a second."""
     series = evidence.series_of(REFERENCE)
     times: list[tuple[float, str, int, str]] = []
-    used: list[Record] = []
+    lacking = 0
     for surface in evidence.surfaces if series else ():
         for policy in evidence.policies:
             record = evidence.find(surface, series, policy) if series else None
             seconds = record.outcome.median_seconds if record else None
-            if surface.faces > 100_000 and seconds is not None:
+            if record is None or seconds is None or surface.faces <= 100_000:
+                continue
+            if seconds_interval(record) is None:
+                lacking += 1
+            else:
                 times.append((seconds, surface.title, surface.faces, policy))
-                used += [record] if record else []
     largest = max((t for t in times if t[0] < 1), key=lambda t: t[2], default=None)
     fits = f", the largest {largest[2]:,} triangles ({largest[1]})" if largest else ""
     smallest = min(times, key=lambda t: (t[2], t[0]), default=None)
     words = (
         f"{sum(t[0] < 1 for t in times)} of {len(times)} times below a second{fits}; the smallest "
-        f"above 100,000 is {smallest[1]} with {smallest[2]:,}: {significant(smallest[0])} s"
+        f"of these surfaces is {smallest[1]} with {smallest[2]:,}: {significant(smallest[0])} s"
         if smallest
-        else "No surface of more than 100,000 triangles in this run."
-    )
+        else "No time on a surface of more than 100,000 triangles in this run"
+    ) + f"{lacking_words(lacking, len(times))}."
     return Claim(
         "less-than-one-second",
         "a conformal parameterization can be computed in less than one second for a mesh model of "
@@ -195,7 +236,7 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
         "CEM takes less than a second on the smallest surface above 100,000 triangles ('can be'); "
         "it need not on all larger ones.",
         words,
-        timed_verdict(int(bool(smallest and smallest[0] < 1)), int(bool(times)), used),
+        timed_verdict(int(bool(smallest and smallest[0] < 1)), int(bool(times)), lacking),
         f"{OURS} The head of the report describes the machine.",
     )
 

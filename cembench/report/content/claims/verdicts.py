@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.document import Verdict
-from cembench.results.comparison import seconds_interval
-from cembench.results.records import Record
 
 OURS = (
     "All algorithms are this project's implementations on one linear algebra; the paper timed the "
@@ -24,15 +22,22 @@ def verdict_of(held: int, tested: int) -> Verdict:
     return "holds in part" if held else "does not hold here"
 
 
-def timed_verdict(held: int, tested: int, records: Iterable[Record]) -> Verdict:
-    """Return a verdict based on seconds; none if a record has too few rounds for an interval.
+def timed_verdict(held: int, tested: int, lacking: int) -> Verdict:
+    """Return a verdict based on seconds, of figures that have an interval.
 
-    A single round does not show how much the next one would differ.
+    A single round does not show how much the next one would differ, so `lacking` figures, with too
+    few rounds for an interval, decide nothing: :func:`lacking_words` says how many there are.
     """
-    timed = [r for r in records if r.outcome.median_seconds is not None]
-    if tested and any(seconds_interval(record) is None for record in timed):
-        return "too few rounds"
-    return verdict_of(held, tested)
+    return "too few rounds" if lacking and not tested else verdict_of(held, tested)
+
+
+def lacking_words(lacking: int, tested: int) -> str:
+    """Return on how many surfaces there are too few rounds for an interval; "" if on none.
+
+    >>> lacking_words(2, 6)
+    '; too few rounds on 2 more'
+    """
+    return f"; too few rounds on {lacking}{' more' * bool(tested)}" if lacking else ""
 
 
 def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:

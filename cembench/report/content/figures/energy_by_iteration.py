@@ -29,7 +29,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
         "Conformal energy against iterations of CEM",
         tuple(panels),
         "E_C at the start (0) and after each iteration. The last value need not be the smallest: "
-        "CEM's iteration ends after the first step that changes E_C by less than the tolerance. "
+        "CEM's iteration ends after the first step that does not lower E_C by the tolerance. "
         "Curves other than CEM's are not in the paper.",
         "For each surface, a curve of the conformal energy that falls with the iterations.",
         "Figure 8",

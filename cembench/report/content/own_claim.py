@@ -1,0 +1,78 @@
+"""The paper's own claim as measured, and the count of all verdicts: the head of its report."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from cembench.report.content.averages import COMPARED, STATED_RATE, mean_rate
+from cembench.report.content.claims.verdicts import under
+from cembench.report.content.evidence import Evidence
+from cembench.report.content.sure_speedups import paired_rounds
+from cembench.report.content.table_2 import measured_rates
+from cembench.report.document import VERDICTS, Claim, Sentence
+from cembench.results.intervals import DEFAULT_ROUNDS
+from cembench.results.many import FEWEST_SURFACES, arithmetic, rate_interval
+
+#: Verdicts whose claims are named in the count.
+_NAMED = ("does not hold here", "holds in part")
+
+
+def claim_of_the_paper(evidence: Evidence) -> str:
+    """Return the paper's average rates of speedup beside those of this run, as a sentence.
+
+    A measured rate has its 95 % interval over models and rounds in brackets where there are enough
+    of both (:func:`cembench.results.many.rate_interval`).
+    """
+    names = ", ".join(algorithm.upper() for algorithm in COMPARED)
+    printed = ", ".join(f"{STATED_RATE[algorithm]:.1f}" for algorithm in COMPARED)
+    told = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
+    here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
+    origins = Counter(surface.origin for surface in evidence.one_per_model)
+    models, others = origins["model"], origins["stand-in"]
+    over = [
+        *([f"{models} of its models"] if models else []),
+        *([f"{others} stand-in{'s' if others > 1 else ''}"] if others else []),
+    ]
+    intervals = (
+        "with 95 % intervals over models and rounds"
+        if any(sure for _, (_, sure) in told)
+        else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_SURFACES} models)"
+    )
+    return (
+        f"CEM against {names}: printed {printed}; here {here}. This is the rate of speedup "
+        "(Eq. 33: 0 for equal times, 1 if CEM takes half the time), averaged over the models; "
+        f"here over {' and '.join(over)}, {intervals}."
+    )
+
+
+def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
+    """Return the measured averages as text, and whether one of them has an interval."""
+    told, sure = [], False
+    for algorithm in COMPARED:
+        rates, _ = measured_rates(evidence, algorithm, policy)
+        series = evidence.series_of(algorithm)
+        if not rates or series is None:
+            told.append("not measured")
+            continue
+        rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
+        interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
+        sure = sure or interval is not None
+        between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
+        told.append(f"{mean_rate(rates):.1f}{between}")
+    return ", ".join(told), sure
+
+
+def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
+    """Return the numbers of all verdicts, failing ones first and with links to their claims."""
+    parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
+    for verdict, (one, several) in VERDICTS.items():
+        found = [claim for claim in claims if claim.verdict == verdict]
+        if not found:
+            continue
+        parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
+        parts.append(one if len(found) == 1 else several)
+        if verdict in _NAMED:
+            for k, claim in enumerate(found):
+                parts += [", " if k else ": ", claim]
+    return (*parts, ".")

@@ -1,0 +1,155 @@
+"""Algorithms compared on the surfaces that all of them mapped: angle errors, seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import exp, inf, log
+from statistics import median
+
+import numpy as np
+
+from cembench.report.content.as_good import as_good
+from cembench.report.content.evidence import ANGLE, AlgorithmSeries, Evidence, figure_of
+from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
+from cembench.results.intervals import Interval
+from cembench.results.many import average_interval, geometric
+from cembench.results.records import Record
+
+#: An algorithm takes part with maps of at least this share of the surfaces that most mapped.
+SHARE = 0.9
+#: Smaller mean angle errors, in degrees, count as this: their ratios are of rounding.
+FLOOR = 0.01
+#: An angle error within this share of the smallest one of a surface counts as equal to it.
+NEAR = 0.01
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An algorithm's records on the common surfaces."""
+
+    series: AlgorithmSeries
+    records: tuple[Record, ...]
+
+    @property
+    def label(self) -> str:
+        """The algorithm's name in this run."""
+        return self.series.label
+
+    @property
+    def seconds(self) -> float:
+        """The geometric mean of the seconds."""
+        return exp(float(np.mean([log(r.outcome.median_seconds or 1.0) for r in self.records])))
+
+    @property
+    def angles(self) -> list[float]:
+        """The mean angle errors in degrees by surface, none below :data:`FLOOR`."""
+        return [max(FLOOR, figure_of(r, ANGLE)) for r in self.records]
+
+    @property
+    def angle(self) -> float:
+        """The geometric mean of the mean angle errors."""
+        return float(geometric(np.array(self.angles)))
+
+
+@dataclass(frozen=True)
+class AngleRatio:
+    """The angle errors of an algorithm over those of another on the same surfaces.
+
+    The interval is over surfaces (bootstrap); None for fewer than six.
+    """
+
+    mean: float
+    median: float
+    interval: Interval | None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the interval shows that the other's are smaller."""
+        return self.interval is not None and self.interval.low > 1
+
+
+@dataclass(frozen=True)
+class Field:
+    """The algorithms that are compared, those with the smallest angle errors first."""
+
+    standings: tuple[Standing, ...]
+    #: Number of surfaces that an algorithm for disks mapped.
+    surfaces: int
+    #: Labels of the algorithms that mapped too few of them.
+    left_out: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of surfaces that all of them mapped."""
+        return len(self.standings[0].records)
+
+    @property
+    def smallest(self) -> list[float]:
+        """The smallest mean angle error on each surface."""
+        return [min(column) for column in zip(*(s.angles for s in self.standings), strict=True)]
+
+    @property
+    def good(self) -> list[Standing]:
+        """The algorithms that are as good as the best one on every surface, the fastest first."""
+        kept = [s for s in self.standings if as_good(s.angles, self.smallest)]
+        return sorted(kept, key=lambda s: s.seconds)
+
+    def near(self, standing: Standing, share: float) -> int:
+        """Return on how many surfaces the angle error is within a share of the smallest."""
+        pairs = zip(standing.angles, self.smallest, strict=True)
+        return sum(own <= (1 + share) * least for own, least in pairs)
+
+
+def field_of(evidence: Evidence, policy: str) -> Field | None:
+    """Return the main algorithms that map to the disk, on the surfaces that all of them mapped.
+
+    Those that mapped fewer than :data:`SHARE` of what others did are left out. None if there is no
+    surface.
+    """
+    held = {s: _maps(evidence, s, policy) for s in evidence.disk_series if s.main}
+    most = max(map(len, held.values()), default=0)
+    chosen = {s: maps for s, maps in held.items() if maps and len(maps) >= SHARE * most}
+    common = set.intersection(*map(set, chosen.values())) if chosen else set()
+    if not common:
+        return None
+    order = [s.mesh_hash for s in evidence.surfaces if s.mesh_hash in common]
+    standings = [Standing(s, tuple(maps[key] for key in order)) for s, maps in chosen.items()]
+    return Field(
+        tuple(sorted(standings, key=lambda s: s.angle)),
+        len({key for maps in held.values() for key in maps}),
+        tuple(s.label for s in held if s not in chosen),
+    )
+
+
+def _maps(evidence: Evidence, series: AlgorithmSeries, policy: str) -> dict[str, Record]:
+    """Return the records of an algorithm that have seconds and angles, by surface."""
+    found = {s.mesh_hash: evidence.find(s, series, policy) for s in evidence.surfaces}
+    return {
+        key: record
+        for key, record in found.items()
+        if record is not None and record.outcome.median_seconds and figure_of(record, ANGLE) < inf
+    }
+
+
+def compare_angles(other: Standing, best: Standing) -> AngleRatio:
+    """Return the geometric mean over surfaces of other / best, with its interval and the median."""
+    ratios = [a / b for a, b in zip(other.angles, best.angles, strict=True)]
+    interval = average_interval([[ratio] for ratio in ratios], geometric)
+    return AngleRatio(float(geometric(np.array(ratios))), median(ratios), interval)
+
+
+def compare_seconds(slower: Standing, faster: Standing) -> Comparison | None:
+    """Compare two algorithms by the geometric mean over surfaces of the ratios in each round."""
+    ratios = [paired_ratios(a, b) for a, b in zip(slower.records, faster.records, strict=True)]
+    rounds = min(map(len, ratios))
+    if not rounds:
+        return None
+    together = np.log([found[:rounds] for found in ratios]).mean(axis=0)
+    return compare_ratios(np.exp(together).tolist())
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as "a, b and c"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
