@@ -86,7 +86,9 @@ def measure_one(mesh: str | None, size: int) -> dict[str, object]:
     with linear_algebra():
         for _ in range(ROUNDS):
             gc.collect()
-            _, timing = measure(lambda: cem(surface.fresh(), tolerance=0, max_iterations=2))
+            _, timing = measure(
+                lambda: cem(surface.fresh(), tolerance=0, max_iterations=2, stop="change")
+            )
             peak = peak_memory_bytes()
             gc.collect()
             L = sparse.csr_array(laplacian(surface))[order][:, order]

@@ -42,13 +42,14 @@ def methods() -> dict[str, Method]:
     for suffix, delaunay in (("", False), (" D", True)):
         for name, function in zip(PAPER, (cem, fdm, ldm, qiem), strict=True):
             found[name + suffix] = _with(function, delaunay=delaunay)
-        found["CEM 200" + suffix] = _with(cem, delaunay=delaunay, max_iterations=200, tolerance=0)
+        slow = {"max_iterations": 200, "tolerance": 0, "stop": "change"}
+        found["CEM 200" + suffix] = _with(cem, delaunay=delaunay, **slow)
         found["direct" + suffix] = _with(direct_cem, delaunay=delaunay)
         found["direct, back=0" + suffix] = _with(direct_cem, delaunay=delaunay, back=0)
     return found
 
 
-def _with(function: Method, **parameters: float) -> Method:
+def _with(function: Method, **parameters: float | str) -> Method:
     return lambda mesh: function(mesh, **parameters)
 
 

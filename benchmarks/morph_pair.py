@@ -5,7 +5,7 @@ transport together, then each of 48 frames, without drawing. The stand-ins for L
 first if the cache does not hold them, which takes minutes and is not counted::
 
     python benchmarks/morph_pair.py
-    python benchmarks/morph_pair.py --surfaces liu-wry-face liu-neutral-face liu-smile-face
+    python benchmarks/morph_pair.py --surfaces liu-wry-face-stand-in liu-smile-face-stand-in
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ ROUNDS, FRAMES = 5, 48
 def main() -> None:
     """Measure in a process of its own and print what came out."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--surfaces", nargs="+", default=["liu-wry-face", "liu-smile-face"])
+    usual = ["liu-wry-face-stand-in", "liu-smile-face-stand-in"]
+    parser.add_argument("--surfaces", nargs="+", default=usual)
     parser.add_argument("--faces", type=int, help="triangles; default: the rows' own")
     parser.add_argument("--threads", type=int, default=2)
     parser.add_argument("--one", help=argparse.SUPPRESS)

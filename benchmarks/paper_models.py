@@ -1,7 +1,8 @@
-"""The paper's four public models: printed beside measured, and what numbering alone decides.
+"""The paper's seven public models: printed beside measured, and what numbering alone decides.
 
-Fills docs/paper_models.md, and the short table of README.md, from the files of the models
-(`cembench fetch --group paper`; Nefertiti comes with CGAL) and from other coarse disks::
+Fills docs/paper_models.md, and the short table of README.md, from the models in a folder
+(`cembench fetch --group paper` prints one), known by their meshes whatever their files are called,
+and from other coarse disks there::
 
     python -m benchmarks.paper_models FOLDER_OF_MESHES
 """
@@ -12,6 +13,7 @@ import argparse
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from cembench.algorithms.cem import cem, map_from_triangle
@@ -21,19 +23,18 @@ from cembench.algorithms.qiem import qiem
 
 from benchmarks.pages import ROOT, fill
 from cembench.conformal.metrics import all_metrics
-from cembench.core.errors import AlgorithmFailed
+from cembench.core.errors import AlgorithmFailed, MeshError
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.files import read_mesh
+from cembench.mesh.reading import is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import load_registry
 from cembench.results import paper
+from cembench.running.plan import paper_role_of
 
 PAGE = ROOT / "docs/paper_models.md"
-MODELS = {
-    "Nefertiti": "nefertiti.obj",
-    "Chinese Lion": "chinese_lion.obj",
-    "Human Brain": "human_brain.obj",
-    "Left Hand": "left_hand.obj",
-}
+#: The model whose maps fold by every method.
+FOLDED = "David Head"
 #: Coarse disks on which the numbering is studied besides, and how many choices are tried at most.
 COARSE = ("nefertiti.obj", "canonical_face.obj", "hand_lowres.obj", "turtle.obj")
 MOST = 600
@@ -47,6 +48,7 @@ class Cells:
     mean: float
     sd: float
     iterations: int | None = None
+    folds: int = 0
 
     def shown(self) -> tuple[str, str, str]:
         """The figures with the digits that the paper prints."""
@@ -61,7 +63,26 @@ def cells(mesh: DiskMesh, found: Parameterization) -> Cells:
         metrics["angle_error_mean_deg"],
         metrics["angle_error_sd_deg"],
         found.iterations,
+        metrics["flipped_triangles"],
     )
+
+
+def models(folder: Path) -> dict[str, DiskMesh]:
+    """Return the paper's models among the files of a folder, in the paper's order."""
+    registry, found = load_registry(), {}
+    for path in sorted(filter(is_named_like_a_mesh, folder.iterdir())):
+        try:
+            mesh = read_mesh(path)
+        except MeshError:
+            continue  # not a disk, and every model is one
+        if row := paper_role_of(registry, mesh).paper_row:
+            found[row] = mesh
+    rows = {dataset.paper_row for dataset in registry.datasets.values() if dataset.paper_row}
+    if missing := rows - found.keys():
+        raise SystemExit(
+            f"{folder} lacks {', '.join(sorted(missing))}: cembench fetch --group paper"
+        )
+    return {row: found[row] for row in paper.table(1) if row in found}
 
 
 def printed(model: str, algorithm: str) -> tuple[str, str, str]:
@@ -74,21 +95,26 @@ def printed(model: str, algorithm: str) -> tuple[str, str, str]:
     )
 
 
-def cem_as_printed(mesh: DiskMesh, model: str) -> Parameterization:
+def cem_as_printed(mesh: DiskMesh, model: str, *, repair: bool = False) -> Parameterization:
     """CEM stopped after the number of iterations that Table 1 prints."""
     count = paper.table(1)[model]["cem_iterations"]
     assert count is not None
-    return cem(mesh, max_iterations=int(count), tolerance=0)
+    return cem(mesh, max_iterations=int(count), tolerance=0, repair=repair)
 
 
-#: What is measured: the paper's column, what it is called here, and the call.
-RUNS: tuple[tuple[str, str, Callable[[DiskMesh, str], Parameterization]], ...] = (
-    ("qiem", "QIEM", lambda mesh, model: qiem(mesh)),
-    ("fdm", "FDM, public program", lambda mesh, model: fdm(mesh, public_program=True)),
-    ("fdm", "FDM, corrected", lambda mesh, model: fdm(mesh)),
-    ("ldm", "LDM", lambda mesh, model: ldm(mesh)),
-    ("cem", "CEM, as many iterations", cem_as_printed),
-    ("cem", "CEM, its own stop", lambda mesh, model: cem(mesh)),
+Call: TypeAlias = Callable[..., Parameterization]
+#: The paper's columns as it ran them: the column, what it is called here, and the call, which takes
+#: the mesh, the model and whether folds are repaired.
+AS_PRINTED: tuple[tuple[str, str, Call], ...] = (
+    ("qiem", "QIEM", lambda mesh, model, repair: qiem(mesh, repair=repair)),
+    ("fdm", "FDM", lambda mesh, model, repair: fdm(mesh, public_program=True, repair=repair)),
+    ("ldm", "LDM", lambda mesh, model, repair: ldm(mesh, repair=repair)),
+    ("cem", "CEM", lambda mesh, model, repair: cem_as_printed(mesh, model, repair=repair)),
+)
+#: Other readings: the corrected FDM, and CEM with its own stop.
+READINGS: tuple[tuple[str, str, Call], ...] = (
+    ("fdm", "FDM, corrected", lambda mesh, model, repair: fdm(mesh, repair=repair)),
+    ("cem", "CEM, its own stop", lambda mesh, model, repair: cem(mesh, repair=repair)),
 )
 
 
@@ -100,57 +126,71 @@ class Row:
     column: str
     title: str
     said: tuple[str, str, str]
-    found: tuple[str, str, str]
+    found: Cells
+
+    @property
+    def agreeing(self) -> int:
+        """How many of the three figures agree to the printed digits."""
+        return sum(a == b for a, b in zip(self.said, self.found.shown(), strict=True))
 
 
-def measured(folder: Path) -> Iterable[Row]:
-    """Yield what every call of :data:`RUNS` finds on every model."""
-    for model, file in MODELS.items():
-        mesh = read_mesh(folder / file)
-        for column, title, call in RUNS:
-            found = cells(mesh, call(mesh.fresh(), model)).shown()
-            yield Row(model, column, title, printed(model, column), found)
+def measured(
+    meshes: Mapping[str, DiskMesh], runs: Sequence[tuple[str, str, Call]], *, repair: bool = False
+) -> list[Row]:
+    """Return what every call finds on every model."""
+    rows = []
+    for model, mesh in meshes.items():
+        for column, title, call in runs:
+            found = cells(mesh, call(mesh.fresh(), model, repair))
+            rows.append(Row(model, column, title, printed(model, column), found))
             print(model, title, flush=True)
+    return rows
 
 
 def beside(rows: Sequence[Row]) -> Iterable[str]:
     """Yield the lines of the table of printed beside measured figures."""
-    yield "| model | algorithm | printed E_C | mean | SD | measured E_C | mean | SD | digits |"
-    yield "|---|---|---:|---:|---:|---:|---:|---:|---|"
+    yield "| model | algorithm | printed E_C | mean | SD | here E_C | mean | SD | folds | digits |"
+    yield "|---|---|---:|---:|---:|---:|---:|---:|---:|---|"
     for row in rows:
-        differ = [
-            name
-            for name, a, b in zip(("E_C", "mean", "SD"), row.said, row.found, strict=True)
-            if a != b
-        ]
+        pairs = zip(("E_C", "mean", "SD"), row.said, row.found.shown(), strict=True)
+        differ = [name for name, a, b in pairs if a != b]
         agreed = "all agree" if not differ else f"not {', '.join(differ)}"
         yield (
-            f"| {row.model} | {row.title} | {' | '.join(row.said)} | {' | '.join(row.found)} "
-            f"| {agreed} |"
+            f"| {row.model} | {row.title} | {' | '.join(row.said)} "
+            f"| {' | '.join(row.found.shown())} | {row.found.folds} | {agreed} |"
         )
 
 
-#: What README.md shows of each of the paper's columns.
-SHORT = {
-    "QIEM": "QIEM",
-    "FDM, public program": "FDM",
-    "LDM": "LDM",
-    "CEM, as many iterations": "CEM",
-}
+def counted(rows: Sequence[Row]) -> str:
+    """Return how many of the printed cells agree, by algorithm."""
+    total = sum(row.agreeing for row in rows)
+    by_title: dict[str, list[Row]] = {}
+    for row in rows:
+        by_title.setdefault(row.title, []).append(row)
+    each = "; ".join(
+        f"{title} {sum(row.agreeing for row in of)} of {3 * len(of)}"
+        for title, of in by_title.items()
+    )
+    angles = sum(row.said[1:] == row.found.shown()[1:] for row in by_title["FDM"])
+    return (
+        f"{total} of {3 * len(rows)} cells agree to the printed digits: {each}. FDM's mean and SD "
+        f"agree on {angles} of {len(by_title['FDM'])} models."
+    )
 
 
 def short(rows: Sequence[Row]) -> Iterable[str]:
     """Yield the lines of a table by model: measured, and printed in brackets where it differs."""
-    yield f"| E_C, mean, SD | {' | '.join(SHORT.values())} |"
-    yield f"|---|{'---|' * len(SHORT)}"
-    for model in MODELS:
+    titles = [title for _, title, _ in AS_PRINTED]
+    yield f"| E_C, mean, SD | {' | '.join(titles)} |"
+    yield f"|---|{'---|' * len(titles)}"
+    for model in dict.fromkeys(row.model for row in rows):
         shown = {row.title: brackets(row) for row in rows if row.model == model}
-        yield f"| {model} | {' | '.join(shown[title] for title in SHORT)} |"
+        yield f"| {model} | {' | '.join(shown[title] for title in titles)} |"
 
 
 def brackets(row: Row) -> str:
     """Return the measured figures, each with the printed one in brackets where that differs."""
-    pairs = zip(row.said, row.found, strict=True)
+    pairs = zip(row.said, row.found.shown(), strict=True)
     return ", ".join(here if here == said else f"{here} ({said})" for said, here in pairs)
 
 
@@ -199,9 +239,8 @@ def ranges(folder: Path) -> Iterable[str]:
             print(file, name, flush=True)
 
 
-def nefertiti(folder: Path) -> str:
+def nefertiti(mesh: DiskMesh) -> str:
     """Return what the choices on Nefertiti say of the printed cell of LDM."""
-    mesh = read_mesh(folder / MODELS["Nefertiti"])
     found = ldm_choices(mesh)
     said = printed("Nefertiti", "ldm")
     lowest = int(np.argmin(mesh.boundary))
@@ -232,11 +271,15 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    rows = list(measured(folder))
+    meshes = models(folder)
+    rows = measured(meshes, AS_PRINTED)
+    repaired = measured({FOLDED: meshes[FOLDED]}, AS_PRINTED, repair=True)
     fill(ROOT / "README.md", "paper_models", "\n".join(short(rows)))
-    parts = ["## Printed beside measured", "", *beside(rows), "", "## What numbering decides", ""]
-    parts += [nefertiti(folder), "", *ranges(folder)]
-    fill(PAGE, "paper_models", "\n".join(parts))
+    parts = ["## Printed beside measured", "", counted(rows), "", *beside(rows), ""]
+    parts += ["Two other readings:", "", *beside(measured(meshes, READINGS)), ""]
+    parts += [f"{FOLDED} with its folds repaired, the default:", "", *beside(repaired), ""]
+    parts += ["## What numbering decides", "", nefertiti(meshes["Nefertiti"]), ""]
+    fill(PAGE, "paper_models", "\n".join([*parts, *ranges(folder)]))
 
 
 if __name__ == "__main__":

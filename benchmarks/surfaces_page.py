@@ -27,7 +27,7 @@ from cembench.registry import Registry, load_registry
 from cembench.report.surface_facts import factor_spans, find_facts, row_check
 from cembench.results import paper
 from cembench.results.records import MeshFacts
-from cembench.running.plan import mesh_facts, paper_role_of_file
+from cembench.running.plan import mesh_facts, paper_role_of
 
 PAGE = Path(__file__).parents[1] / "docs/surfaces.md"
 SHEET = Path(__file__).parents[1] / "reports/surfaces/contact_sheet.jpg"
@@ -74,7 +74,7 @@ def models(registry: Registry, files: Iterable[Path]) -> Iterable[Line]:
     cem, seen = registry.algorithm("cem"), set[str]()
     for path in files:
         mesh = read_mesh(path)
-        standing = paper_role_of_file(registry, path, mesh)
+        standing = paper_role_of(registry, mesh)
         if standing.origin != "model":
             raise SystemExit(f"{path} is none of the paper's models; see `cembench fetch`.")
         if standing.paper_row in seen:

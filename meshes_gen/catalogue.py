@@ -40,30 +40,30 @@ Seed = Annotated[int, Field(ge=0)]
 
 #: The function that makes the solid of each stand-in from a seed.
 BODIES: Mapping[str, Callable[[int], Body]] = {
-    "nefertiti": nefertiti_body,
-    "cowboy-hat": cowboy_hat_body,
-    "chinese-vase": chinese_vase_body,
-    "bourbon-bottle": bourbon_bottle_body,
-    "foot": foot_body,
-    "chinese-lion": chinese_lion_body,
-    "david-head": david_head_body,
-    "stanford-bunny": stanford_bunny_body,
-    "human-brain": human_brain_body,
-    "ho-pouting-face": lambda seed: face_body(HO, EXPRESSIONS["pouting"], seed),
-    "ho-neutral-face": lambda seed: face_body(HO, EXPRESSIONS["neutral"], seed),
-    "left-hand": left_hand_body,
-    "statue-of-liberty": statue_of_liberty_body,
-    "liu-neutral-face": lambda seed: face_body(LIU, EXPRESSIONS["neutral"], seed),
-    "liu-smile-face": lambda seed: face_body(LIU, EXPRESSIONS["smile"], seed),
-    "liu-pouting-face": lambda seed: face_body(LIU, EXPRESSIONS["pouting"], seed),
-    "liu-wry-face": lambda seed: face_body(LIU, EXPRESSIONS["wry"], seed),
-    "isis-statue": isis_statue_body,
-    "bimba-statue": bimba_statue_body,
-    "knit-cap-man": knit_cap_man_body,
+    "nefertiti-stand-in": nefertiti_body,
+    "cowboy-hat-stand-in": cowboy_hat_body,
+    "chinese-vase-stand-in": chinese_vase_body,
+    "bourbon-bottle-stand-in": bourbon_bottle_body,
+    "foot-stand-in": foot_body,
+    "chinese-lion-stand-in": chinese_lion_body,
+    "david-head-stand-in": david_head_body,
+    "stanford-bunny-stand-in": stanford_bunny_body,
+    "human-brain-stand-in": human_brain_body,
+    "ho-pouting-face-stand-in": lambda seed: face_body(HO, EXPRESSIONS["pouting"], seed),
+    "ho-neutral-face-stand-in": lambda seed: face_body(HO, EXPRESSIONS["neutral"], seed),
+    "left-hand-stand-in": left_hand_body,
+    "statue-of-liberty-stand-in": statue_of_liberty_body,
+    "liu-neutral-face-stand-in": lambda seed: face_body(LIU, EXPRESSIONS["neutral"], seed),
+    "liu-smile-face-stand-in": lambda seed: face_body(LIU, EXPRESSIONS["smile"], seed),
+    "liu-pouting-face-stand-in": lambda seed: face_body(LIU, EXPRESSIONS["pouting"], seed),
+    "liu-wry-face-stand-in": lambda seed: face_body(LIU, EXPRESSIONS["wry"], seed),
+    "isis-statue-stand-in": isis_statue_body,
+    "bimba-statue-stand-in": bimba_statue_body,
+    "knit-cap-man-stand-in": knit_cap_man_body,
 }
 
 #: Revisions of changed solids: only their cached surfaces are made again.
-REVISIONS = {"ho-pouting-face": 1, "liu-pouting-face": 1}
+REVISIONS = {"ho-pouting-face-stand-in": 1, "liu-pouting-face-stand-in": 1}
 
 
 def stand_in(
@@ -106,12 +106,12 @@ def _content(name: str, faces: int, seed: int, delaunay: bool) -> dict[str, Any]
 
 #: Person and expression of each stand-in that is a face.
 FACES = {
-    "ho-pouting-face": (HO, "pouting"),
-    "ho-neutral-face": (HO, "neutral"),
-    "liu-neutral-face": (LIU, "neutral"),
-    "liu-smile-face": (LIU, "smile"),
-    "liu-pouting-face": (LIU, "pouting"),
-    "liu-wry-face": (LIU, "wry"),
+    "ho-pouting-face-stand-in": (HO, "pouting"),
+    "ho-neutral-face-stand-in": (HO, "neutral"),
+    "liu-neutral-face-stand-in": (LIU, "neutral"),
+    "liu-smile-face-stand-in": (LIU, "smile"),
+    "liu-pouting-face-stand-in": (LIU, "pouting"),
+    "liu-wry-face-stand-in": (LIU, "wry"),
 }
 
 
@@ -160,23 +160,23 @@ def _registered(name: str) -> Callable[..., DiskMesh]:
     return declare(make)
 
 
-nefertiti = _registered("nefertiti")
-cowboy_hat = _registered("cowboy-hat")
-chinese_vase = _registered("chinese-vase")
-bourbon_bottle = _registered("bourbon-bottle")
-foot = _registered("foot")
-chinese_lion = _registered("chinese-lion")
-david_head = _registered("david-head")
-stanford_bunny = _registered("stanford-bunny")
-human_brain = _registered("human-brain")
-ho_pouting_face = _registered("ho-pouting-face")
-ho_neutral_face = _registered("ho-neutral-face")
-left_hand = _registered("left-hand")
-statue_of_liberty = _registered("statue-of-liberty")
-liu_neutral_face = _registered("liu-neutral-face")
-liu_smile_face = _registered("liu-smile-face")
-liu_pouting_face = _registered("liu-pouting-face")
-liu_wry_face = _registered("liu-wry-face")
-isis_statue = _registered("isis-statue")
-bimba_statue = _registered("bimba-statue")
-knit_cap_man = _registered("knit-cap-man")
+nefertiti = _registered("nefertiti-stand-in")
+cowboy_hat = _registered("cowboy-hat-stand-in")
+chinese_vase = _registered("chinese-vase-stand-in")
+bourbon_bottle = _registered("bourbon-bottle-stand-in")
+foot = _registered("foot-stand-in")
+chinese_lion = _registered("chinese-lion-stand-in")
+david_head = _registered("david-head-stand-in")
+stanford_bunny = _registered("stanford-bunny-stand-in")
+human_brain = _registered("human-brain-stand-in")
+ho_pouting_face = _registered("ho-pouting-face-stand-in")
+ho_neutral_face = _registered("ho-neutral-face-stand-in")
+left_hand = _registered("left-hand-stand-in")
+statue_of_liberty = _registered("statue-of-liberty-stand-in")
+liu_neutral_face = _registered("liu-neutral-face-stand-in")
+liu_smile_face = _registered("liu-smile-face-stand-in")
+liu_pouting_face = _registered("liu-pouting-face-stand-in")
+liu_wry_face = _registered("liu-wry-face-stand-in")
+isis_statue = _registered("isis-statue-stand-in")
+bimba_statue = _registered("bimba-statue-stand-in")
+knit_cap_man = _registered("knit-cap-man-stand-in")

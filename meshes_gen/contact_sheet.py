@@ -17,15 +17,15 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Viewing direction of each surface (x, y, z); figures look along -y.
 VIEWS: Mapping[str, tuple[float, float, float]] = {
-    "left-hand": (0.15, -1.0, 0.1),
-    "stanford-bunny": (-0.45, -1.0, 0.3),
-    "human-brain": (-0.25, -1.0, 0.25),
-    "foot": (0.8, -0.8, 0.35),
-    "cowboy-hat": (0.8, -0.9, 0.35),
-    "chinese-lion": (0.25, -1.0, 0.1),
-    "statue-of-liberty": (0.3, -1.0, 0.1),
-    "isis-statue": (0.7, -1.0, 0.2),
-    "nefertiti": (0.9, -0.7, 0.15),
+    "left-hand-stand-in": (0.15, -1.0, 0.1),
+    "stanford-bunny-stand-in": (-0.45, -1.0, 0.3),
+    "human-brain-stand-in": (-0.25, -1.0, 0.25),
+    "foot-stand-in": (0.8, -0.8, 0.35),
+    "cowboy-hat-stand-in": (0.8, -0.9, 0.35),
+    "chinese-lion-stand-in": (0.25, -1.0, 0.1),
+    "statue-of-liberty-stand-in": (0.3, -1.0, 0.1),
+    "isis-statue-stand-in": (0.7, -1.0, 0.2),
+    "nefertiti-stand-in": (0.9, -0.7, 0.15),
 }
 DEFAULT_VIEW = (0.55, -1.0, 0.25)
 

@@ -99,7 +99,7 @@ def ho_face_with_holes(
         return np.minimum(mask(p), np.min(holes, axis=0))
 
     body = Body(whole.f, keep, whole.lower, whole.upper, whole.cells, loops=4)
-    boundary = round(1.5 * ROWS["ho-neutral-face"].boundary_at(faces))
+    boundary = round(1.5 * ROWS["ho-neutral-face-stand-in"].boundary_at(faces))
     boundary += (faces - boundary) % 2
     parameters = {"faces": faces, "seed": seed, "remeshing_filter": has_remeshing_filter()}
     return cached(

@@ -38,10 +38,10 @@ def _rows() -> Mapping[str, Row]:
         vertices, faces = counts["vertices"], counts["faces"]
         assert vertices is not None
         assert faces is not None
-        name = model.lower().replace("'s ", " ").replace(" ", "-")
+        name = model.lower().replace("'s ", " ").replace(" ", "-") + "-stand-in"
         found[name] = Row(model, int(vertices), int(faces))
     return found
 
 
-#: The rows in the paper's order, under the names of their stand-ins ("ho-pouting-face").
+#: The rows in the paper's order, under the names of their stand-ins ("ho-pouting-face-stand-in").
 ROWS = _rows()

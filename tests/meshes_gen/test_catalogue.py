@@ -25,16 +25,16 @@ from cembench.results.paper.profiles import Profile, surfaces_of
 from cembench.running.plan import PaperRole, mesh_facts
 
 #: Made in seconds; the others are for the slow run.
-QUICK = ("nefertiti", "cowboy-hat", "chinese-vase")
+QUICK = ("nefertiti-stand-in", "cowboy-hat-stand-in", "chinese-vase-stand-in")
 #: Their conformal factor spans three orders of magnitude (ratio of extreme length factors).
 HARD = (
-    "foot",
-    "stanford-bunny",
-    "human-brain",
-    "left-hand",
-    "statue-of-liberty",
-    "isis-statue",
-    "bimba-statue",
+    "foot-stand-in",
+    "stanford-bunny-stand-in",
+    "human-brain-stand-in",
+    "left-hand-stand-in",
+    "statue-of-liberty-stand-in",
+    "isis-statue-stand-in",
+    "bimba-statue-stand-in",
 )
 ALL = [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in ROWS]
 
@@ -91,66 +91,67 @@ def test_rows_are_in_the_registry_under_their_models_names() -> None:
 
 
 def test_boundaries_follow_from_table_2() -> None:
-    assert ROWS["nefertiti"].boundary == 34
-    assert ROWS["chinese-lion"].boundary == 245
-    assert ROWS["left-hand"].boundary == 246
-    assert ROWS["bimba-statue"].boundary == 1160
+    assert ROWS["nefertiti-stand-in"].boundary == 34
+    assert ROWS["chinese-lion-stand-in"].boundary == 245
+    assert ROWS["left-hand-stand-in"].boundary == 246
+    assert ROWS["bimba-statue-stand-in"].boundary == 1160
 
 
 def test_same_seed_same_bytes(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    first = catalogue.stand_in("chinese-vase", 2_000)
+    first = catalogue.stand_in("chinese-vase-stand-in", 2_000)
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
-    assert catalogue.stand_in("chinese-vase", 2_000).hash == first.hash
-    assert catalogue.stand_in("chinese-vase", 2_000, seed=1).hash != first.hash
+    assert catalogue.stand_in("chinese-vase-stand-in", 2_000).hash == first.hash
+    assert catalogue.stand_in("chinese-vase-stand-in", 2_000, seed=1).hash != first.hash
 
 
 @pytest.mark.parametrize("faces", [1_000, 9_001])
 def test_any_size(faces: int) -> None:
-    mesh = catalogue.stand_in("cowboy-hat", faces)
+    mesh = catalogue.stand_in("cowboy-hat-stand-in", faces)
     assert abs(mesh.m - faces) <= 1
     assert mesh.notices == ()
 
 
 def test_some_edges_not_delaunay_on_request() -> None:
-    mesh = catalogue.stand_in("cowboy-hat", delaunay=False)
+    mesh = catalogue.stand_in("cowboy-hat-stand-in", delaunay=False)
     assert non_delaunay_share(mesh) == pytest.approx(0.05, abs=0.01)
-    assert _check("cowboy-hat", mesh)["ok"]
+    assert _check("cowboy-hat-stand-in", mesh)["ok"]
 
 
 def test_another_route_without_pymeshlab(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("cembench.surfaces.remesh.has_remeshing_filter", lambda: False)
     monkeypatch.setattr("cembench.surfaces.catalogue.has_remeshing_filter", lambda: False)
-    mesh = catalogue.stand_in("cowboy-hat")
+    mesh = catalogue.stand_in("cowboy-hat-stand-in")
     (notice,) = mesh.notices
     assert notice.kind is NoticeKind.REMESHED_WITHOUT_FILTER
     assert "doctor" in notice.text
-    assert _check("cowboy-hat", mesh)["ok"]
+    assert _check("cowboy-hat-stand-in", mesh)["ok"]
 
 
 def test_unknown_stand_in_lists_the_known() -> None:
-    with pytest.raises(RegistryError, match=r"unknown stand-in 'teapot'; known: nefertiti, .*"):
+    with pytest.raises(RegistryError, match=r"unknown stand-in 'teapot'; known: nefertiti-st"):
         catalogue.stand_in("teapot")
 
 
 @pytest.mark.slow
 def test_landmarks_of_the_four_expressions() -> None:
     places = {}
-    for name in ("liu-neutral-face", "liu-smile-face", "liu-pouting-face", "liu-wry-face"):
+    for expression in ("neutral", "smile", "pouting", "wry"):
+        name = f"liu-{expression}-face-stand-in"
         mesh = catalogue.stand_in(name, 20_000)
         marks = catalogue.landmarks(name, mesh)
         assert len(marks) == len(set(marks.values())) == 10
-        places[name] = {key: mesh.V[vertex] for key, vertex in marks.items()}
-    neutral, smile = places["liu-neutral-face"], places["liu-smile-face"]
+        places[expression] = {key: mesh.V[vertex] for key, vertex in marks.items()}
+    neutral, smile = places["neutral"], places["smile"]
     assert np.linalg.norm(neutral["nose_tip"] - smile["nose_tip"]) < 0.04  # the same person
     assert smile["mouth_corner_left"][2] > neutral["mouth_corner_left"][2] + 0.05
-    wry = places["liu-wry-face"]
+    wry = places["wry"]
     assert wry["mouth_corner_right"][2] > wry["mouth_corner_left"][2] + 0.1
     assert wry["mouth_corner_right"][0] < wry["lips_right"][0] < wry["lips_middle"][0]
 
 
 def test_only_faces_have_landmarks() -> None:
-    with pytest.raises(RegistryError, match="'foot' has no landmarks"):
-        catalogue.landmarks("foot", catalogue.stand_in("nefertiti"))
+    with pytest.raises(RegistryError, match="'foot-stand-in' has no landmarks"):
+        catalogue.landmarks("foot-stand-in", catalogue.stand_in("nefertiti-stand-in"))
 
 
 def test_the_quick_profile_takes_the_stand_ins_of_the_eight_smallest_models() -> None:
@@ -160,7 +161,7 @@ def test_the_quick_profile_takes_the_stand_ins_of_the_eight_smallest_models() ->
 def test_pouting_lips_leave_no_tunnel_to_plug(monkeypatch: pytest.MonkeyPatch) -> None:
     plugged: list[object] = []
     monkeypatch.setattr("cembench.surfaces.remesh.plugs_for", lambda *a: plugged.append(a))
-    march(catalogue.BODIES["ho-pouting-face"](0))
+    march(catalogue.BODIES["ho-pouting-face-stand-in"](0))
     assert not plugged
 
 
@@ -175,9 +176,9 @@ def test_landmarks_lie_on_the_surface(name: str) -> None:
 
 def test_landmarks_of_faces_are_found_through_the_registry() -> None:
     surfaces = load_registry().surfaces
-    mesh = catalogue.stand_in("nefertiti")  # any mesh has nearest vertices; this one is made fast
+    mesh = catalogue.stand_in("nefertiti-stand-in")  # any mesh will do; this one is made fast
     for name in catalogue.FACES:
         find = surfaces[name].landmarks
         assert find is not None
         assert find(mesh) == catalogue.landmarks(name, mesh)
-    assert surfaces["foot"].landmarks is None
+    assert surfaces["foot-stand-in"].landmarks is None
