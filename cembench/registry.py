@@ -21,6 +21,7 @@ import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FrameType, ModuleType
@@ -586,6 +587,14 @@ class Registry:
 
     def surface(self, name: str) -> Surface:
         """Return the surface of this name; :class:`RegistryError` lists the known ones."""
+        if name in self.datasets and name not in self.surfaces:
+            row = self.datasets[name].paper_row
+            standing = [s.name for s in self.surfaces.values() if row and s.paper_row == row]
+            raise RegistryError(
+                f"{name!r} is a public surface, which is read from a file and not generated: "
+                f"`cembench fetch {name}`, then `--dataset {name}`."
+                + (f" Its stand-in is {standing[0]}." if standing else "")
+            )
         return _look_up("surface", self.surfaces, name)
 
     def dataset(self, name: str) -> Dataset:
@@ -625,8 +634,10 @@ COMMAND = "command:"
 
 def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
     if name not in known:
+        near = get_close_matches(name, known) or [one for one in known if one.startswith(name)]
         raise RegistryError(
             f"unknown {kind} {name!r}; known: {', '.join(sorted(known)) or 'none'}."
+            + (f" Did you mean {' or '.join(near)}?" if name and near else "")
         )
     return known[name]
 

@@ -38,11 +38,15 @@ def count_calls(monkeypatch):
 
 @pytest.fixture
 def cli(capsys, monkeypatch, tmp_path):
-    """Run the command line in an empty folder: exit code, standard output, standard error."""
+    """Run the command line in an empty folder: exit code, standard output, standard error.
+
+    As on one core: where there are more, commands start processes to share their work.
+    """
     workplace = tmp_path / "workplace"
     workplace.mkdir()
     monkeypatch.chdir(workplace)
     monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.setattr("cembench.running.environment.usable_cores", lambda: 1)
 
     def call(*arguments):
         monkeypatch.setattr("sys.argv", ["cembench", *map(str, arguments)])

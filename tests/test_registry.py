@@ -95,6 +95,10 @@ def test_a_name_is_declared_once(plugin):
 def test_an_unknown_name_lists_the_known_ones():
     with pytest.raises(RegistryError, match=r"unknown algorithm 'x'; known: .*cem"):
         load_registry().algorithm("x")
+    with pytest.raises(RegistryError, match=r"Did you mean flat-disk\?"):
+        load_registry().surface("flat-dsik")
+    with pytest.raises(RegistryError, match=r"--dataset left-hand`\. Its stand-in is left-hand-s"):
+        load_registry().surface("left-hand")
     with pytest.raises(RegistryError, match=r"unknown surface 'x'; known: .*flat-disk"):
         load_registry().surface("x")
 

@@ -25,14 +25,15 @@ from cembench.commands import peers as peers_verbs
 from cembench.commands import publish as publish_verbs
 from cembench.commands import repair as repair_verbs
 from cembench.commands import report as report_verbs
+from cembench.commands import reproduce as reproduce_verbs
 from cembench.commands import run as run_verbs
 from cembench.commands import sets as set_verbs
+from cembench.commands import sign as sign_verbs
 from cembench.commands import theory as theory_verbs
 from cembench.commands import validate as validate_verbs
 from cembench.commands.console import (
     Json,
     assignments,
-    complain,
     err,
     out,
     print_json,
@@ -40,7 +41,7 @@ from cembench.commands.console import (
     registry_with,
     split,
 )
-from cembench.commands.ending import Verbs, ending, resumable
+from cembench.commands.ending import Verbs, ending
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import (
     Backend,
@@ -48,6 +49,7 @@ from cembench.commands.options import (
     Budget,
     Faces,
     FixedRounds,
+    Fresh,
     Jobs,
     Memory,
     MostRounds,
@@ -66,7 +68,6 @@ from cembench.commands.options import (
     settings_of_rounds,
 )
 from cembench.core.errors import ParameterError
-from cembench.core.extras import Extra, require
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.looks import USUAL_MOST_ROUNDS
 from cembench.results.paper.profiles import Profile
@@ -88,7 +89,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Benchmark conformal parameterizations of surfaces: fair, checked, repeatable.",
 )
-Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is already recorded.")]
 
 
 def _print_version(asked: bool) -> None:
@@ -274,8 +274,9 @@ def run(
     that have it, -p ALGORITHM.NAME=VALUE of one. docs/measuring.md explains what
     is timed and what an interval means.
     """
+    from cembench.commands.progress import run_with_progress
     from cembench.results import run_folder
-    from cembench.results.paper.profiles import algorithms_of, paper_parameters, surfaces_of
+    from cembench.results.paper.profiles import algorithms_of, surfaces_of
     from cembench.results.record_rows import REFERENCE
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
@@ -330,8 +331,7 @@ def run(
     if many is not None:
         found, standing = [*found, *many.meshes], {**standing, **many.roles}
     tasks = []
-    reproduced = any(role.origin == "model" for role in standing.values())
-    given = (paper_parameters(wanted) if reproduced else {}) | assignments(parameter)
+    given = assignments(parameter)
     for policy in policies:
         how = MeasurementSettings(policy, installed_backend(backend), threads, repeats, share)
         tasks += plan_cells(chosen, found, given, how, plugin, standing)
@@ -344,7 +344,7 @@ def run(
     elif not as_json:
         print_notices(found)
     if machines is None:
-        records = _measure(tasks, Store(output), options)
+        records = run_with_progress(tasks, Store(output), options)
     else:
         records = cluster_runs.measure(
             *(tasks, Store(output), options, machines),
@@ -352,58 +352,6 @@ def run(
             same_environment=same_environment,
         )
     _present(records, as_json=as_json, where=output, reference=reference)
-
-
-@app.command(epilog="Example:  cembench reproduce -o results/reproduce")
-def reproduce(
-    *,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the results.")] = Path(
-        "results/reproduce"
-    ),
-    fresh: Fresh = False,
-    as_json: Json = False,
-) -> None:
-    """Measure every algorithm on stand-ins for the paper's eight smallest models, and report.
-
-    It measures one round, which takes minutes; `run --profile quick` measures
-    enough rounds for intervals. What the folder already holds is not measured
-    again. The report is written to the same folder.
-    """
-    from cembench.core import folders
-    from cembench.registry import load_registry
-    from cembench.results import run_folder
-    from cembench.results.paper.profiles import surfaces_of
-    from cembench.results.record_rows import rows
-    from cembench.results.store import Store
-    from cembench.running.local import Options
-    from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
-
-    require(Extra.REPORT, "a report")
-    run_folder.check(output)
-    folders.check(output / "report", "report")
-    options = Options(memory_bytes=memory_bytes(None), fresh=fresh)
-    registry = load_registry()
-    surfaces = []
-    names = surfaces_of(Profile.quick, registry)
-    for name in names:
-        with err.status(f"making {name}", spinner="line"):
-            surfaces.append(generate_surface(registry, name))
-    chosen = [registry.algorithm(name) for name in registry.usual_algorithms]
-    standing = paper_roles(registry, names)
-    tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), standing=standing)
-    records = _measure(tasks, Store(output), options)
-    command = f"cembench reproduce -o {output}"
-    report, folder = report_verbs.make_report(output, None, command)
-    if as_json:
-        print_json({"cells": rows(records), "report": report_verbs.summary(report, folder)})
-    else:
-        report_verbs.show_report(report, folder)
-        for record in records:
-            if record.outcome.status != "ok":
-                name = f"{record.cell.mesh} / {record.cell.algorithm}"
-                complain(f"{name}: {record.outcome.status}: {record.outcome.cause}")
-    if any(record.outcome.status != "ok" for record in records):
-        raise typer.Exit(1)
 
 
 #: How `doctor` marks what is not ok, by whether it is required.
@@ -432,9 +380,11 @@ def doctor(*, as_json: Json = False) -> None:
 
 #: Modules that hold the other commands.
 _MORE = (
+    reproduce_verbs,
     run_verbs,
     report_verbs,
     publish_verbs,
+    sign_verbs,
     validate_verbs,
     holes_verbs,
     theory_verbs,
@@ -446,15 +396,6 @@ _MORE = (
 )
 for verb, example in (entry for module in _MORE for entry in module.VERBS):
     app.command(epilog=example)(verb)
-
-
-def _measure(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
-    """Run the tasks, with a live table on a terminal and one line per cell elsewhere."""
-    from cembench.commands.progress import progress_on
-    from cembench.running.local import run_tasks
-
-    with resumable(), progress_on(err, len(tasks)) as progress:
-        return run_tasks(tasks, store, options, progress)
 
 
 def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None:
@@ -470,16 +411,18 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
     from cembench.report.content.many import MANY
     from cembench.report.render.terminal import results_table, speedups_table
     from cembench.report.render.terminal_many import machine_lines, many_table
+    from cembench.results.outliers import outlier_lines
     from cembench.results.record_rows import REFERENCE, rows
     from cembench.results.store import Store
 
     reference = reference or REFERENCE
+    suspects = [Text(f"! {line}", style="yellow") for line in outlier_lines(records)]
     environments = Store(where).environments()
     if as_json:
         print_json(rows(records, reference))
     elif len({record.cell.mesh_hash for record in records}) > MANY:
         out.print(many_table(records))
-        for words in machine_lines(records, environments):
+        for words in (*machine_lines(records, environments), *suspects):
             out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
         out.print(f"Pictures and profiles: cembench report {where}", soft_wrap=True)
@@ -488,6 +431,8 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
         speedups = speedups_table(records, reference)
         if speedups is not None:
             out.print(speedups)
+        for words in suspects:
+            out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
     if any(record.outcome.status != "ok" for record in records):
         raise typer.Exit(1)

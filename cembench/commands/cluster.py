@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cembench.commands.console import err, out
+from cembench.commands.console import err, out, warn
 from cembench.commands.ending import resumable
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ Cluster = Annotated[
     str | None,
     typer.Option(
         "--cluster",
-        help="Measure on local:N workers, on those of tcp://HOST:PORT, or on "
+        help="Measure on local:N workers, on those of tls://HOST:PORT, or on "
         "slurm:partition=cpu,cores=16,machines=10: see docs/cluster.md.",
     ),
 ]
@@ -49,15 +49,19 @@ def place_of(given: str | None, *, same_environment: bool) -> ClusterPlace | Non
     """
     from cembench.core.errors import ParameterError
     from cembench.core.extras import Extra, require
-    from cembench.running.cluster.connect import parse_cluster
+    from cembench.running.cluster.connect import MODULES, parse_cluster
 
     if given is None:
         if same_environment:
             raise ParameterError("--same-environment is of --cluster: name one, or leave it out.")
         return None
     where = parse_cluster(given)
-    needed = ["dask", "distributed", *(["dask_jobqueue"] if where.kind == "slurm" else [])]
-    require(Extra.CLUSTER, "--cluster", *needed)
+    require(Extra.CLUSTER, "--cluster", *MODULES[where.kind])
+    if where.is_open:
+        warn(
+            f"{where.address} asks nobody who they are: whoever reaches it runs programs as the "
+            "users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off it."
+        )
     return where
 
 

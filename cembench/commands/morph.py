@@ -251,7 +251,7 @@ VERBS = (
     (
         morph,
         "Examples:  cembench morph a.obj b.obj --landmarks ab.csv -o ab.gif  ·  "
-        "cembench morph liu-wry-face liu-neutral-face liu-smile-face --faces 8000 -o liu.mp4  ·  "
+        "cembench morph liu-wry-face-stand-in liu-smile-face-stand-in --faces 8000 -o liu.mp4  ·  "
         "cembench morph a.ply b.ply -o frames/ab.obj -o ab.npz --json",
     ),
 )

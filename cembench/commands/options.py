@@ -113,6 +113,7 @@ RepeatBusy = Annotated[
         help="Repeat a process up to N times if the machine was busy with other work.",
     ),
 ]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is already recorded.")]
 Jobs = Annotated[
     int | None,
     typer.Option(

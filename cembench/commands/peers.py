@@ -18,7 +18,14 @@ if TYPE_CHECKING:
     from cembench.results.records import Record
 
 #: Default surfaces, and their number of triangles.
-USUAL = ("hemi-ellipsoid", "catenoid-sheet", "cylinder-sheet", "cone", "cowboy-hat", "nefertiti")
+USUAL = (
+    "hemi-ellipsoid",
+    "catenoid-sheet",
+    "cylinder-sheet",
+    "cone",
+    "cowboy-hat-stand-in",
+    "nefertiti-stand-in",
+)
 FACES = 5000
 #: Our algorithms for disks in the comparison; of other targets, all are included.
 DISKS = ("cem", "direct-cem", "harmonic-circle")

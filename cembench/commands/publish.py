@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cembench.commands.console import Json, err, out, print_json
+from cembench.commands.sign import RequireSigned, check_signed
 from cembench.core.outputs import refuse_inputs
 
 
@@ -15,6 +16,7 @@ def publish(
     runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
     *,
     output: Annotated[Path, typer.Option("-o", "--output", help="Where the site goes.")],
+    require_signed: RequireSigned = None,
     as_json: Json = False,
 ) -> None:
     """Write a static site of several runs: index, machines, ratios over time, reports.
@@ -28,6 +30,7 @@ def publish(
     from cembench.results.verify import Depth, sound_records
 
     refuse_inputs(output, runs, force=False)
+    check_signed(runs, require_signed)
     for run in runs:
         sound_records(Store(run), Depth.sample)
 

@@ -11,6 +11,7 @@ import typer
 
 from cembench.commands.console import Json, complain, note, out, print_json, print_pair, warn
 from cembench.commands.options import Verify
+from cembench.commands.sign import RequireSigned, check_signed
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.outputs import refuse_inputs
 from cembench.report.export_format import Format
@@ -240,6 +241,7 @@ def merge(
         bool, typer.Option("--force", help="Allow the output to be one of the runs.")
     ] = False,
     verify: Verify = False,
+    require_signed: RequireSigned = None,
     as_json: Json = False,
 ) -> None:
     """Merge the records of several runs into one folder.
@@ -257,6 +259,7 @@ def merge(
     from cembench.results.verify import Depth, sound_records
 
     refuse_inputs(output, runs, force=force)
+    check_signed(runs, require_signed)
     into = Store(output)
     depth = Depth.everything if verify else Depth.sample
     for run in runs:

@@ -20,7 +20,14 @@ from cembench.results.record_rows import REFERENCE
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.local import DEFAULT_TIMEOUT, USUAL_BUDGET, Options, Watcher, run_tasks
-from cembench.running.plan import MeasurementSettings, PaperRole, Task, paper_roles, plan_cells
+from cembench.running.plan import (
+    MeasurementSettings,
+    PaperRole,
+    Task,
+    paper_role_of,
+    paper_roles,
+    plan_cells,
+)
 from cembench.workflows.notebook import html_table
 from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
@@ -293,7 +300,7 @@ def benchmark(
         if isinstance(one, tuple | list):
             mesh = mesh.renamed(f"surface-{number}")
         meshes.append(mesh)
-        roles |= _roles(registry, one)
+        roles[mesh.name] = _role(registry, one, mesh)
     if algorithms is None:
         chosen = [a for a in chosen if any(isinstance(mesh, a.mesh_type) for mesh in meshes)]
     tasks = []
@@ -328,8 +335,8 @@ def _on_cluster(
         run_on_cluster(tasks, store, client, options, watcher)
 
 
-def _roles(registry: Registry, given: SurfaceInput) -> dict[str, PaperRole]:
-    """Return the row of the paper's tables for a named surface, if it has one."""
+def _role(registry: Registry, given: SurfaceInput, mesh: TriangleMesh) -> PaperRole:
+    """Return the row of the paper's tables that a surface is, or stands in for, if any."""
     if isinstance(given, str) and given in registry.surfaces and not Path(given).is_file():
-        return paper_roles(registry, [given])
-    return {}
+        return paper_roles(registry, [given]).get(given, PaperRole())
+    return paper_role_of(registry, mesh)

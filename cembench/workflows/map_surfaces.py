@@ -15,7 +15,7 @@ from cembench.core.notices import Notice
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.local import Options, map_once
-from cembench.running.plan import MeasurementSettings, Task, paper_role_of_file, plan_cells
+from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
 from cembench.running.surface_file import SurfaceFile
 from cembench.workflows.map_extras import Extras, write_extras
 from cembench.workflows.map_files import (
@@ -95,7 +95,7 @@ def jobs_of(
     for surface in shells.parts:
         mesh = surface.mesh
         taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
-        standing = {mesh.name: paper_role_of_file(registry, surface.path, mesh)}
+        standing = {mesh.name: paper_role_of(registry, mesh)}
         tasks = plan_cells([taken], [mesh], dict(parameters), how, list(plugins), standing)
         found.append(Job(surface, tasks[0]))
     return tuple(found)

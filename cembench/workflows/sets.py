@@ -7,13 +7,15 @@ listed too, with the reason, because success rates need the right denominator.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
 from cembench.core.errors import ParameterError
-from cembench.mesh.datasets import Dataset, Progress, fetch_all, surface_file
+from cembench.mesh.datasets import Dataset, fetch_all, surface_file
+from cembench.mesh.download import Progress
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
@@ -138,7 +140,8 @@ def _of_path(name: str, limit: int | None) -> Iterator[Provided]:
 
 
 def _of_datasets(datasets: Sequence[Dataset], progress: ShowProgress) -> Iterator[Provided]:
-    found = {one.dataset.name: one for one in fetch_all(datasets, progress=progress)}
+    with closing(fetch_all(datasets, progress=progress)) as downloads:
+        found = {one.dataset.name: one for one in downloads}
     for dataset in datasets:
         one = found[dataset.name]
         if one.error is not None:

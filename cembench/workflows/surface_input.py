@@ -13,9 +13,10 @@ from cembench.core.errors import MeshError
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Registry, load_registry
-from cembench.running.plan import generate_surface
+from cembench.running.plan import file_named, generate_surface
 
-#: A checked mesh, the path of a mesh file, the name of a registered surface, or arrays (V, F).
+#: A checked mesh, the path of a mesh file, the name of a generated surface or of a public one that
+#: was fetched, or arrays (V, F).
 SurfaceInput: TypeAlias = TriangleMesh | str | os.PathLike[str] | tuple[ArrayLike, ArrayLike]
 
 #: The kinds of surface that algorithms take, the most special first.
@@ -49,16 +50,11 @@ def checked_surface(
             return given
         return _first(kinds, lambda kind: _converted(given, kind))
     if isinstance(given, str | os.PathLike):
-        path = Path(given)
+        name = str(given)
         registry = registry or load_registry()
-        if str(given) in registry.surfaces and not path.is_file():
-            made = generate_surface(registry, str(given))
-            return checked_surface(made, kinds, registry)
-        if not path.suffix and not path.exists():
-            raise MeshError(
-                f"{str(given)!r} is neither a file nor a registered surface; known surfaces: "
-                f"{', '.join(sorted(registry.surfaces)) or 'none'}."
-            )
+        if name in registry.surfaces and not Path(name).is_file():
+            return checked_surface(generate_surface(registry, name), kinds, registry)
+        path = file_named(registry, name)
         return _first(kinds, lambda kind: read_mesh(path, kind))
     V, F = pair_of_arrays(given)
     return _first(kinds, lambda kind: kind.from_arrays(V, F))

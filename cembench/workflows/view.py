@@ -56,8 +56,10 @@ def map_page(
 
 def metric_facts(outcome: Outcome) -> list[tuple[str, str]]:
     """Return the figures of a map as pairs of a title and a number with unit."""
-    return [
+    facts = [
         (metric.title, f"{metric.text(outcome.metrics[metric.name], precise=True)} {metric.unit}")
         for metric in METRICS
         if metric.name in outcome.metrics
     ]
+    folded = outcome.folded_before_repair
+    return facts if folded is None else [*facts, ("folded before repair", str(folded))]

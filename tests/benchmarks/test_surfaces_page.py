@@ -31,19 +31,20 @@ def line(name, row, origin):
 def test_a_model_stands_below_its_stand_in_and_rows_are_in_the_papers_order():
     text = tables(
         [
-            line("cowboy-hat", "Cowboy Hat", "stand-in"),
+            line("cowboy-hat-stand-in", "Cowboy Hat", "stand-in"),
             line("nefertiti.mat", "Nefertiti", "model"),
-            line("nefertiti", "Nefertiti", "stand-in"),
+            line("nefertiti-stand-in", "Nefertiti", "stand-in"),
         ]
     )
     rows = [row for row in text.splitlines() if row.startswith("| ") and "| surface" not in row]
     assert rows[:3] == [
-        "| nefertiti | stand-in for Nefertiti | 562 | 36 | 562 | 34 | 5.0% | 1.2e+03 |",
+        "| nefertiti-stand-in | stand-in for Nefertiti | 562 | 36 | 562 | 34 | 5.0% | 1.2e+03 |",
         "| nefertiti.mat | model Nefertiti | 562 | 36 | 562 | 34 | 5.0% | 1.2e+03 |",
-        "| cowboy-hat | stand-in for Cowboy Hat | 562 | 36 | 4,604 | 48 | 5.0% | 1.2e+03 |",
+        "| cowboy-hat-stand-in | stand-in for Cowboy Hat | 562 | 36 "
+        "| 4,604 | 48 | 5.0% | 1.2e+03 |",
     ]
     assert rows[3] == (
-        "| nefertiti | stand-in for Nefertiti | 7 | 0.5000 | 1.25 | 2.50 | 0 "
+        "| nefertiti-stand-in | stand-in for Nefertiti | 7 | 0.5000 | 1.25 | 2.50 | 0 "
         "| 19 | 0.0278 | 2.65 | 3.35 |"
     )
 

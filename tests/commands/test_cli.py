@@ -95,6 +95,35 @@ def test_map_tells_of_a_map_that_is_far_from_conformal(cli, tmp_path):
     assert json.loads(cli("map", tmp_path / "long.obj", "--json")[1])["notes"] == []
 
 
+def test_map_names_a_much_better_stop(cli, tmp_path):
+    from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+
+    from cembench.mesh.files import write_mesh
+
+    write_mesh(tmp_path / "half.obj", hemi_ellipsoid(6400))
+    code, out, _ = cli("map", tmp_path / "half.obj", "-a", "cem", "--json")
+    assert code == 0
+    (note,) = json.loads(out)["notes"]
+    assert "-p cem.stop=change" in note
+    named = ("-p", "cem.stop=change", "--json")
+    assert json.loads(cli("map", tmp_path / "half.obj", "-a", "cem", *named)[1])["notes"] == []
+
+
+def test_without_repair_a_folded_map_is_invalid_and_its_folds_are_a_figure(cli, tmp_path):
+    from cembench.mesh.files import write_mesh
+
+    write_mesh(tmp_path / "crumpled.obj", gallery.crumpled_disk())
+    arguments = ("map", tmp_path / "crumpled.obj", "-a", "harmonic-circle")
+    code, out, _ = cli(*arguments, "-p", "repair=false", "--json")
+    own = json.loads(out)
+    assert (code, own["status"]) == (1, "invalid")
+    assert own["folded_before_repair"] == own["flipped_triangles"] == 6
+    repaired = json.loads(cli(*arguments, "--json")[1])
+    assert (repaired["status"], repaired["folded_before_repair"]) == ("ok", 6)
+    assert "folded before repair" in cli(*arguments, "--html", "page.html")[1]
+    assert "folded before repair" in (cli.folder / "page.html").read_text()
+
+
 def test_run_records_shows_and_resumes(cli, cap):
     arguments = [
         "run",

@@ -170,7 +170,7 @@ def test_a_real_face_morphs_into_a_real_head(cli):
 @pytest.mark.slow
 def test_three_expressions_morph_without_folds_and_jumps(cli):
     """Figures 13 and 14 on smaller faces of the same shape."""
-    names = ("liu-wry-face", "liu-neutral-face", "liu-smile-face")
+    names = ("liu-wry-face-stand-in", "liu-neutral-face-stand-in", "liu-smile-face-stand-in")
     code, out, _ = cli("morph", *names, "--faces", 8000, "--run", "run", "--json")
     assert code == 0
     found = json.loads(out)

@@ -181,8 +181,8 @@ def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
     from cembench.registry import load_registry
     from cembench.running.plan import PaperRole, paper_roles
 
-    found = paper_roles(load_registry(), ["foot", "flat-disk"])
-    assert found == {"foot": PaperRole("Foot", "stand-in")}
+    found = paper_roles(load_registry(), ["foot-stand-in", "flat-disk"])
+    assert found == {"foot-stand-in": PaperRole("Foot", "stand-in")}
 
 
 def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):
