@@ -99,7 +99,7 @@ def cem_as_printed(mesh: DiskMesh, model: str, *, repair: bool = False) -> Param
     """CEM stopped after the number of iterations that Table 1 prints."""
     count = paper.table(1)[model]["cem_iterations"]
     assert count is not None
-    return cem(mesh, max_iterations=int(count), tolerance=0, repair=repair)
+    return cem(mesh, max_iterations=int(count), tolerance=0, stop="change", repair=repair)
 
 
 Call: TypeAlias = Callable[..., Parameterization]

@@ -47,7 +47,8 @@ def koebe_cem(
     the centroid, as in the paper, which ignores the disk's interior). The holes are sorted longest
     first, and the shortest is opened first. A step starts from the paper's pole (in later sweeps
     from the boundary's position when it was last open) or from the boundary's last image put on a
-    circle, whichever has the lower E_C. At the end each hole is put on the circle fitted to it and
+    circle, whichever has the lower E_C, and ends when E_C changes by less than `tolerance` (CEM's
+    `stop="change"`). At the end each hole is put on the circle fitted to it and
     the interior is solved for again (`rounding`; `circularity_before_rounding` is its circularity
     before that).
     """

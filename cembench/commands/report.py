@@ -22,6 +22,10 @@ Output = Annotated[
 ]
 
 
+#: Processes that draw, at most: each holds a surface with its maps.
+MOST_DRAWING = 2
+
+
 def report(
     run: Run = DEFAULT_RUN, *, output: Output = None, verify: Verify = False, as_json: Json = False
 ) -> None:
@@ -64,8 +68,8 @@ def make_report(
             if not err.is_terminal and done < total:
                 err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
 
-        aside = usable_cores() > 1
-        return write_report(run, folder, command or told, progress, aside=aside), folder
+        jobs = min(usable_cores(), MOST_DRAWING)
+        return write_report(run, folder, command or told, progress, jobs=jobs), folder
 
 
 def show_report(report: Report, folder: Path) -> None:

@@ -10,10 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import warnings
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple
@@ -30,7 +27,7 @@ from PIL import Image
 from cembench.core.atomic import write_bytes, write_text
 from cembench.report.document import Figure
 from cembench.report.palette import PLAIN, SeriesStyle
-from cembench.running.process_pool import process_pool
+from cembench.report.shared_drawing import draw
 
 #: How a series is drawn: points, joined points, a staircase, or bars side by side or stacked.
 Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
@@ -135,29 +132,10 @@ _NO_DATE = {
 }
 
 
-#: What draws plots into a folder instead of this process; see :func:`drawn_aside`.
-_ASIDE: ContextVar[Callable[[Plot, Path], object] | None] = ContextVar("_ASIDE", default=None)
-
-
-@contextmanager
-def drawn_aside() -> Iterator[None]:
-    """Draw the plots of this block in another process; their files are complete at its end."""
-    with process_pool(1) as pool:
-        drawn: list[Future[None]] = []
-        token = _ASIDE.set(lambda plot, place: drawn.append(pool.submit(_draw_into, plot, place)))
-        try:
-            yield
-        finally:
-            _ASIDE.reset(token)
-        for one in drawn:
-            one.result()
-
-
 def write_plot(plot: Plot, folder: Path) -> Figure:
     """Draw a plot into ``folder/figures``; return the report's figure with its files and data."""
     place = folder / "figures"
-    draw = _ASIDE.get() or _draw_into
-    draw(plot, place)
+    draw(_draw_into, plot, place)
     write_text(place / f"{plot.name}.csv", data_of(plot))
     return Figure(
         name=plot.name,

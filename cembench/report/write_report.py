@@ -13,7 +13,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 
 from cembench.core import folders
@@ -24,10 +23,10 @@ from cembench.report.content.report import Progress, build_report
 from cembench.report.document import Report
 from cembench.report.export import export_rows
 from cembench.report.export_format import Format
-from cembench.report.plots import drawn_aside
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv
+from cembench.report.shared_drawing import shared_drawing
 
 
 def write_report(
@@ -36,9 +35,9 @@ def write_report(
     command: str,
     progress: Progress = lambda *_: None,
     *,
-    aside: bool = False,
+    jobs: int = 1,
 ) -> Report:
-    """Write the report of a run in all its forms; with `aside`, another process draws its plots.
+    """Write the report of a run in all its forms; `jobs` processes draw its pictures and plots.
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -59,7 +58,7 @@ def write_report(
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
-            with drawn_aside() if aside else nullcontext():
+            with shared_drawing(jobs):
                 report = build_report(evidence, draft, command, progress)
             _write_all(report, evidence, draft)
             folders.publish(draft, folder, "report")

@@ -126,8 +126,9 @@ def differences(
     found = []
     for name in facts:
         mine, other = ours.get(name), theirs.get(name)
-        if isinstance(mine, Mapping) or isinstance(other, Mapping):
-            mine, other = mine or {}, other or {}  # older records lack some facts
+        older = [{} if fact is None else fact for fact in (mine, other)]  # some facts are lacking
+        if mine != other and all(isinstance(fact, Mapping) for fact in older):
+            mine, other = older
             found += [
                 f"{part}: {mine.get(part)} / {other.get(part)}"
                 for part in sorted({*mine, *other})

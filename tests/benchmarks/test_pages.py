@@ -32,7 +32,8 @@ def test_the_rounds_of_the_records_give_the_averages_of_the_tables(report, polic
         found = readme_speedups.ratios(folder / "records.csv", name.lower(), policy)
         figures = np.exp([np.median(np.log(one)) for one in found])
         for reading, average in readme_speedups.AVERAGES.items():
-            assert average(figures) == pytest.approx(float(there[reading][f"{name} here"]))
+            rate = average(figures) - 1
+            assert rate == pytest.approx(float(there[reading][f"{name} here"]))
 
 
 def test_averages_have_intervals_where_cells_have_six_rounds():
@@ -57,7 +58,7 @@ def test_a_report_without_averages_is_refused(tmp_path):
     [
         ("README.md", "readme_speedups"),
         ("docs/surfaces.md", "surfaces_page"),
-        ("docs/algorithms.md", "cem_stopping_rules"),
+        ("docs/paper_models.md", "cem_stopping_rules"),
         ("docs/algorithms.md", "qiem_steps"),
     ],
 )

@@ -200,7 +200,7 @@ def test_doctor_tells_of_remeshing_and_of_what_was_fetched(cli, monkeypatch, tmp
     assert code == 0
     assert "-- remeshing pymeshlab's filter" in " ".join(out.split())
     assert "apt-get install libopengl0" in out
-    assert "0 of 53 fetched; kept in" in out
+    assert "0 of 57 fetched; kept in" in out
     assert "cembench fetch NAME" in out
 
 

@@ -248,10 +248,10 @@ def test_a_part_of_a_file_is_read_alone(served, tmp_path):
     both = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 5 5 5\nv 6 5 5\nv 5 6 5\nf 1 2 3\nf 4 5 6\n"
     answers["mesh47.obj"] = both.ljust(len(answers["mesh47.obj"]), b"\n")
     sha = hashlib.sha256(answers["mesh47.obj"]).hexdigest()
-    part = replace(datasets[47], name="second", sha256=sha, polygons=(1, 1))
+    part = replace(datasets[47], sha256=sha, polygons=(1, 1))
     fetch(part)
     mesh = read_mesh(surface_file(part), TriangleMesh)
-    assert (mesh.name, mesh.n, mesh.m) == ("second", 3, 1)
+    assert (mesh.name, mesh.n, mesh.m) == ("mesh47", 3, 1)
     assert mesh.V.min() == 5
     assert surface_file(datasets[0]) == datasets[0].path
 

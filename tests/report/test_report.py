@@ -27,7 +27,7 @@ from cembench.results.merging import merge
 from cembench.results.paper import CITATION
 from cembench.results.store import Store
 from tests.limits import tree
-from tests.report.small_run import write_run
+from tests.report.small_run import meshes, write_run
 
 
 def items_of(report, kind):
@@ -341,13 +341,15 @@ def test_runs_that_are_merged_bring_their_surfaces(tmp_path):
     assert sorted(p.name for p in (tmp_path / "both" / "meshes").iterdir()) == sorted(names)
 
 
-def test_another_process_draws_the_same_plots(small_run, written, monkeypatch, tmp_path):
-    drawn = []
-    monkeypatch.setattr(plots, "_drawn", lambda plot: drawn.append(plot))
-    monkeypatch.setattr(inspection, "SIDE", 48)
-    write_report(small_run, tmp_path / "report", "cembench report run", aside=True)
-    assert tree(tmp_path / "report") == tree(written[1])
-    assert drawn == []
+def test_other_processes_draw_the_same_pictures_and_plots(monkeypatch, tmp_path):
+    """One surface lies in the run, the other does not."""
+    store = write_run(tmp_path / "run", ("reuse",))
+    (tmp_path / "run" / "meshes" / f"{meshes()[''].hash[:32]}.npz").unlink()
+    write_report(store.folder, tmp_path / "one", "c")
+    monkeypatch.setattr(plots, "_drawn", None)
+    monkeypatch.setattr(inspection, "SIDE", None)
+    write_report(store.folder, tmp_path / "two", "c", jobs=2)
+    assert tree(tmp_path / "two") == tree(tmp_path / "one")
 
 
 def test_the_head_says_until_when_it_was_measured(evidence):

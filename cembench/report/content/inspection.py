@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,10 +72,10 @@ class Inspection:
 
     surface: MeasuredSurface
     kept: bool
-    checkerboards: Mapping[str, Figure] = field(default_factory=lambda: MappingProxyType({}))
+    checkerboards: Mapping[str, Figure] = field(default_factory=dict)
     curvature: Figure | None = None
     mesh: Figure | None = None
-    angles: Mapping[str, Angles] = field(default_factory=lambda: MappingProxyType({}))
+    angles: Mapping[str, Angles] = field(default_factory=dict)
     #: The interactive scene of the surface and its maps; empty without maps.
     scene: bytes = b""
 
@@ -89,7 +88,7 @@ class Inspection:
         )
 
 
-def inspect_surface(evidence: Evidence, surface: MeasuredSurface, folder: Path) -> Inspection:
+def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) -> Inspection:
     """Draw a surface with every map that ended ok, and compute its angles."""
     mesh = evidence.mesh(surface)
     if mesh is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from cembench import __version__
@@ -38,6 +39,7 @@ from cembench.report.content.table_3 import table_3
 from cembench.report.content.table_4 import table_4
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
+from cembench.report.shared_drawing import each
 from cembench.results.paper import CITATION
 from cembench.results.records import MeshOrigin
 
@@ -77,9 +79,10 @@ def build_report(
     n = len(shown) + 1
     inspections: dict[str, Inspection] = {}
     pages = []
+    inspected = each(partial(inspect_surface, evidence, folder), shown)
     for k, surface in enumerate(shown):
         progress(f"surface {surface.title}", k, n)
-        seen = inspections[surface.mesh_hash] = inspect_surface(evidence, surface, folder)
+        seen = inspections[surface.mesh_hash] = next(inspected)
         pages.append(_page(evidence, surface, seen, folder))
     progress("tables, plots and claims", n - 1, n)
     tested = claims(evidence, inspections) if of_paper else []

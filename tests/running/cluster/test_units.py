@@ -237,6 +237,8 @@ def test_differences_of_software_name_library_and_versions():
     ours = {"cembench": "1", "libraries": {"numpy": "2.1", "scipy": "1.15"}}
     theirs = {"cembench": "1", "libraries": {"numpy": "2.0", "scipy": "1.15"}, "cpu": "another"}
     assert differences(ours, theirs) == ["numpy: 2.1 / 2.0"]
+    assert differences({"cembench": {}}, {"cembench": "1"}) == ["cembench: {} / 1"]
+    assert differences({"libraries": {"numpy": "2"}}, {}) == ["numpy: 2 / None"]
 
 
 def test_a_machine_may_be_named(monkeypatch):
