@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
-from typing import TypeAlias
 
 from cembench.report.content.claims import accuracy, efficiency, iteration, premises, start
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
-from cembench.report.shared_drawing import each
 
-#: A function that tests one claim.
-Test: TypeAlias = Callable[[Evidence, Mapping[str, Inspection]], Claim]
 #: All claims in the order of the paper's text.
-CLAIMS: tuple[Test, ...] = (
+CLAIMS: tuple[Callable[[Evidence, Mapping[str, Inspection]], Claim], ...] = (
     premises.delaunay,
     premises.well_conditioned,
     start.distortion_near_pole,
@@ -46,8 +41,4 @@ CLAIMS: tuple[Test, ...] = (
 
 def claims(evidence: Evidence, inspections: Mapping[str, Inspection]) -> list[Claim]:
     """Return all claims with their verdicts on this run."""
-    return list(each(partial(_tested, evidence, inspections), CLAIMS))
-
-
-def _tested(evidence: Evidence, inspections: Mapping[str, Inspection], test: Test) -> Claim:
-    return test(evidence, inspections)
+    return [claim(evidence, inspections) for claim in CLAIMS]
