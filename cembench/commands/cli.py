@@ -53,6 +53,8 @@ from cembench.commands.options import (
     Jobs,
     Memory,
     MostRounds,
+    Pairing,
+    PairingOption,
     Parameters,
     Plugins,
     Precision,
@@ -234,6 +236,7 @@ def run(
     rounds: FixedRounds = None,
     max_rounds: MostRounds = USUAL_MOST_ROUNDS,
     budget: Budget = None,
+    pairing: PairingOption = Pairing.auto,
     repeat_busy: RepeatBusy = 0,
     jobs: Jobs = None,
     seed: Seed = 0,
@@ -285,6 +288,10 @@ def run(
 
     run_folder.check(output)
     machines = cluster_runs.place_of(cluster, same_environment=same_environment)
+    if machines is not None and pairing is Pairing.process:
+        raise ParameterError(
+            "--pairing process is for runs on this machine; leave it out, or leave --cluster out."
+        )
     policies = _policies(solves)
     one_round = bool(sets) and rounds is None and precision is None
     repeats, share = settings_of_rounds(1 if one_round else rounds, precision)
@@ -297,6 +304,7 @@ def run(
         reference=reference or REFERENCE,
         most_rounds=max_rounds,
         budget=budget_seconds(budget, profile),
+        pairing=pairing.value,
         repeat_busy=repeat_busy,
         jobs=jobs or (usable_cores() if sets else 1),
     )

@@ -105,6 +105,24 @@ Budget = Annotated[
         "`paper`, else 30m).",
     ),
 ]
+
+
+class Pairing(StrEnum):
+    """Whether algorithms that are compared also share a process in each round."""
+
+    auto = "auto"
+    separate = "separate"
+    process = "process"
+
+
+PairingOption = Annotated[
+    Pairing,
+    typer.Option(
+        help="Besides a process for each cell, a round may have one that the algorithms of a "
+        "surface share, where processes differ more than calls (process). auto: where this "
+        "machine's scatter promises narrower ratios in the same time."
+    ),
+]
 RepeatBusy = Annotated[
     int,
     typer.Option(

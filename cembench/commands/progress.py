@@ -51,6 +51,10 @@ class Remaining:
         self._left[cell] = left
         self._last[cell] = seconds
 
+    def took(self, cell: str, seconds: float) -> None:
+        """Add the seconds of a shared process to those of a cell's last one."""
+        self._last[cell] = self._last.get(cell, 0.0) + seconds
+
     def finished(self, cell: str) -> None:
         """Drop the processes still expected for this cell."""
         self.processes -= self._left.pop(cell, 0)
@@ -105,6 +109,10 @@ class PlainProgress(Watcher):
         """Update the estimate of the time left."""
         self.remaining.ended(task.cell.label, rounds_left(step), seconds)
 
+    def took(self, task: Task, seconds: float) -> None:
+        """Update the estimate of the time left."""
+        self.remaining.took(task.cell.label, seconds)
+
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
         """Print a line for the cell."""
         self.remaining.finished(task.cell.label)
@@ -118,6 +126,10 @@ class PlainProgress(Watcher):
         """Print the number of workers; those of one machine take turns."""
         self.remaining.machines = max(1, len(set(names)))
         self.shows(f"{len(names)} worker{'' if len(names) == 1 else 's'} there")
+
+    def says(self, words: str) -> None:
+        """Print what precision can be expected."""
+        self.shows(words)
 
     def shows(self, words: str) -> None:
         """Print what happened on a cluster; a live display stays below it."""

@@ -33,7 +33,7 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
     The exit code is 1 if a record or a map no longer agrees with its recorded
     figures.
     """
-    from cembench.results.stability import stability_words
+    from cembench.results.stability import scatter_words, stability_words
     from cembench.results.store import Store
     from cembench.results.verify import Depth, Kind
     from cembench.results.verify import verify as verify_run
@@ -65,6 +65,7 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
     }
     about["machines"] = machines_of(store, verified.records)
     about["stability"] = stability_words(verified.records)
+    about["scatter"] = scatter_words(verified.records)
     if as_json:
         print_json(about)
     else:
@@ -86,8 +87,9 @@ def _show_status(
     if others:
         out.print(f"{len(others):>6}  other records, not part of the last request")
     _show_machines(about["machines"])
-    if about["stability"]:
-        out.print(about["stability"])
+    for words in (about["stability"], about["scatter"]):
+        if words:
+            out.print(words)
     for cell, state in cells:
         if state.name not in ("ok", "waiting"):
             line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {state}"

@@ -48,6 +48,8 @@ class NoticeKind(StrEnum):
     PROCESSES_LEFT = "processes_left"
     #: The first call of a process took much longer than the later ones.
     COLD_FIRST_CALL = "cold_first_call"
+    #: A process shared with the cells that a cell is compared with could not be used.
+    NOT_TOGETHER = "not_together"
     #: How the seconds of an external program were measured.
     PROGRAM_SECONDS = "program_seconds"
 

@@ -5,7 +5,10 @@ whatever slows the machine for a while slows both. If both had the same cost, ei
 slower one of a round by the same amount with the same probability. The logarithm of the ratio is
 then symmetric about 0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact
 under any noise: "faster" is wrong in at most 5 % of all comparisons, even if rounds continued until
-the interval was narrow (:mod:`cembench.results.looks`). For many comparisons in one table see
+the interval was narrow (:mod:`cembench.results.looks`). Where the algorithms of a round shared a
+process too (:mod:`cembench.running.pairing`), the ratios within it decide, unless those between
+separate processes show that one algorithm disturbed the other; then a verdict must hold for both,
+so it is wrong no more often. For many comparisons in one table see
 :mod:`cembench.results.many`; for two runs :mod:`cembench.results.runs_compared`.
 """
 
@@ -54,6 +57,11 @@ class Comparison:
     #: p-value of the difference (:mod:`cembench.results.student`), corrected for the looks taken;
     #: corrections for many comparisons use it. 1 without an interval.
     p: float = 1.0
+    #: Whether the ratios are those within shared processes.
+    together: bool = False
+    #: Ratio within shared processes over that between separate ones, where both were measured: an
+    #: interval that excludes 1 shows that the algorithms disturb each other.
+    disturbance: Interval | None = None
 
     @property
     def speedup(self) -> float:
@@ -96,23 +104,56 @@ def is_unstable(record: Record) -> bool:
 
 
 def paired_ratios(record: Record, reference: Record) -> list[float]:
-    """Return the ratio of both times for each round that measured both in one sitting.
+    """Return the ratios that decide, one for each round that measured both in one sitting.
 
-    For an external program the solve time is used; the cost of its process is shown separately and
-    never compared with the seconds of a call. Empty if a round has no such time.
+    See :func:`ratios_of_rounds`.
     """
-    return ratios_of_rounds(record.outcome.rounds, reference.outcome.rounds)
+    ours, theirs = record.outcome.rounds, reference.outcome.rounds
+    share = share_of(len(_pairs(ours, theirs)), record.cell, reference.cell)
+    return ratios_of_rounds(ours, theirs, share)
 
 
 def measured_ratios(record: Record, reference: Record) -> list[float]:
     """Return :func:`paired_ratios` by our clock alone, whatever solve time a program prints."""
     pairs = _pairs(record.outcome.rounds, reference.outcome.rounds)
-    return _ratios([(a.measured_seconds, b.measured_seconds) for a, b in pairs])
+    if record.is_program or reference.is_program:
+        return _ratios([(a.measured_seconds, b.measured_seconds) for a, b in pairs])
+    return paired_ratios(record, reference)
 
 
-def ratios_of_rounds(ours: Sequence[Round], theirs: Sequence[Round]) -> list[float]:
-    """Like :func:`paired_ratios`, for rounds that are not in a record yet."""
-    return _ratios([(a.solve_seconds, b.solve_seconds) for a, b in _pairs(ours, theirs)])
+def ratios_of_rounds(
+    ours: Sequence[Round], theirs: Sequence[Round], share: float = 1.0
+) -> list[float]:
+    """Return the ratio of both times for each round that measured both in one sitting.
+
+    These are the ratios within shared processes if every round has them and they agree with those
+    between separate ones, which are the ratios otherwise. For an external program the solve time is
+    used; the cost of its process is shown separately and never compared with the seconds of a call.
+    Empty if a round has no such time.
+    """
+    separate, together = both_ratios(ours, theirs)
+    return together if agree(disturbance(separate, together, share)) else separate
+
+
+def both_ratios(ours: Sequence[Round], theirs: Sequence[Round]) -> tuple[list[float], list[float]]:
+    """Return the ratios between separate processes, and those within shared ones, if any."""
+    pairs = _pairs(ours, theirs)
+    separate = _ratios([(a.solve_seconds, b.solve_seconds) for a, b in pairs])
+    return separate, _ratios([(a.together_seconds, b.together_seconds) for a, b in pairs])
+
+
+def disturbance(
+    separate: Sequence[float], together: Sequence[float], share: float = 1.0
+) -> Interval | None:
+    """Return the interval of the ratio within shared processes over that between separate ones."""
+    if not together or len(together) != len(separate):
+        return None
+    return ratio_interval([a / b for a, b in zip(together, separate, strict=True)], share)
+
+
+def agree(found: Interval | None) -> bool:
+    """Whether the shared processes are known to show the same ratio as separate ones."""
+    return found is not None and 1 in found
 
 
 def _ratios(times: Sequence[tuple[float | None, float | None]]) -> list[float]:
@@ -132,18 +173,25 @@ def compare(record: Record, reference: Record) -> Comparison | None:
     ours, theirs = record.outcome.solve_seconds, reference.outcome.solve_seconds
     if ours is None or theirs is None:
         return None
-    ratios = paired_ratios(record, reference)
-    if not ratios:
+    separate, together = both_ratios(record.outcome.rounds, reference.outcome.rounds)
+    if not separate:
         return Comparison(ours / theirs, None, "not side by side", 0)
-    share = share_of(len(ratios), record.cell, reference.cell)
-    return confirmed(compare_ratios(ratios, share), measured_ratios(record, reference), share)
+    share = share_of(len(separate), record.cell, reference.cell)
+    found = disturbance(separate, together, share)
+    if agree(found):
+        return replace(compare_ratios(together, share), together=True, disturbance=found)
+    alone = compare_ratios(separate, share)
+    if found is not None:
+        # The verdict must hold either way, and so it errs no more often than that of either.
+        return replace(confirmed(alone, together, share), disturbance=found)
+    return confirmed(alone, measured_ratios(record, reference), share)
 
 
 def confirmed(found: Comparison, measured: Sequence[float], share: float = 1.0) -> Comparison:
-    """Return a comparison with its verdict only if the ratios by our clock have the same one.
+    """Return a comparison with its verdict only if other ratios of its rounds have the same one.
 
-    They differ only for an external program that prints its solve time: its own word never decides
-    a comparison alone.
+    They are those by our clock, which differ only for an external program that prints its solve
+    time: its own word never decides a comparison alone.
     """
     ours = compare_ratios(measured, share) if measured else None
     if ours is not None and ours.verdict == found.verdict:

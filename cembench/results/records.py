@@ -234,6 +234,9 @@ class Round(BaseModel):
     cpu_seconds: Seconds | None = None
     #: Wall-clock seconds of the warm-up call; None if the first call is timed.
     cold_seconds: CallSeconds | None = None
+    #: Wall-clock seconds of each timed call in a process shared with the cells that this one is
+    #: compared with; empty without one.
+    together: tuple[CallSeconds, ...] = ()
     #: Key from which the motion of the surface for each call is derived
     #: (:mod:`cembench.running.motion`); empty in older records.
     motions: str = ""
@@ -254,6 +257,11 @@ class Round(BaseModel):
     def seconds(self) -> float:
         """The round's figure: the median of its calls."""
         return lower_median(self.calls)
+
+    @property
+    def together_seconds(self) -> float | None:
+        """The median of the calls in the shared process; None without one."""
+        return lower_median(self.together) if self.together else None
 
     @property
     def solve_seconds(self) -> float | None:

@@ -3,9 +3,19 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+from math import log
+from statistics import median, stdev
 
-from cembench.results.comparison import UNSTABLE_WIDTH, is_unstable, seconds_interval
+from cembench.results.comparison import (
+    UNSTABLE_WIDTH,
+    both_ratios,
+    circumstances,
+    compare,
+    is_unstable,
+    seconds_interval,
+)
 from cembench.results.records import Ended, Record
 
 _ENDED: dict[Ended | None, str] = {
@@ -44,6 +54,48 @@ def stability_words(records: Sequence[Record]) -> str:
         has = "has" if len(without) == 1 else "have"
         told += f". {len(without)} {has} too few rounds for an interval: {_why(without)}"
     return f"{told}."
+
+
+def scatter_words(records: Sequence[Record]) -> str:
+    """Return how far ratios scatter from round to round, and how many are unstable.
+
+    Empty without comparisons of at least two rounds. Every two cells that share their circumstances
+    are compared; the figures are medians over these.
+    """
+    separate, within, widths = [], [], []
+    for ours, theirs in _compared(records):
+        apart, together = both_ratios(ours.outcome.rounds, theirs.outcome.rounds)
+        found = compare(ours, theirs)
+        if len(apart) < 2 or found is None:
+            continue
+        separate.append(_scatter(apart))
+        within += [_scatter(together)] if together else []
+        if found.interval is not None:
+            widths.append((found.interval.high - found.interval.low) / found.ratio)
+    if not separate:
+        return ""
+    told = f"Ratios of two algorithms scatter by {median(separate):.1%} from round to round"
+    if within:
+        told += f" between processes and by {median(within):.1%} within one process"
+    told += f" (medians over {len(separate)} pairs)"
+    if widths:
+        unstable = sum(width > UNSTABLE_WIDTH for width in widths)
+        told += f"; {unstable} of {len(widths)} have an interval wider than {UNSTABLE_WIDTH:.0%}"
+    return f"{told}."
+
+
+def _compared(records: Sequence[Record]) -> Iterator[tuple[Record, Record]]:
+    """Return the pairs of timed cells that are comparable."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        if len(record.outcome.rounds) > 1:
+            groups.setdefault(circumstances(record.cell), []).append(record)
+    for group in groups.values():
+        yield from combinations(group, 2)
+
+
+def _scatter(ratios: Sequence[float]) -> float:
+    return stdev(map(log, ratios))
 
 
 def _why(records: Sequence[Record]) -> str:

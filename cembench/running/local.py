@@ -60,7 +60,7 @@ from cembench.results.samples import Samples
 from cembench.results.store import Store
 from cembench.running.comparable import impossible, incomparable, is_cold
 from cembench.running.environment import describe_environment, for_measuring
-from cembench.running.estimate import expected_bytes
+from cembench.running.estimate import USUAL_ROUNDS, expected_bytes
 from cembench.running.external.present import external_of
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.judge import Promise
@@ -73,14 +73,27 @@ from cembench.running.judging import (
     sample,
 )
 from cembench.running.kernel import kernel_seconds
-from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, SECOND_CALL, WARM_UP
+from cembench.running.measure import (
+    ENOUGH_CALLS,
+    LONG_CALL,
+    SECOND_CALL,
+    WARM_UP,
+)
 from cembench.running.motion import NUMBERS_KEPT, UNMOVED, in_first_order
 from cembench.running.neighbours import counters, neighbours
+from cembench.running.pairing import PROCESSES, WORTH, Pairing, Scatter
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, finds_all, run_limited, spawning
 from cembench.running.side_by_side import check_side_by_side
-from cembench.running.until_precise import affordable, cheapest, cost, lack
-from cembench.running.worker import PROGRAMS, Answer, Job, JobTask
+from cembench.running.until_precise import (
+    BESIDE_CALLS,
+    affordable,
+    cheapest,
+    cost,
+    each_round,
+    lack,
+)
+from cembench.running.worker import PROGRAMS, Answer, Job, JobTask, Part, TimedPart
 
 #: Wall-clock seconds that a call may take unless the user says otherwise.
 DEFAULT_TIMEOUT = 600.0
@@ -121,6 +134,9 @@ class Options:
     #: Whether a budget that does not bring all cells to their first look is spent surface by
     #: surface, so that the comparisons on the cheapest ones are complete; else cell by cell.
     whole_surfaces: bool = False
+    #: Whether the cells that are compared on a surface also share a process in each round:
+    #: "process", "separate", or "auto": where that promises narrower ratios in the same time.
+    pairing: Pairing = "separate"
     #: How often a process is repeated if the machine was busy; the quietest run counts.
     repeat_busy: int = 0
     #: Number of checks that run in parallel, sharing the memory. Timed processes run alone.
@@ -168,11 +184,17 @@ class Watcher:
     def ends(self, task: Task, step: Step, seconds: float) -> None:
         """A process has ended, after `seconds` in all."""
 
+    def took(self, task: Task, seconds: float) -> None:
+        """A cell's part of a process that it shared took `seconds` more."""
+
     def finished(self, task: Task, record: Record, *, kept: bool) -> None:
         """A cell has its record, from an earlier run if `kept`; it needs no more processes."""
 
     def machines(self, names: Sequence[str]) -> None:
         """These machines of a cluster take part now, one name per worker."""
+
+    def says(self, words: str) -> None:
+        """Before the first round: what precision this machine and the budget allow."""
 
     def shows(self, words: str) -> None:
         """Something happened to a machine of the cluster, or to a unit that it measured."""
@@ -278,6 +300,10 @@ class _Run:
     rounds: dict[str, dict[int, Round]] = field(default_factory=dict)
     #: Seconds of the processes that were timed in this sitting, by the cells' labels.
     took: dict[str, list[float]] = field(default_factory=dict)
+    #: Whether cells that are compared also share a process in each round, and why some do not, by
+    #: their circumstances.
+    pairs: bool = False
+    apart: dict[str, str] = field(default_factory=dict)
 
     def measure(self, tasks: Sequence[Task]) -> None:
         asked = {task.cell.label for task in tasks}
@@ -287,6 +313,7 @@ class _Run:
         self.watcher.begins(sum(self._processes_left(task) for task in pending))
         self._check_all(pending)
         self.watcher.timing_starts()
+        self._choose_pairing([task for task in pending if task.cell.label not in self.records])
         most = max((task.cell.repeats or self.options.most_rounds for task in pending), default=0)
         for number in range(most + 1):
             if is_look(number, self.options.most_rounds):
@@ -298,8 +325,8 @@ class _Run:
                 continue
             self.launcher.close()
             kernel = kernel_seconds(len(open_))
-            for task in in_random_order(open_, self.options.seed, number):
-                self._time(task, number, kernel)
+            for group in self._groups(in_random_order(open_, self.options.seed, number)):
+                self._time_group(group, number, kernel)
 
     def _is_kept(self, task: Task, asked: AbstractSet[str]) -> bool:
         kept = kept_record(task, self.store, self.options, asked)
@@ -448,7 +475,85 @@ class _Run:
             return inf
         return self.options.budget - (monotonic() - self.since)
 
-    def _time(self, task: Task, number: int, kernel: float) -> None:
+    def _choose_pairing(self, tasks: Sequence[Task]) -> None:
+        """Decide whether cells that are compared also share a process, and say what it buys.
+
+        The scatter of this machine is measured if that takes a small share of the run: ten
+        processes, each with the calls of a cell and of its twin.
+        """
+        asked = self.options.pairing
+        self.pairs = asked == "process"
+        chosen = _known_call(tasks, self.options.reference)
+        if chosen is None or asked == "separate":
+            return
+        calls = [self.checks[task.cell.label].rounds for task in tasks]
+        known = [rounds[0].seconds for rounds in calls if rounds]
+        price = sum(BESIDE_CALLS + each_round(seconds) for seconds in known)
+        twins = BESIDE_CALLS + 2 * each_round(known[tasks.index(chosen)]) if all(calls) else inf
+        if PROCESSES * twins > WORTH * min(self._seconds_left(), USUAL_ROUNDS * price):
+            return
+        checked = Checked.of(self.checks[chosen.cell.label])
+        found = []
+        self.launcher.close()
+        for _ in range(PROCESSES):
+            both = self.launcher.together([chosen, chosen], [checked, checked])
+            if isinstance(both, Outcome):
+                return
+            found.append((both[0].seconds, both[1].seconds))
+        scatter = Scatter.of(found)
+        if asked == "auto":
+            self.pairs = scatter.pairing_is_narrower
+        rounds = self.options.most_rounds
+        if self.options.budget is not None:
+            rounds = min(rounds, int(self._seconds_left() / (price * (1 + self.pairs))))
+        self.watcher.says(scatter.words(rounds, self.options.most_rounds, pairs=self.pairs))
+
+    def _groups(self, tasks: Sequence[Task]) -> list[list[Task]]:
+        """Return the cells that are compared with each other, and so may share a process."""
+        if not self.pairs:
+            return [[task] for task in tasks]
+        groups: dict[str, list[Task]] = {}
+        for task in tasks:
+            alone = task.algorithm.program is not None
+            key = task.cell.label if alone else circumstances(task.cell)
+            groups.setdefault(key, []).append(task)
+        return list(groups.values())
+
+    def _time_group(self, tasks: Sequence[Task], number: int, kernel: float) -> None:
+        """Time each cell in a process of its own, and after that all of them in one."""
+        measured = [(task, self._time(task, number, kernel)) for task in tasks]
+        rounds = {task.cell.label: found for task, found in measured if found is not None}
+        timed = [task for task in tasks if task.cell.label in rounds]
+        together = self._time_together(timed, number) if len(timed) > 1 else {}
+        for task in timed:
+            label = task.cell.label
+            found = rounds[label].model_copy(update={"together": together.get(label, ())})
+            self._samples(task).save_round(number, found)
+            self.rounds[label][number] = found
+            self._save_if_complete(task)
+
+    def _time_together(self, tasks: Sequence[Task], number: int) -> dict[str, tuple[float, ...]]:
+        """Return the calls of these cells in one process; none if these cannot be compared.
+
+        Then the cells go on in processes of their own alone, which show whose fault it is.
+        """
+        key = circumstances(tasks[0].cell)
+        if key in self.apart:
+            return {}
+        since = monotonic()
+        checked = [Checked.of(self.checks[task.cell.label]) for task in tasks]
+        found = self.launcher.together(tasks, checked)
+        each = (monotonic() - since) / len(tasks)
+        for task in tasks:
+            self.took[task.cell.label][-1] += each
+            self.watcher.took(task, each)
+        if isinstance(found, Outcome):
+            self.apart[key] = f"round {number + 1}: {found.cause}"
+            return {}
+        return {task.cell.label: one.calls for task, one in zip(tasks, found, strict=True)}
+
+    def _time(self, task: Task, number: int, kernel: float) -> Round | None:
+        """Return the round of a cell's own process; None if it has none, and so its record."""
         step = self._step(task, number)
         started = _now()
         checked = self.checks[task.cell.label]
@@ -461,12 +566,9 @@ class _Run:
                 more |= {"status": found.status, "faults": found.faults, "rounds": ()}
                 found = checked
             self._save(task, found.model_copy(update=more))
-            return
+            return None
         origin = {"sitting": self.sitting, "started_at": started, "kernel_seconds": kernel}
-        measured = found.model_copy(update=origin)
-        self._samples(task).save_round(number, measured)
-        self.rounds[task.cell.label][number] = measured
-        self._save_if_complete(task)
+        return found.model_copy(update=origin)
 
     def _timed_when_quiet(self, task: Task, checked: Checked) -> Round | Outcome:
         """Time one process; repeat it if the machine was busy, up to the requested number of times.
@@ -498,6 +600,10 @@ class _Run:
             self.rounds[task.cell.label][k] for k in sorted(self.rounds[task.cell.label])
         )
         notes = (*checked.notes, *_notes(checked, rounds))
+        why = self.apart.get(circumstances(task.cell))
+        if why is not None:
+            text = f"not compared within one process, which could not be used in {why}"
+            notes = (*notes, Notice(NoticeKind.NOT_TOGETHER, text))
         told = {"rounds": rounds, "notes": notes, "ended": ended}
         self._save(task, checked.model_copy(update=told))
 
@@ -527,6 +633,21 @@ def _partners(tasks: Iterable[Task], reference: str) -> dict[str, str]:
         for task in tasks
         if circumstances(task.cell) in known and task.cell.algorithm != reference
     }
+
+
+def _known_call(tasks: Sequence[Task], reference: str) -> Task | None:
+    """Return the cheapest cell whose calls show how a machine scatters; None if there is none.
+
+    That is one of the reference on the smallest surface, where cells are measured until precise.
+    """
+    calls = [
+        task
+        for task in tasks
+        if task.cell.algorithm == reference
+        and task.cell.precision is not None
+        and task.algorithm.program is None
+    ]
+    return min(calls, key=lambda task: task.mesh.m, default=None)
 
 
 def _disturbed(measured: Round) -> float:
@@ -674,9 +795,49 @@ class Launcher:
         return judged.outcome, uv
 
     def time(self, task: Task, checked: Checked) -> Round | Outcome:
-        """Return the timed calls of one process, or the outcome if it has none.
+        """Return the timed calls of one process, or the outcome if it has none."""
+        found = self.together([task], [checked])
+        return found if isinstance(found, Outcome) else found[0]
 
-        Their surfaces are moved and renumbered, for all cells alike. Where calls are short, the
+    def together(self, tasks: Sequence[Task], checked: Sequence[Checked]) -> list[Round] | Outcome:
+        """Return the timed calls of these cells in one process, or the outcome if a cell has none.
+
+        Each cell has calls, motions and judgements as in a process of its own. Which cell it was
+        that used more than it may is not known where there are several.
+        """
+        parts = [self._part(number, task) for number, task in enumerate(tasks)]
+        began = monotonic()
+        answer = self._run(tasks[0], "time", 2 * len(tasks) * self.options.timeout, parts=parts)
+        ended = monotonic()
+        used = answer.used
+        if used is None or len(answer.parts) != len(parts):
+            return answer.outcome or _unreadable("it holds no round")
+        for part, told in zip(parts, answer.parts, strict=True):
+            if not set(told.motions) <= set(part.motions) or len(told.names) != len(told.motions):
+                return _unreadable("it reports other calls than those requested")
+        rounds = [told.round for told in answer.parts]
+        used.wall = sum(sum(one.calls) for one in rounds)
+        used.cold = sum(one.cold_seconds or 0.0 for one in rounds)
+        for task, one in zip(tasks, rounds, strict=True):
+            self._first_seconds[task.cell.label] = one.cold_seconds or one.calls[0]
+        wrong = [fault for one in rounds for fault in impossible(used, one, began, ended)]
+        wrong = wrong or incomparable(used, answer.running, tasks[0].cell.threads)
+        if wrong:
+            return not_ok("not_comparable", *wrong)
+        found = []
+        for task, known, part, told in zip(tasks, checked, parts, answer.parts, strict=True):
+            part.uv_file.replace(self.scratch / "uv.npy")
+            judged = self._judged_calls(task, known, told)
+            if isinstance(judged, Outcome):
+                return judged
+            more = {"motions": part.turn, "repeated": judged.repeated}
+            found.append(told.round.model_copy(update=more))
+        return found
+
+    def _part(self, number: int, task: Task) -> Part:
+        """Return what the next process of a cell makes, alone or with others.
+
+        Its surfaces are moved and renumbered, for all cells alike. Where calls are short, the
         first one, which only warms up, gets a motion that a call of the process before has had: so
         what a fresh process makes of it is compared with what one did that had been called before.
         A cell's first process makes another call that is not timed, whose surface keeps its
@@ -694,33 +855,17 @@ class Launcher:
         replays = last is not None and not self._is_long(task)
         if last is not None and replays:
             motions[0] = last[0]
-        began = monotonic()
-        answer = self._run(
-            task,
-            "time",
-            2 * self.options.timeout,
+        return Part(
+            cell=task.cell,
+            plugins=task.plugins,
+            turn=turn,
             motions=tuple(motions),
             first_counts=not replays,
             untimed=1 + is_first,
+            uv_file=self.scratch / f"uv-{number}.npy",
         )
-        ended = monotonic()
-        found, used = answer.round, answer.used
-        if found is None or used is None:
-            return answer.outcome or _unreadable("it holds no round")
-        if not set(answer.motions) <= set(motions) or len(answer.names) != len(answer.motions):
-            return _unreadable("it reports other calls than those requested")
-        used.wall, used.cold = sum(found.calls), found.cold_seconds or 0.0
-        self._first_seconds[label] = found.cold_seconds or found.calls[0]
-        wrong = impossible(used, found, began, ended)
-        wrong = wrong or incomparable(used, answer.running, task.cell.threads)
-        if wrong:
-            return not_ok("not_comparable", *wrong)
-        judged = self._judged_calls(task, checked, answer)
-        if isinstance(judged, Outcome):
-            return judged
-        return found.model_copy(update={"motions": turn, "repeated": judged.repeated})
 
-    def _judged_calls(self, task: Task, checked: Checked, told: Answer) -> JudgedCalls | Outcome:
+    def _judged_calls(self, task: Task, checked: Checked, told: TimedPart) -> JudgedCalls | Outcome:
         """Return the notices on the maps of a process, or an outcome if they are faulty."""
         label = task.cell.label
         known = dict([self._last[label]]) if label in self._last else {}
@@ -745,10 +890,10 @@ class Launcher:
         self._keep(task, told.motions[number], self._row(task, told, number))
         return judged
 
-    def _any_timed(self, told: Answer) -> int:
+    def _any_timed(self, told: TimedPart) -> int:
         return random.SystemRandom().randrange(int(told.names[0] == WARM_UP), len(told.names))
 
-    def _row(self, task: Task, told: Answer, number: int) -> NDArray[np.complex128]:
+    def _row(self, task: Task, told: TimedPart, number: int) -> NDArray[np.complex128]:
         """Return the map of a call in the surface's own order."""
         rows = np.lib.format.open_memmap(self.scratch / "uv.npy", mode="r")
         return in_first_order(np.array(rows[number]), task.mesh, told.motions[number])
@@ -765,7 +910,7 @@ class Launcher:
         return sample(in_first_order(uv, task.mesh, motion))
 
     def _kept_from_call_to_call(
-        self, task: Task, judged: JudgedCalls, told: Answer
+        self, task: Task, judged: JudgedCalls, told: TimedPart
     ) -> tuple[Fault, ...]:
         """Return the fault that the process before has kept something, if its maps show it.
 
@@ -791,7 +936,7 @@ class Launcher:
         return () if fault is None else (fault,)
 
     def _judge_once(
-        self, task: Task, checked: Checked, told: Answer, known: Mapping[str, Path]
+        self, task: Task, checked: Checked, told: TimedPart, known: Mapping[str, Path]
     ) -> JudgedCalls | Outcome:
         answer = self._judged(
             task,

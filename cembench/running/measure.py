@@ -9,8 +9,11 @@ computed there.
 from __future__ import annotations
 
 import gc
+import math
+import random
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from itertools import pairwise
 from time import monotonic
 from typing import Any
 
@@ -59,61 +62,92 @@ LONG_CALL = 5.0
 #: Names of first calls that are not timed: the first warms up, a second is for comparison only.
 WARM_UP, SECOND_CALL = "the warm-up", "the second call"
 
+#: In place of a map that is kept elsewhere.
+_NOT_KEPT = np.empty(0, dtype=np.complex128)
+
 Complex = NDArray[np.complex128]
 Call = Callable[[TriangleMesh], tuple[Returned, Timing]]
 
 
+@dataclass(frozen=True)
+class TimedCall:
+    """A call of a process, with its map and its times."""
+
+    motion: str
+    timing: Timing
+    #: The map, copied while the clock ran.
+    uv: Complex | Fault
+    #: CPU seconds at the begin and end of the call.
+    before: Processor
+    after: Processor
+    #: Whether it counts; a call that warms up does not.
+    counts: bool = True
+
+
 @dataclass
 class TimedCalls:
-    """The calls of one process in order; the first ones may not be timed."""
+    """The calls of one process, in order, of one algorithm or of several."""
 
-    #: Number of calls that are not timed.
-    untimed: int = 0
-    motions: list[str] = field(default_factory=list)
-    timings: list[Timing] = field(default_factory=list)
-    #: The map of each call, copied while its clock ran.
-    maps: list[Complex | Fault] = field(default_factory=list)
-    #: CPU seconds at the begin and end of each call.
-    before: list[Processor] = field(default_factory=list)
-    after: list[Processor] = field(default_factory=list)
+    calls: list[TimedCall] = field(default_factory=list)
     #: Whether a call changed the given surface.
     changed: bool = False
     began: float = field(default_factory=monotonic)
     start: Processor = field(default_factory=after_call)
 
     @property
-    def timed(self) -> list[Timing]:
+    def counted(self) -> list[TimedCall]:
         """The timed calls."""
-        return self.timings[self.untimed :]
+        return [call for call in self.calls if call.counts]
+
+    @property
+    def seconds(self) -> float:
+        """The seconds of the timed calls."""
+        return sum(call.timing.total for call in self.counted)
 
     def names(self) -> list[str]:
-        """Return the names of the calls."""
-        count = len(self.timed)
+        """Return the names of the calls of one algorithm."""
+        count = len(self.counted)
         calls = [f"call {k} of {count}" for k in range(1, count + 1)]
-        return [*(WARM_UP, SECOND_CALL)[: self.untimed], *calls]
+        return [*(WARM_UP, SECOND_CALL)[: len(self.calls) - count], *calls]
 
     def used(self, preparing: float = 0.0) -> Used:
         """Return the resources used by the timed calls, and between all calls.
 
         `preparing` is what it took to prepare a call before the algorithm was loaded.
         """
-        first = self.untimed
-        pairs = list(zip(self.before, self.after, strict=True))
-        gaps = list(zip(self.after, self.before[1:], strict=False))
-        alone = gaps if first else [(self.start, self.before[0]), *gaps]
+        calls, counted = self.calls, self.counted
+        first = calls[0]
+        gaps = [(a.after, b.before) for a, b in pairwise(calls)]
+        alone = [(self.start, first.before), *gaps] if first.counts else gaps
         return Used(
-            wall=sum(t.total for t in self.timed),
-            cold=self.timings[0].total if first else 0.0,
+            wall=self.seconds,
+            cold=sum(call.timing.total for call in calls if not call.counts),
             between=sum(b.thread - a.thread for a, b in alone),
             preparing=preparing * len(alone),
-            own=sum(b.process - a.process for a, b in pairs[first:]),
-            others=sum(b.others - a.others for a, b in pairs[first:]),
+            own=sum(call.after.process - call.before.process for call in counted),
+            others=sum(call.after.others - call.before.others for call in counted),
             beside=sum(b.beside - a.beside for a, b in gaps),
-            disturbed=sum(b.running > 0 for b in self.before[1:]),
-            looked=len(self.before) - 1,
+            disturbed=sum(call.before.running > 0 for call in calls[1:]),
+            looked=len(calls) - 1,
             began=self.began,
             ended=monotonic(),
         )
+
+
+@dataclass(frozen=True)
+class Timed:
+    """What is timed in a process: an algorithm, its cell, and the motions of its calls.
+
+    The first `untimed` calls are not timed: a warm-up, and perhaps another one. With
+    `first_counts`, a first call of more than :data:`LONG_CALL` seconds is timed, and no other.
+    Without `motions` the surface is not moved.
+    """
+
+    algorithm: Algorithm
+    cell: Cell
+    motions: Sequence[str] = ()
+    first_counts: bool = True
+    untimed: int = 1
 
 
 def check_cell(
@@ -194,61 +228,80 @@ def time_cell(
     algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, checked: Checked
 ) -> Round | Outcome:
     """Time calls on the original surface, and judge their maps here; see :func:`timed_calls`."""
-    calls = timed_calls(algorithm, mesh, cell)
+    calls = timed_calls(mesh, Timed(algorithm, cell))
     if isinstance(calls, Outcome):
         return calls
     found, told = calls
-    maps = [uv for uv in told.maps if not isinstance(uv, Fault)]
-    named = list(zip(told.names(), told.motions, maps, strict=True))
+    named = [
+        (name, call.motion, call.uv)
+        for name, call in zip(told.names(), told.calls, strict=True)
+        if not isinstance(call.uv, Fault)
+    ]
     judged = judged_calls(Promise.of(algorithm), mesh, checked, named, {})
     if judged.faults:
         return not_ok("invalid", *judged.faults)
     return found.model_copy(update={"repeated": judged.repeated})
 
 
-def timed_calls(
-    algorithm: Algorithm,
-    mesh: TriangleMesh,
-    cell: Cell,
-    motions: Sequence[str] = (),
-    *,
-    first_counts: bool = True,
-    untimed: int = 1,
-) -> tuple[Round, TimedCalls] | Outcome:
+def timed_calls(mesh: TriangleMesh, one: Timed) -> tuple[Round, TimedCalls] | Outcome:
     """Time a call after a warm-up, or several calls if they are short.
 
-    The first `untimed` calls are not timed: a warm-up, and perhaps another one. With
-    `first_counts`, a first call of more than :data:`LONG_CALL` seconds is timed, and no other.
-    Each call gets the surface in a different motion; without `motions`, unmoved. The maps are
-    judged after all timing. Returns an outcome if the algorithm raised or returned no map.
+    Each call gets the surface in a different motion. The maps are judged after all timing. Returns
+    an outcome if the algorithm raised or returned no map.
     """
-    call = _call(algorithm, mesh, cell)
+    found = timed_together(mesh, [one])
+    return found if isinstance(found, Outcome) else found[0][0]
+
+
+def timed_together(
+    mesh: TriangleMesh, cells: Sequence[Timed]
+) -> tuple[list[tuple[Round, TimedCalls]], TimedCalls] | Outcome:
+    """Time several algorithms in this process, as :func:`timed_calls` does one.
+
+    First come the calls that are not timed, then those that are, each in random order: as many of
+    each algorithm as it has in a process of its own. Returns the round and the calls of each, and
+    the calls of all in their order; or an outcome if one raised or returned no map.
+    """
+    first = cells[0].cell
     try:
-        with linear_algebra(cell.solves, cell.backend):
-            told = _timed(
-                call, mesh, algorithm.target, motions, first_counts=first_counts, untimed=untimed
-            )
-        timings = told.timed
-        start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
+        made = [_call(one.algorithm, mesh, one.cell) for one in cells]
+        with linear_algebra(first.solves, first.backend):
+            told, everything = _timed(list(zip(cells, made, strict=True)), mesh)
+        rounds = [
+            _round_of(one, call, t, mesh) for one, call, t in zip(cells, made, told, strict=True)
+        ]
     except BaseException as error:
         return outcome_of_error(error, mesh)
+    found = []
+    for measured, calls in zip(rounds, told, strict=True):
+        if isinstance(measured, Outcome):
+            return measured
+        found.append((measured, calls))
+    return found, everything
+
+
+def _round_of(one: Timed, call: Call, told: TimedCalls, mesh: TriangleMesh) -> Round | Outcome:
+    """Return the figures of an algorithm's calls, or an outcome that says what is wrong."""
+    counted = told.counted
+    timings = [c.timing for c in counted]
+    start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
     problems = [fault for t in timings if (fault := phases_fault(t))][:1]
-    for name, uv in zip(told.names(), told.maps, strict=True):
-        if isinstance(uv, Fault):
+    for name, made in zip(told.names(), told.calls, strict=True):
+        if isinstance(made.uv, Fault):
             words = f"{name} returned a different map from the check"
-            problems += [Fault(kind=FaultKind.OTHER_MAP, detail=words), uv]
+            problems += [Fault(kind=FaultKind.OTHER_MAP, detail=words), made.uv]
             break
-    problems += [_changed()] if told.changed else _changes(mesh, cell)
-    if not problems and min(t.total for t in told.timings) <= 0:
+    problems += [_changed()] if told.changed else _changes(mesh, one.cell)
+    if not problems and min(c.timing.total for c in told.calls) <= 0:
         words = "its times are impossible: a call took no time or negative time"
         problems.append(Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=words))
     if problems:
         return not_ok("invalid", *problems)
-    first = len(told.timings) - len(timings)
-    found = _round(timings, told.before[first:], told.after[first:], isinstance(call, ProgramCalls))
-    cold = told.timings[0].total if told.untimed else None
+    before, after = [c.before for c in counted], [c.after for c in counted]
+    found = _round(timings, before, after, isinstance(call, ProgramCalls))
+    cold = None if told.calls[0].counts else told.calls[0].timing.total
     found = _program_round(found, call, len(timings), start)
-    return found.model_copy(update={"cold_seconds": cold}), told
+    return found.model_copy(update={"cold_seconds": cold})
 
 
 def _about_program(call: ProgramCalls) -> dict[str, Any]:
@@ -267,47 +320,64 @@ def _program_round(measured: Round, call: Call, calls: int, start: float | None)
 
 
 def _timed(
-    call: Call,
-    mesh: TriangleMesh,
-    target: str,
-    motions: Sequence[str],
-    *,
-    first_counts: bool,
-    untimed: int,
-) -> TimedCalls:
-    """Make the calls; record their maps and their times."""
-    told = TimedCalls()
+    cells: Sequence[tuple[Timed, Call]], mesh: TriangleMesh
+) -> tuple[list[TimedCalls], TimedCalls]:
+    """Make the calls; return those of each cell, and all of them in their order."""
+    told, everything = [TimedCalls() for _ in cells], TimedCalls()
 
-    def once() -> None:
-        number = len(told.timings)
-        motion = motions[number] if motions else UNMOVED
+    def once(number: int, *, counts: bool) -> None:
+        (one, call), mine = cells[number], told[number]
+        motion = one.motions[len(mine.calls)] if one.motions else UNMOVED
         gc.collect()
         gc.disable()
         try:
             # Made after the collection, so that no finaliser or callback could see it.
             given = moved(mesh, motion)
-            told.before.append(before_call())
+            before = before_call()
             returned, timing = call(given)
-            told.after.append(after_call())
+            after = after_call()
         finally:
             gc.enable()
-        told.motions.append(motion)
-        told.timings.append(timing)
-        told.maps.append(finite(returned.uv, target))
-        told.changed |= not _is_as(given, moved(mesh, motion))
+        uv = finite(returned.uv, one.algorithm.target)
+        counts = counts or (timing.total > LONG_CALL and one.first_counts and not mine.calls)
+        made = TimedCall(motion, timing, uv, before, after, counts)
+        mine.calls.append(made)
+        everything.calls.append(replace(made, uv=_NOT_KEPT))
+        mine.changed |= not _is_as(given, moved(mesh, motion))
 
-    once()
-    if told.timings[0].total > LONG_CALL and first_counts:
-        return told
-    told.untimed = untimed
+    numbers = _shuffled(range(len(cells)))
+    for number in numbers:
+        once(number, counts=False)
+    short = [number for number in numbers if not told[number].counted]
+    if not short:
+        return told, everything
     gc.collect()
     gc.freeze()  # a second collection scans only new objects; the others stay out of the caches
-    while len(told.timings) < untimed:
-        once()
-    while len(told.timed) < ENOUGH_CALLS and sum(t.total for t in told.timed) < ENOUGH_SECONDS:
-        once()
+    for number in short:
+        while len(told[number].calls) < cells[number][0].untimed:
+            once(number, counts=False)
+    if len(cells) == 1:
+        while _wants_more(told[0]):
+            once(0, counts=True)
+    else:
+        for number in _shuffled([n for n in short for _ in range(_calls_expected(told[n]))]):
+            once(number, counts=True)
     gc.unfreeze()
-    return told
+    return told, everything
+
+
+def _wants_more(told: TimedCalls) -> bool:
+    return len(told.counted) < ENOUGH_CALLS and told.seconds < ENOUGH_SECONDS
+
+
+def _calls_expected(told: TimedCalls) -> int:
+    """Return how many calls there would be in a process of its own, by the last call so far."""
+    last = max(told.calls[-1].timing.total, ENOUGH_SECONDS / ENOUGH_CALLS)
+    return math.ceil(ENOUGH_SECONDS / last)
+
+
+def _shuffled(numbers: Sequence[int]) -> list[int]:
+    return random.SystemRandom().sample(numbers, len(numbers))
 
 
 def preparing_seconds(mesh: TriangleMesh) -> float:

@@ -13,6 +13,7 @@ from cembench.results.comparison import interval_of_rounds, ratio_interval, rati
 from cembench.results.intervals import Interval
 from cembench.results.looks import share_of
 from cembench.results.records import Cell, Round, lower_median
+from cembench.running.measure import ENOUGH_SECONDS
 
 #: Overhead of a round in seconds: starting a process, reading the mesh and judging the maps.
 BESIDE_CALLS = 0.25
@@ -24,14 +25,17 @@ def lack(cell: Cell, rounds: Rounds, reference: tuple[Cell, Rounds] | None = Non
     """Return the factor by which a cell's intervals are too wide; at most 1 is precise.
 
     The intervals are that of its seconds and, if it was measured with a reference, that of the
-    ratio. Infinite if there is no interval yet; 0 for a cell with a fixed number of rounds.
+    ratio. Where compared cells shared processes, only the ratio counts. Infinite if there is no
+    interval yet; 0 for a cell with a fixed number of rounds.
     """
     if cell.precision is None:
         return 0.0
-    found = [_half(interval_of_rounds(cell, rounds), lower_median([r.seconds for r in rounds]))]
-    ratios = ratios_of_rounds(rounds, reference[1]) if reference else []
+    shared = bool(rounds) and all(r.together for r in rounds)
+    own = _half(interval_of_rounds(cell, rounds), lower_median([r.seconds for r in rounds]))
+    found = [0.0 if shared else own]
+    share = share_of(len(rounds), cell, reference[0]) if reference else 1.0
+    ratios = ratios_of_rounds(rounds, reference[1], share) if reference else []
     if reference and ratios:
-        share = share_of(len(ratios), cell, reference[0])
         found.append(_half(ratio_interval(ratios, share), lower_median(ratios)))
     return max(found) / cell.precision
 
@@ -40,10 +44,16 @@ def _half(interval: Interval | None, figure: float) -> float:
     return inf if interval is None else (interval.high - interval.low) / (2 * figure)
 
 
+def each_round(seconds: float) -> float:
+    """Return the estimated seconds of a cell's calls in a process, from those of one call."""
+    return seconds + max(seconds, ENOUGH_SECONDS)
+
+
 def cost(rounds: Rounds) -> float:
     """Return the estimated seconds of another round of a cell, based on the last one."""
-    calls = rounds[-1].calls
-    return BESIDE_CALLS + sum(calls) + max(calls)  # one call more, to warm up
+    calls, shared = rounds[-1].calls, rounds[-1].together
+    more = sum(shared) + max(shared) if shared else 0.0
+    return BESIDE_CALLS + sum(calls) + max(calls) + more  # one call more each, to warm up
 
 
 def affordable(

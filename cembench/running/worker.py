@@ -16,6 +16,7 @@ from time import monotonic
 from typing import Literal, NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from cembench.core.errors import MeshError
@@ -27,7 +28,7 @@ from cembench.running.comparable import Used
 from cembench.running.external.call import use_folder
 from cembench.running.judge import Promise
 from cembench.running.judging import Checked, JudgedCalls, judged_calls, judged_check
-from cembench.running.measure import call_cell, preparing_seconds, timed_calls
+from cembench.running.measure import Timed, TimedCalls, call_cell, preparing_seconds, timed_together
 from cembench.running.motion import moved
 from cembench.running.process import die_with_parent, limit_memory
 from cembench.running.processor import keep_orphans
@@ -44,12 +45,28 @@ MESH_TYPES = {kind.__name__: kind for kind in (TriangleMesh, DiskMesh, HoledMesh
 JobTask = Literal["check", "time", "again", "judge check", "judge calls"]
 
 
+class Part(BaseModel):
+    """A cell that is timed in a process, alone or with others."""
+
+    cell: Cell
+    plugins: tuple[str, ...]
+    #: Key of the motions, the motions of the surface for the calls, and whether a long first call
+    #: is timed.
+    turn: str
+    motions: tuple[str, ...]
+    first_counts: bool
+    #: Number of calls before the timed ones.
+    untimed: int
+    #: Output file for the maps of the calls, one row each.
+    uv_file: Path
+
+
 class Job(BaseModel):
     """The job of one process."""
 
-    #: "check": one call, with its map and memory. "time": a warm-up and timed calls. "again": one
-    #: call on the surface in the first motion, for its map. "judge check", "judge calls": judge the
-    #: results of these without importing an algorithm.
+    #: "check": one call, with its map and memory. "time": warm-ups and timed calls of the `parts`.
+    #: "again": one call on the surface in the first motion, for its map. "judge check",
+    #: "judge calls": judge the results of these without importing an algorithm.
     task: JobTask
     cell: Cell
     plugins: tuple[str, ...]
@@ -59,15 +76,13 @@ class Job(BaseModel):
     mesh_files: tuple[Path, Path]
     #: Output file for the :class:`Answer`.
     answer_file: Path
-    #: Output file for the map of a check, or those of timed calls, one row each.
+    #: Output file for the map of a check; input for a judge, of timed calls with one row each.
     uv_file: Path
+    parts: tuple[Part, ...] = ()
     #: The checked map's data, for comparison with timed calls.
     checked: Checked = Checked()
-    #: Motions of the surface for the calls, and whether a long first call is timed.
+    #: Motions of the surface for the calls.
     motions: tuple[str, ...] = ()
-    first_counts: bool = True
-    #: Number of calls before the timed ones.
-    untimed: int = 1
     #: Input of judging: the outcome of a check, or the names of the rows of `uv_file`.
     promise: Promise = Promise()
     called: Outcome | None = None
@@ -79,14 +94,19 @@ class Job(BaseModel):
     parent: int
 
 
+class TimedPart(BaseModel):
+    """The timed calls of a cell: their figures, and the names and motions of their maps."""
+
+    round: Round
+    names: tuple[str, ...]
+    motions: tuple[str, ...]
+
+
 class Answer(BaseModel):
-    """The answer of a process: an outcome, or the timed calls."""
+    """The answer of a process: an outcome, or the timed calls of its cells, and what they used."""
 
     outcome: Outcome | None = None
-    round: Round | None = None
-    #: For timed calls: the names of their maps, their motions, and the resources used.
-    names: tuple[str, ...] = ()
-    motions: tuple[str, ...] = ()
+    parts: tuple[TimedPart, ...] = ()
     used: Used | None = None
     #: Observed by the parent; see :class:`~cembench.running.process.ProcessEnd`.
     running: tuple[int, ...] = ()
@@ -140,24 +160,34 @@ def _again(job: Job) -> Answer:
 def _time(job: Job) -> Answer:
     began, mesh = monotonic(), _mesh(job)
     preparing = preparing_seconds(mesh)
-    algorithm = load_algorithm(job.cell.algorithm, job.plugins)
-    found = timed_calls(
-        algorithm,
-        mesh,
-        job.cell,
-        job.motions,
-        first_counts=job.first_counts,
-        untimed=job.untimed,
-    )
+    cells = [
+        Timed(
+            load_algorithm(part.cell.algorithm, part.plugins),
+            part.cell,
+            part.motions,
+            part.first_counts,
+            part.untimed,
+        )
+        for part in job.parts
+    ]
+    found = timed_together(mesh, cells)
     if isinstance(found, Outcome):
         return Answer(outcome=found)
-    measured, told = found
-    np.save(job.uv_file, np.stack([uv for uv in told.maps if not isinstance(uv, Fault)]))
-    used = told.used(preparing)
+    each, everything = found
+    used = everything.used(preparing)
     used.began = began
-    if algorithm.program is not None:
+    if any(one.algorithm.program is not None for one in cells):
         used.own = 0.0  # writing and reading the files is not part of the program's wall-clock time
-    return Answer(round=measured, names=tuple(told.names()), motions=tuple(told.motions), used=used)
+    parts = []
+    for part, (measured, told) in zip(job.parts, each, strict=True):
+        np.save(part.uv_file, _maps(told))
+        motions = tuple(call.motion for call in told.calls)
+        parts.append(TimedPart(round=measured, names=tuple(told.names()), motions=motions))
+    return Answer(parts=tuple(parts), used=used)
+
+
+def _maps(told: TimedCalls) -> NDArray[np.complex128]:
+    return np.stack([call.uv for call in told.calls if not isinstance(call.uv, Fault)])
 
 
 def _judge_check(job: Job) -> Answer:

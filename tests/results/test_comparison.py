@@ -64,6 +64,48 @@ def test_nothing_is_said_that_is_not_shown(ours, theirs, verdict, rounds):
     assert (found.verdict, found.rounds) == (verdict, rounds)
 
 
+def shared(seconds, together, **cell):
+    record = record_of(seconds, **cell)
+    rounds = [
+        r.model_copy(update={"together": (t,)})
+        for r, t in zip(record.outcome.rounds, together, strict=True)
+    ]
+    return record.model_copy(
+        update={"outcome": record.outcome.model_copy(update={"rounds": tuple(rounds)})}
+    )
+
+
+NOISE = np.array([1.2, 0.8, 1.1, 0.9, 1.3, 0.7, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("separate", "within", "found"),
+    [
+        # The two agree, and the shared ones are narrower: they decide.
+        (0.95 * NOISE, 0.95 + 0.01 * NOISE, ("faster", True)),
+        # One disturbs the other where they share a process: "faster" there alone is nothing.
+        (1 + 0.01 * NOISE, 0.7 + 0.01 * NOISE, ("undecided", False)),
+        (NOISE, 0.2 + 0.01 * NOISE, ("undecided", False)),
+        # It does, but is faster without that, too.
+        (0.5 + 0.01 * NOISE, 0.4 + 0.01 * NOISE, ("faster", False)),
+    ],
+)
+def test_shared_processes_decide_only_what_separate_ones_do_not_deny(separate, within, found):
+    ones = [1.0] * len(NOISE)
+    one = compare(shared(separate, within), shared(ones, ones))
+    assert (one.verdict, one.together) == found
+    assert one.disturbance is not None
+
+
+def test_shared_processes_count_only_where_each_round_has_one():
+    ours, theirs = shared(NOISE, NOISE), shared(NOISE, NOISE)
+    rounds = (*theirs.outcome.rounds[:-1], Round(calls=(1.0,), sitting="s"))
+    theirs = theirs.model_copy(
+        update={"outcome": theirs.outcome.model_copy(update={"rounds": rounds})}
+    )
+    assert not compare(ours, theirs).together
+
+
 def test_there_is_no_comparison_without_times():
     assert compare(record_of([]), record_of([1.0])) is None
     assert compare_runs([record_of([])], [record_of([1.0])]) == []

@@ -23,6 +23,7 @@ from cembench import DiskMesh, Parameterization, algorithm
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.core.clock import phase
+from cembench.linear_algebra.cholesky import Cholesky
 from cembench.running.motion import moved
 
 #: Where the ones that keep something on disk keep it.
@@ -319,8 +320,8 @@ def next_surface():
     frame = sys._getframe()
     while frame is not None:
         found = frame.f_locals
-        if "told" in found and found.get("motions"):
-            return [moved(found["mesh"], found["motions"][len(found["told"].timings)])]
+        if "mine" in found and found["one"].motions:
+            return [moved(found["mesh"], found["one"].motions[len(found["mine"].calls)])]
         frame = frame.f_back
     return []
 
@@ -329,6 +330,24 @@ def next_surface():
 def foresight(mesh: DiskMesh) -> Parameterization:
     ahead_of_calls(next_surface)
     return kept(content(mesh), mesh)
+
+
+@algorithm("slows-others", title="Slows its neighbours", target="disk", conformal=False)
+def slows_others(mesh: DiskMesh) -> Parameterization:
+    honestly = Cholesky.__init__
+    if not hasattr(Cholesky, "fast"):
+        Cholesky.fast = honestly
+
+        def slow(*given, **named):
+            for _ in range(3):
+                Cholesky.fast(*given, **named)
+
+        Cholesky.slow = slow
+    Cholesky.__init__ = Cholesky.fast
+    try:
+        return Parameterization(work(mesh))
+    finally:
+        Cholesky.__init__ = Cholesky.slow
 
 
 def noisy(uv, mesh):

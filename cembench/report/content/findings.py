@@ -23,7 +23,7 @@ from cembench.report.document import Claim, Figure, Finding, Findings, Sentence
 from cembench.results.comparison import Comparison
 from cembench.results.outliers import outlier_lines
 from cembench.results.paper import ALGORITHMS
-from cembench.results.stability import stability_words
+from cembench.results.stability import scatter_words, stability_words
 
 
 def findings(
@@ -43,7 +43,7 @@ def findings(
     told = field_words(field) if field else ["No map to the disk to compare."]
     if claims and field:
         told[0] = _beside_the_paper(field, told[0])
-    told.append(stability_words(evidence.records))
+    told += [stability_words(evidence.records), scatter_words(evidence.records)]
     sentences += [(words,) for words in told if words]
     best = field.standings[0].label if field else REFERENCE
     return Findings(

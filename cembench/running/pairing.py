@@ -1,0 +1,70 @@
+"""Whether compared algorithms share a process in each round, by how this machine scatters.
+
+Processes differ: each has its own addresses and pages, from its first call to its last. On some
+machines that scatters the ratio of two algorithms more than all else. In one process both have the
+same. But there one can disturb the other, by accident (pools, caches) or on purpose. So each round
+still has a process for every cell, and the ratios of these are the control of the shared one's: see
+:func:`cembench.results.comparison.compare`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from statistics import NormalDist
+from typing import Literal
+
+import numpy as np
+
+from cembench.results.intervals import ERROR
+from cembench.results.looks import LOOKS, share
+
+Pairing = Literal["auto", "separate", "process"]
+
+#: Number of processes that show the scatter, and the largest share of a run that they may take.
+PROCESSES, WORTH = 10, 0.05
+#: A round that has both kinds of processes costs so many times one with separate ones.
+COST = 2.0
+#: Efficiency of the signed-rank interval for values that scatter normally.
+_EFFICIENCY = 3 / np.pi
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviations of the logarithm of the ratio of two equal calls."""
+
+    #: Between processes, and within one.
+    separate: float
+    together: float
+
+    @classmethod
+    def of(cls, seconds: Sequence[tuple[float, float]]) -> Scatter:
+        """Return the scatter from the seconds of twins, a pair for each process."""
+        a, b = np.log(np.array(seconds)).T
+        return cls(sqrt(a.var(ddof=1) + b.var(ddof=1)), float((a - b).std(ddof=1)))
+
+    @property
+    def pairing_is_narrower(self) -> bool:
+        """Whether sharing processes gives narrower intervals of ratios in the same time."""
+        return COST * self.together**2 < self.separate**2
+
+    def half_width(self, rounds: int, *, pairs: bool) -> float:
+        """Return the expected half-width of the interval of a ratio, relative to the ratio."""
+        scatter = self.together if pairs else self.separate
+        quantile = NormalDist().inv_cdf(1 - ERROR * share(rounds) / 2)
+        return quantile * scatter / sqrt(_EFFICIENCY * rounds)
+
+    def words(self, rounds: int, most: int, *, pairs: bool) -> str:
+        """Return a sentence on what so many rounds of each cell can show."""
+        told = (
+            f"this machine: ratios of equal calls scatter by {self.separate:.1%} between processes "
+            f"and by {self.together:.1%} within one, so algorithms are compared "
+            f"{'within one process of each round' if pairs else 'between processes'}; "
+        )
+        if rounds < LOOKS[0]:
+            few = "about one round" if rounds < 2 else f"about {rounds} rounds"
+            return f"{told}the time is enough for {few} of each cell, too few for all intervals"
+        width = self.half_width(rounds, pairs=pairs)
+        all_ = "all " if rounds >= most else "about "
+        return f"{told}{all_}{rounds} rounds of each cell make ratios certain to about ±{width:.1%}"
