@@ -7,6 +7,7 @@ speedups in two runs overlap. Stopped, it goes on where it was when called again
 
     python -m benchmarks.aa                      # a machine with nothing else to do
     python -m benchmarks.aa --busy 1             # beside so many processes that never rest
+    python -m benchmarks.aa --pairing process    # rounds with a shared process too
     python -m benchmarks.aa --profile quick --runs 2 --budget 4m -o results/aa-quick
     python -m benchmarks.aa --write-docs         # both, as far as they are there, in the page
 
@@ -31,8 +32,9 @@ from typing import Any
 from benchmarks import pages
 from benchmarks.repeatability import TWINS, pairs
 from cembench.core.atomic import write_text
-from cembench.results.comparison import compare
+from cembench.results.comparison import both_ratios, compare, ratio_interval
 from cembench.results.intervals import ERROR
+from cembench.results.looks import share_of
 from cembench.results.many import corrected
 from cembench.results.records import Record
 from cembench.results.store import Store
@@ -40,7 +42,12 @@ from cembench.results.store import Store
 PAGE = pages.ROOT / "docs/measuring.md"
 ALGORITHMS = ("cem", "ldm", "direct-cem", "lscm")
 SURFACES = ("flat-disk", "hemi-ellipsoid", "cone", "spherical-cap", "cylinder-sheet")
-HALVES = {"quiet": "quiet", "busy": "beside a busy neighbour"}
+HALVES = {
+    "quiet": "quiet",
+    "busy": "beside a busy neighbour",
+    "process": "within one process",
+    "process-busy": "within one process, beside a busy neighbour",
+}
 
 
 def main() -> None:
@@ -54,11 +61,13 @@ def main() -> None:
     parser.add_argument("--precision", default="10%")
     parser.add_argument("--budget", default="4m", help="of each run, see `cembench run`")
     parser.add_argument("--busy", type=int, default=0, metavar="N", help="start N busy loops")
+    parser.add_argument("--pairing", choices=("separate", "process"), default="separate")
     parser.add_argument("-o", "--output", type=Path, default=Path("results/aa"))
     parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md; no runs")
     chosen = parser.parse_args()
     if not chosen.write_docs:
-        half = "busy" if chosen.busy else "quiet"
+        half = "process" if chosen.pairing == "process" else "quiet"
+        half = half if not chosen.busy else "process-busy" if half == "process" else "busy"
         with neighbours(chosen.busy):
             measure(chosen, half)
     text = tell(chosen.output)
@@ -110,7 +119,7 @@ def run_command(chosen: argparse.Namespace, folder: Path, seed: int) -> list[str
             else ("--surfaces", chosen.surfaces, "--faces", str(chosen.faces))
         ),
         *("--precision", chosen.precision, "--budget", chosen.budget),
-        *("--seed", str(seed), "-o", str(folder)),
+        *("--pairing", chosen.pairing, "--seed", str(seed), "-o", str(folder)),
     ]
 
 
@@ -131,7 +140,10 @@ def summarise(runs: Sequence[Sequence[Record]], names: Sequence[str]) -> dict[st
         for r in record.outcome.rounds
     ]
     overlapping, compared, apart = _repeated(runs, names)
+    narrower = [n for records in runs for name in names for n in _narrower(records, name)]
     return {
+        "shared": sum(one.together for one in found),
+        "median_narrower": median(narrower) if narrower else None,
         "runs": len(runs),
         "comparisons": len(found),
         "called_different": sum(different),
@@ -145,6 +157,17 @@ def summarise(runs: Sequence[Sequence[Record]], names: Sequence[str]) -> dict[st
         "median_difference": median(apart) if apart else None,
         "largest_difference": max(apart, default=None),
     }
+
+
+def _narrower(records: Sequence[Record], name: str) -> Iterator[float]:
+    """Yield how many times narrower the intervals within a shared process are, if there was one."""
+    for ours, theirs in pairs(records, f"{name}-twin", name):
+        rounds = ours.outcome.rounds, theirs.outcome.rounds
+        share = share_of(len(rounds[0]), ours.cell, theirs.cell)
+        intervals = [ratio_interval(r, share) for r in both_ratios(*rounds) if r]
+        if len(intervals) == 2 and all(intervals):
+            separate, together = (log(i.high / i.low) for i in intervals if i)
+            yield separate / together
 
 
 def _repeated(
@@ -197,8 +220,16 @@ def tell(output: Path) -> str:
             f"| {f['called_different_corrected']} | {f['median_rounds']:g} "
             f"| {f['busy_share']:.0%} |"
         )
+    shared = [(half, f) for half, f in rows.items() if f.get("median_narrower")]
     lines += ["", f"Stated is at most {ERROR:.0%}. *rounds*: the median of a cell; *busy*: the "]
     lines[-1] += "share of processes beside which others took more than a quarter of a core."
+    for half, f in shared:
+        lines += [
+            "",
+            f"Shared processes, {HALVES[half]}: they decide {f['shared']} of {f['comparisons']} "
+            f"comparisons, the others are left to separate processes; their intervals are "
+            f"{f['median_narrower']:.1f} times narrower in the median.",
+        ]
     for half, f in rows.items():
         if f["speedups_compared"]:
             share = f["speedups_overlapping"] / f["speedups_compared"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,20 +23,30 @@ Output = Annotated[
 ]
 
 
+Tables = Annotated[
+    list[Path],
+    typer.Option("--tables", help="A TOML file that declares more tables. Repeatable."),
+]
 #: Processes that draw, at most: each holds a surface with its maps.
 MOST_DRAWING = 2
 
 
 def report(
-    run: Run = DEFAULT_RUN, *, output: Output = None, verify: Verify = False, as_json: Json = False
+    run: Run = DEFAULT_RUN,
+    *,
+    output: Output = None,
+    tables: Tables = [],  # noqa: B006 - typer copies defaults
+    verify: Verify = False,
+    as_json: Json = False,
 ) -> None:
     """Write a report of a run: the paper's tables, figures and claims, as measured.
 
     The folder holds index.html (one file that works offline), report.md,
     report.tex, and each table, figure and its data as separate files. The four
-    tables are printed here too.
+    tables are printed here too. --tables adds tables of your own; docs/tables.md
+    says how they are declared.
     """
-    written, folder = make_report(run, output, verify=verify)
+    written, folder = make_report(run, output, tables=tables, verify=verify)
     if as_json:
         print_json(summary(written, folder))
     else:
@@ -43,7 +54,12 @@ def report(
 
 
 def make_report(
-    run: Path, output: Path | None, command: str = "", *, verify: bool = False
+    run: Path,
+    output: Path | None,
+    command: str = "",
+    *,
+    tables: Sequence[Path] = (),
+    verify: bool = False,
 ) -> tuple[Report, Path]:
     """Write a report with progress on standard error; return the report and its folder."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
@@ -56,6 +72,7 @@ def make_report(
     sound_records(Store(run), Depth.everything if verify else Depth.sample)
     folder = output or run / "report"
     told = f"cembench report {run}" + (f" -o {output}" if output else "")
+    told += "".join(f" --tables {file}" for file in tables)
     bar = Progress(
         BarColumn(20), MofNCompleteColumn(), TextColumn("{task.description}", markup=False),
         console=err, transient=True,
@@ -69,7 +86,8 @@ def make_report(
                 err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
 
         jobs = min(usable_cores(), MOST_DRAWING)
-        return write_report(run, folder, command or told, progress, jobs=jobs), folder
+        written = write_report(run, folder, command or told, progress, jobs=jobs, tables=tables)
+        return written, folder
 
 
 def show_report(report: Report, folder: Path) -> None:
@@ -120,6 +138,7 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
 VERBS = (
     (
         report,
-        "Examples:  cembench report results/run  ·  cembench report results/run -o out --json",
+        "Examples:  cembench report results/run  ·  cembench report results/run -o out --json  ·  "
+        "cembench report results/run --tables mine.toml",
     ),
 )

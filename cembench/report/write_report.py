@@ -13,6 +13,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cembench.core import folders
@@ -20,6 +22,7 @@ from cembench.core.atomic import draft_folder, unwritable
 from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import Progress, build_report
+from cembench.report.declared import further_tables
 from cembench.report.document import Report
 from cembench.report.export import export_rows
 from cembench.report.export_format import Format
@@ -36,8 +39,11 @@ def write_report(
     progress: Progress = lambda *_: None,
     *,
     jobs: int = 1,
+    tables: Sequence[Path] = (),
 ) -> Report:
     """Write the report of a run in all its forms; `jobs` processes draw its pictures and plots.
+
+    `tables` are files with declarations of more tables (:mod:`cembench.report.declared`).
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -45,6 +51,8 @@ def write_report(
 
     Raises
     ------
+    ParameterError
+        A declaration is wrong, or does not fit the run.
     MissingExtra
         A package for reports is not installed.
     RecordError
@@ -54,12 +62,14 @@ def write_report(
     """
     require(Extra.REPORT, "a report")
     evidence = Evidence.of(run)
+    more = further_tables(evidence, tables)
     folders.check(folder, "report")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
             with shared_drawing(jobs):
                 report = build_report(evidence, draft, command, progress)
+                report = replace(report, sections=(*report.sections, *more))
             _write_all(report, evidence, draft)
             folders.publish(draft, folder, "report")
     except OSError as error:

@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from cembench.results.columns import COLUMNS, FIGURES
 from cembench.results.comparison import (
     Comparison,
     circumstances,
     compare,
     compare_cpu,
-    is_unstable,
     references,
-    seconds_interval,
 )
 from cembench.results.many import corrected
 from cembench.results.records import Record
 
 #: Default reference algorithm for speedups, as in the paper's Table 2.
 REFERENCE = "cem"
+_METRICS = frozenset(metric.name for metric in FIGURES)
 
 
 def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str, Any]]:
@@ -74,68 +74,15 @@ def _compared(
 
 
 def row(record: Record) -> dict[str, Any]:
-    """Return a record as a flat row; metrics are under their own names.
+    """Return a record as a flat row (:mod:`cembench.results.columns`).
 
-    `seconds_raw` holds the figure of each round, `seconds_calls` every timed call by round.
+    A metric that the record does not have is left out; one that is infinite is None. `seconds_raw`
+    holds the figure of each round, `seconds_calls` every timed call by round.
     """
-    cell, outcome = record.cell, record.outcome
-    interval = seconds_interval(record)
-    return {
-        "mesh": cell.mesh,
-        "algorithm": cell.algorithm,
-        "title": record.title,
-        "target": record.target,
-        "external": record.external.kind if record.external else None,
-        "external_name": record.external.name if record.external else None,
-        "external_version": outcome.program.version if outcome.program else None,
-        "parameters": cell.parameters,
-        "status": outcome.status,
-        "cause": outcome.cause,
-        **outcome.metrics,
-        "folded_before_repair": outcome.folded_before_repair,
-        "boundaries": [boundary.model_dump() for boundary in outcome.boundaries],
-        "iterations": outcome.iterations,
-        "seconds": outcome.median_seconds,
-        "seconds_raw": list(outcome.seconds),
-        "seconds_low": interval.low if interval else None,
-        "seconds_high": interval.high if interval else None,
-        "seconds_min": min((min(r.calls) for r in outcome.rounds), default=None),
-        "seconds_calls": [list(r.calls) for r in outcome.rounds],
-        "unstable": is_unstable(record),
-        "ended": outcome.ended,
-        "cpu_seconds": outcome.cpu_seconds,
-        "busy_rounds": sum(bool(r.neighbours and r.neighbours.busy) for r in outcome.rounds),
-        "start_seconds": outcome.start_seconds,
-        "own_seconds": outcome.own_seconds,
-        "solve_seconds": outcome.solve_seconds if record.is_program else None,
-        "input_bytes": outcome.program.input_bytes if outcome.program else None,
-        "output_bytes": outcome.program.output_bytes if outcome.program else None,
-        "phases": outcome.phases,
-        "factorisations": outcome.work.numeric if outcome.work else None,
-        "analyses": outcome.work.symbolic if outcome.work else None,
-        "right_hand_sides": outcome.work.right_hand_sides if outcome.work else None,
-        "matrix_order": outcome.work.order if outcome.work else None,
-        "factor_entries": outcome.work.entries if outcome.work else None,
-        "peak_memory_bytes": outcome.peak_memory_bytes,
-        "memory_increase_bytes": outcome.memory_increase_bytes,
-        "notes": [str(note) for note in outcome.notes],
-        "energy_history": list(outcome.energy_history),
-        "extras": outcome.extras,
-        "vertices": record.mesh.vertices,
-        "faces": record.mesh.faces,
-        "boundary_vertices": record.mesh.boundary_vertices,
-        "non_delaunay_share": record.mesh.non_delaunay_share,
-        "notices": [str(notice) for notice in record.mesh.notices],
-        "origin": record.mesh.origin,
-        "paper_row": record.mesh.paper_row or None,
-        "solves": cell.solves,
-        "backend": cell.backend,
-        "threads": cell.threads,
-        "mesh_hash": cell.mesh_hash,
-        "repeats": cell.repeats or None,
-        "precision": cell.precision,
-        "rounds": len(outcome.rounds),
-        "environment": record.environment,
-        "started_at": record.started_at,
-        "key": cell.key,
+    metrics = record.outcome.metrics
+    found = {
+        column.name: column.of(record)
+        for column in COLUMNS.values()
+        if column.exported and (column.name in metrics or column.name not in _METRICS)
     }
+    return found | metrics

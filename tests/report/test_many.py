@@ -12,12 +12,13 @@ from cembench.report.content.many.accuracy_profiles import accuracy_profiles
 from cembench.report.content.many.difficulty import boundary_crowding, difficulties
 from cembench.report.content.many.found import many_findings
 from cembench.report.content.many.pairwise_wins import _wins, pairwise_wins
-from cembench.report.content.many.success import share_interval, success_table
-from cembench.report.content.many.worst import HARDEST, hardest, spread_table
+from cembench.report.content.many.worst import HARDEST, hardest
+from cembench.report.declared import declared_table
 from cembench.report.document import plain
 from cembench.report.render.terminal_many import many_table
 from cembench.report.write_report import write_report
 from cembench.results.exhibits import Exhibit, write_exhibit
+from cembench.results.frame import share_interval
 from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
 from tests.report.small_run import ok, record
@@ -61,7 +62,7 @@ def by_label(table):
 
 
 def test_shares_count_what_was_tried_and_say_what_failed(evidence):
-    table = success_table(evidence, "reuse")
+    table = declared_table(evidence, "success")
     assert [c.title for c in table.columns][6:8] == ["invalid", "timeout"]
     cem = by_label(table)["CEM"]
     assert [cem[k].number for k in (2, 3)] == [COUNT, COUNT - 3]
@@ -116,7 +117,7 @@ def test_equal_figures_and_untried_surfaces_are_no_win():
 def test_the_hardest_are_those_with_the_worst_best_map(evidence):
     shown = hardest(evidence, "reuse")
     assert len(shown) == HARDEST
-    table = by_label(spread_table(evidence, "reuse"))
+    table = by_label(declared_table(evidence, "spread"))
     best = [
         min(
             r.outcome.metrics["angle_error_mean_deg"]

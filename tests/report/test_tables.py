@@ -3,16 +3,14 @@ from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench.report.content import averages
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.other_targets import other_targets
 from cembench.report.content.policies import policies_table
-from cembench.report.content.printed_beside_measured import significant
+from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.surface_page import figures_table
-from cembench.report.content.table_1 import table_1
 from cembench.report.content.table_2 import averages_table, measured_rates, table_2
-from cembench.report.content.table_3 import table_3
-from cembench.report.content.table_4 import table_4
+from cembench.report.declared import declared_table
 from cembench.report.document import marked
 from cembench.results import paper
+from cembench.results.columns import significant
 from cembench.results.records import LinearAlgebraWork
 from tests.report.small_run import ok, record, write_run
 
@@ -28,7 +26,7 @@ def entry(table, surface, group, title):
 
 
 def test_printed_figures_stand_beside_measured_ones_each_with_its_origin(evidence):
-    table = by_name(table_1(evidence))["table-1"]
+    table = by_name(printed_tables(evidence, 1))["table-1"]
     _, printed = entry(table, "Liu's Neutral Face", "CEM", "printed")
     column, here = entry(table, "Liu's Neutral Face", "CEM", "here")
     assert (printed.text, printed.origin, printed.record) == ("2.01", "printed", "")
@@ -40,8 +38,7 @@ def test_printed_figures_stand_beside_measured_ones_each_with_its_origin(evidenc
 
 @pytest.mark.parametrize("number", [1, 3, 4])
 def test_every_printed_cell_is_the_papers(evidence, number):
-    make = {1: table_1, 3: table_3, 4: table_4}[number]
-    table = by_name(make(evidence))[f"table-{number}"]
+    table = by_name(printed_tables(evidence, number))[f"table-{number}"]
     printed = {
         v.number
         for row in table.rows
@@ -53,26 +50,26 @@ def test_every_printed_cell_is_the_papers(evidence, number):
 
 
 def test_gaps_say_why(evidence):
-    table = by_name(table_1(evidence))["table-1"]
+    table = by_name(printed_tables(evidence, 1))["table-1"]
     _, failed = entry(table, "Chinese Vase", "QIEM", "here")
     assert (failed.text, failed.number) == ("failed", None)
     assert failed.why == "failed: it_gave up & 100 % lost"
     assert any("failed: it_gave up" in note and "Chinese Vase" in note for note in table.notes)
     assert any(note.startswith("not in this run: Nefertiti") for note in table.notes)
-    other = by_name(table_1(evidence))["table-1-other-surfaces"]
+    other = by_name(printed_tables(evidence, 1))["table-1-other-surfaces"]
     assert entry(other, "flat-disk", "LDM", "here")[1].why == "not in this run"
     assert entry(other, "flat-disk", "FDM", "here")[1].text == "timeout"
 
 
 def test_another_number_of_triangles_than_printed_is_said(evidence):
-    notes = by_name(table_3(evidence))["table-3"].notes
+    notes = by_name(printed_tables(evidence, 3))["table-3"].notes
     assert any(n.startswith("triangles differ") and "193,298 in print" in n for n in notes)
 
 
 def test_maps_to_other_targets_are_in_no_table_of_disks(evidence):
-    tables = [t for make in (table_1, table_2, table_3, table_4) for t in make(evidence)]
+    tables = [t for number in (1, 2, 3, 4) for t in printed_tables(evidence, number)]
     assert not any("LSCM" in column.group for table in tables for column in table.columns)
-    apart = other_targets(evidence)
+    apart = declared_table(evidence, "other-targets")
     assert {row[2].text for row in apart.rows} == {"free boundary"}
     titles = [column.title for column in apart.columns]
     assert {"|mu|", "area SD", "overlap"} <= set(titles)
@@ -112,7 +109,7 @@ def test_a_record_older_than_a_figure_has_a_gap_there(evidence):
 
 
 def test_other_algorithms_and_surfaces_have_tables_of_their_own(evidence):
-    found = by_name(table_1(evidence))
+    found = by_name(printed_tables(evidence, 1))
     assert {"table-1", "table-1-other-algorithms", "table-1-other-surfaces"} <= set(found)
     groups = {column.group for column in found["table-1-other-algorithms"].columns}
     assert groups == {"", "Harmonic"}

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.printed_beside_measured import significant
-from cembench.report.document import Value
 
 BOTH = ("reuse", "backslash")
 
@@ -16,12 +14,8 @@ def has_both_policies(evidence: Evidence) -> bool:
 
 def seconds_under(
     evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str
-) -> tuple[Value, float | None]:
-    """Return a cell's seconds under a policy, as a value and as a number."""
+) -> float | None:
+    """Return a cell's seconds under a policy; None if it has none."""
     record = evidence.find(surface, series, policy)
-    if record is None or record.outcome.status != "ok" or record.outcome.median_seconds is None:
-        key = record.cell.key if record else ""
-        text = record.outcome.status if record and record.outcome.status != "ok" else "-"
-        return Value(text, None, "", key, evidence.missing_reason(record)), None
-    seconds = record.outcome.median_seconds
-    return Value(significant(seconds), seconds, surface.origin, record.cell.key), seconds
+    ok = record is not None and record.outcome.status == "ok"
+    return record.outcome.median_seconds if record and ok else None

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,16 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import paper
 from cembench.results import record_rows as frame
+from cembench.results.columns import COLUMNS
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.paper.profiles import as_elsewhere
 from cembench.results.records import Cell, MeshOrigin, Record
 from cembench.results.store import Store
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 REFERENCE = frame.REFERENCE
 DISK = "disk"
@@ -112,6 +116,41 @@ class Evidence:
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
         return {row["key"]: row for row in frame.rows(self.records)}
+
+    @cached_property
+    def frame(self) -> pd.DataFrame:
+        """The records as a frame, a row each, by surface, series and policy.
+
+        Its columns are those of :mod:`cembench.results.columns`, and `surface` (its title), `place`
+        (its number in the report), `label` and `series` (its number), `main`, and `ok`.
+        """
+        import pandas as pd
+
+        series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
+        surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
+        found = []
+        for record in self.records:
+            k, own = series[record.cell.algorithm, self._variants[record.cell.key]]
+            place, surface = surfaces[record.cell.mesh_hash]
+            figures = {name: column.of(record) for name, column in COLUMNS.items()}
+            about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
+            more = {"main": own.main, "ok": record.outcome.status == "ok"}
+            order = (place, k, self.policies.index(record.cell.solves))
+            found.append((order, figures | about | more))
+        return pd.DataFrame([row for _, row in sorted(found, key=lambda pair: pair[0])])
+
+    @cached_property
+    def by_key(self) -> dict[str, Record]:
+        """The records by the keys of their cells."""
+        return {record.cell.key: record for record in self.records}
+
+    def origin_of(self, record: Record) -> MeshOrigin:
+        """Return the origin of a record's figures."""
+        return self._origins[record.cell.mesh_hash]
+
+    @cached_property
+    def _origins(self) -> dict[str, MeshOrigin]:
+        return {surface.mesh_hash: surface.origin for surface in self.surfaces}
 
     @cached_property
     def machines(self) -> Marks:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from math import exp, log
-
 from cembench.report.content.both_policies import BOTH, seconds_under
 from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.printed_beside_measured import POLICIES
-from cembench.report.document import Column, Table, Value, count, missing, words
+from cembench.report.content.printed_beside_measured import (
+    POLICIES,
+    Footer,
+    Quantity,
+    geometric_mean,
+    table_beside,
+)
+from cembench.report.document import Table
+from cembench.results.columns import COLUMNS, counted
 from cembench.results.records import LinearAlgebraWork
 
 CAPTION = (
@@ -24,17 +29,14 @@ _OWN_ORDER = (
 )
 
 
+#: The counts of each algorithm; the first two have ratios to CEM's.
+_COUNTS = ("counted_factorisations", "counted_columns", "factor_millions")
+
+
 def work_tables(evidence: Evidence) -> list[Table]:
     """Return a table for each policy whose records hold counts."""
-    return [
-        _table(evidence, policy)
-        for policy in evidence.policies
-        if any(
-            work_of(evidence, surface, series, policy) is not None
-            for surface in evidence.surfaces
-            for series in evidence.series
-        )
-    ]
+    known = {r.cell.solves for r in evidence.records if counted(r)}
+    return [_table(evidence, policy) for policy in evidence.policies if policy in known]
 
 
 def work_of(
@@ -42,61 +44,39 @@ def work_of(
 ) -> LinearAlgebraWork | None:
     """Return the linear algebra of an algorithm on a surface; None if unknown."""
     record = evidence.find(surface, series, policy)
-    work = record.outcome.work if record else None
-    return work if work is not None and work.numeric else None
+    return counted(record) if record else None
 
 
 def _table(evidence: Evidence, policy: str) -> Table:
-    columns = [Column("surface", numeric=False)]
-    for series in evidence.series:
-        titles = ("factored", "solved", "factor, M")
-        columns += [Column(title, series.label) for title in titles]
     reference = evidence.series_of(REFERENCE)
-    ratios: dict[str, tuple[list[float], list[float]]] = {
-        series.label: ([], []) for series in evidence.series
-    }
-    rows = []
-    for surface in evidence.surfaces:
-        base = work_of(evidence, surface, reference, policy) if reference else None
-        cells = [words(surface.title)]
-        for series in evidence.series:
-            work = work_of(evidence, surface, series, policy)
-            if work is None:
-                cells += [missing("not counted")] * 3
-                continue
-            cells += [
-                Value(str(work.numeric), work.numeric, surface.origin),
-                Value(
-                    f"{round(work.right_hand_sides, 1):g}", work.right_hand_sides, surface.origin
-                ),
-                Value(f"{work.entries / 1e6:.3g}", work.entries / 1e6, surface.origin)
-                if work.entries
-                else missing("the library does not report it"),
-            ]
-            if base is not None and base.right_hand_sides and work.right_hand_sides:
-                factored, solved = ratios[series.label]
-                factored.append(work.numeric / base.numeric)
-                solved.append(work.right_hand_sides / base.right_hand_sides)
-        rows.append(tuple(cells))
-    means, counts = [words(f"over {REFERENCE.upper()}, geometric mean")], [words("n, surfaces")]
-    for series in evidence.series:
-        factored, solved = ratios[series.label]
-        means += [_mean(factored), _mean(solved), words("")]
-        counts += [count(len(factored)), words(""), words("")]
     notes = [own_order(evidence)] if policy == "reuse" and reference else []
     if evidence.series_of("qiem"):
         notes.append(
             "QIEM's steps, and with them its factorisations, follow from rules for the time step "
             "and the stop that the paper leaves open and this suite decides (docs/algorithms.md)"
         )
-    return Table(
+    columns = [COLUMNS[name] for name in _COUNTS]
+    ratios = Footer(
+        f"over {REFERENCE.upper()}, geometric mean",
+        geometric_mean,
+        lambda mean: f"{mean:.2f}",
+        tuple(column.heading for column in columns[:2]),
+        reference.label if reference else REFERENCE,
+    )
+    return table_beside(
+        evidence,
         f"linear-algebra-work-{policy}",
         "Factorisations and solves of a map, compared with those of CEM",
-        tuple(columns),
-        (*rows, tuple(means), tuple(counts)),
-        f"{CAPTION} Here {POLICIES.get(policy, policy)}.",
-        notes=tuple(notes),
-        footer_rows=2,
+        evidence.surfaces,
+        [
+            Quantity(series.label, series, column, title=column.heading)
+            for series in evidence.series
+            for column in columns
+        ],
+        policy=policy,
+        caption=f"{CAPTION} Here {POLICIES.get(policy, policy)}.",
+        footers=(ratios,),
+        notes=notes,
     )
 
 
@@ -111,7 +91,7 @@ def own_order(evidence: Evidence) -> str:
     for surface in evidence.surfaces if reference else ():
         assert reference is not None
         kept, anew = (work_of(evidence, surface, reference, p) for p in BOTH)
-        times = [seconds_under(evidence, surface, reference, p)[1] for p in BOTH]
+        times = [seconds_under(evidence, surface, reference, p) for p in BOTH]
         if kept and anew and kept.right_hand_sides and anew.right_hand_sides and all(times):
             factored.append(kept.numeric / anew.numeric)
             solved.append(kept.right_hand_sides / anew.right_hand_sides)
@@ -130,11 +110,4 @@ def own_order(evidence: Evidence) -> str:
 
 
 def _percent(ratios: list[float]) -> str:
-    return f"{100 * exp(sum(map(log, ratios)) / len(ratios)):.0f} %"
-
-
-def _mean(ratios: list[float]) -> Value:
-    if not ratios:
-        return missing("nothing to compare")
-    mean = exp(sum(map(log, ratios)) / len(ratios))
-    return Value(f"{mean:.2f}", mean, "derived")
+    return f"{100 * geometric_mean(ratios):.0f} %"

@@ -6,11 +6,24 @@ import numpy as np
 
 from cembench.report.content.averages import geometric_rate
 from cembench.report.content.both_policies import BOTH, seconds_under
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import (
+    REFERENCE,
+    AlgorithmSeries,
+    Evidence,
+    MeasuredSurface,
+)
+from cembench.report.content.printed_beside_measured import (
+    Footer,
+    Quantity,
+    geometric_mean,
+    table_beside,
+)
 from cembench.report.content.table_2 import measured_rates
 from cembench.report.document import Column, Gap, Table, Value, count, missing, words
 from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.report.plots import PlotSeries as Bars
+from cembench.results.columns import COLUMNS, FrameColumn
+from cembench.results.records import Record
 
 
 def one_policy_gap(evidence: Evidence) -> Gap:
@@ -25,40 +38,34 @@ def one_policy_gap(evidence: Evidence) -> Gap:
 
 def policies_table(evidence: Evidence) -> Table:
     """Return a table of seconds under both policies and their ratio, for every algorithm."""
-    columns = [Column("surface", numeric=False)]
+    surfaces = {surface.mesh_hash: surface for surface in evidence.surfaces}
+    quantities = []
     for series in evidence.series:
-        columns += [Column(title, series.label) for title in (*BOTH, "ratio")]
-    rows = []
-    ratios: dict[str, list[float]] = {s.label: [] for s in evidence.series}
-    for surface in evidence.surfaces:
-        cells = [words(surface.title)]
-        for series in evidence.series:
-            (kept, a), (anew, b) = (
-                seconds_under(evidence, surface, series, policy) for policy in BOTH
-            )
-            cells += [kept, anew]
-            if a and b:
-                ratios[series.label].append(b / a)
-                cells.append(Value(f"{b / a:.2f}", b / a, "derived"))
-            else:
-                cells.append(missing("not measured under both policies"))
-        rows.append(tuple(cells))
-    means, counts = [words("geometric mean")], [words("n, surfaces counted")]
-    for series in evidence.series:
-        found = ratios[series.label]
-        mean = geometric_rate([r - 1 for r in found]) + 1 if found else None
-        value = missing("nothing to average") if mean is None else Value(f"{mean:.2f}", mean)
-        means += [words(""), words(""), value]
-        counts += [words(""), words(""), count(len(found))]
-    return Table(
+
+        def ratio(record: Record, series: AlgorithmSeries = series) -> float | None:
+            return _ratio(evidence, surfaces[record.cell.mesh_hash], series)
+
+        of_ratio = FrameColumn("ratio", ratio, form=".2f", lacking="not under both policies")
+        seconds = COLUMNS["seconds"]
+        quantities += [Quantity(series.label, series, seconds, title=p, policy=p) for p in BOTH]
+        quantities.append(Quantity(series.label, series, of_ratio, title="ratio", policy=BOTH[0]))
+    mean = Footer("geometric mean", geometric_mean, lambda mean: f"{mean:.2f}", ("ratio",))
+    return table_beside(
+        evidence,
         "reuse-against-backslash",
         "Seconds with factorisations reused (reuse) or repeated at every solve (backslash)",
-        tuple(columns),
-        (*rows, tuple(means), tuple(counts)),
-        "The ratio shows what an implementation saves by reusing a factorisation, "
+        evidence.surfaces,
+        quantities,
+        caption="The ratio shows what an implementation saves by reusing a factorisation, "
         "whatever the algorithm. The paper's MATLAB code factored at every solve.",
-        footer_rows=2,
+        footers=(mean,),
     )
+
+
+def _ratio(evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
+    """Return the seconds with a factorisation at every solve over those with reused ones."""
+    kept, anew = (seconds_under(evidence, surface, series, policy) for policy in BOTH)
+    return anew / kept if kept and anew else None
 
 
 def speedups_table(evidence: Evidence) -> Table:
@@ -99,11 +106,8 @@ def policies_plot(evidence: Evidence) -> Plot:
     """Return a plot of the ratios by surface."""
     drawn = []
     for series in evidence.series:
-        names, values = [], []
-        for surface in evidence.surfaces:
-            a, b = (seconds_under(evidence, surface, series, p)[1] for p in BOTH)
-            names.append(surface.title)
-            values.append(b / a if a and b else None)
+        names = [surface.title for surface in evidence.surfaces]
+        values = [_ratio(evidence, surface, series) for surface in evidence.surfaces]
         drawn.append(Bars(series.label, names, values, "both", evidence.styles[series.label]))
     return Plot(
         "reuse-against-backslash",

@@ -5,70 +5,63 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
+from cembench.report.declared import figure_entry
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results import paper
-from cembench.results.comparison import UNSTABLE_WIDTH
-from cembench.results.records import Record
-
-Number = float | int | None
+from cembench.results.columns import FrameColumn
+from cembench.results.many import geometric
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A pair of columns with a figure of one algorithm, printed and measured.
+    """A figure of one algorithm: a column, or two where the paper printed it.
 
     Parameters
     ----------
-    heading : str
-        Heading of the pair.
+    heading, title : str
+        Heading of the pair, and of the measured column.
     series : Series or None
         The series; None if the run does not have the algorithm.
-    measured : function of a record
-        Returns the figure, or None if the record has none.
-    show : function of a number
-        Formats a measured figure.
+    figure : FrameColumn
+        What is measured, and how it is written.
     column : (int, str) or None
         Its place in the paper: the table's number and the column's name.
     digits : int
         Printed digits after the decimal point.
-    timed : bool
-        Whether it depends on the stability of the times.
-    title : str
-        Heading of the measured column.
+    policy : str
+        Its linear-algebra policy, if it is not that of the table.
 
     """
 
     heading: str
     series: AlgorithmSeries | None
-    measured: Callable[[Record], Number]
-    show: Callable[[float], str]
+    figure: FrameColumn
     column: tuple[int, str] | None = None
     digits: int = 2
-    timed: bool = False
     title: str = "here"
+    policy: str = ""
 
 
 @dataclass(frozen=True)
 class Footer:
-    """A row of aggregates over the numbers of each column; None for none."""
+    """A row of aggregates over the numbers of each column with one of these titles, if any.
+
+    With `over`, the numbers are divided by those of that group's column with the same title.
+    """
 
     label: str
     of: Callable[[Sequence[float]], float]
     show: Callable[[float], str]
+    titles: tuple[str, ...] = ()
+    over: str = ""
 
 
-def significant(number: float, digits: int = 3) -> str:
-    """Return a number with this many significant digits, without an exponent if possible."""
-    if number == 0 or not 1e-5 <= abs(number) < 10**6:
-        return f"{number:.{digits}g}"
-    whole = len(f"{abs(number):.0f}") if abs(number) >= 1 else 0
-    if whole >= digits:
-        return f"{number:,.0f}"
-    leading = 0
-    while whole == 0 and abs(number) < 10 ** -(leading + 1):
-        leading += 1
-    return f"{number:.{digits - whole + leading}f}"
+def geometric_mean(numbers: Sequence[float]) -> float:
+    """Return the geometric mean of positive numbers."""
+    return float(geometric(np.asarray(numbers, dtype=float)))
 
 
 def paper_value(table: int, model: str, column: str, digits: int) -> Value:
@@ -89,22 +82,13 @@ def here(
     """Return a measured figure, or why there is none."""
     if quantity.series is None:
         return missing("the run does not have this algorithm")
-    record = evidence.find(surface, quantity.series, policy)
+    record = evidence.find(surface, quantity.series, quantity.policy or policy)
     if record is None:
         return missing(evidence.missing_reason(record))
     if record.outcome.status != "ok":
         text = record.outcome.status.replace("out_of_memory", "memory")
         return Value(text, None, "", record.cell.key, evidence.missing_reason(record))
-    number = quantity.measured(record)
-    if number is None:
-        return Value("-", None, "", record.cell.key, "the record holds no such figure")
-    why = ""
-    if quantity.timed and evidence.row(record)["unstable"]:
-        why = f"unstable: its 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
-    text = quantity.show(number) + ("!" if why else "")
-    if quantity.timed:
-        text = f"{text} {evidence.machines.of(record)}".rstrip()
-    return Value(text, float(number), surface.origin, record.cell.key, why)
+    return figure_entry(evidence, record, quantity.figure)
 
 
 def table_beside(
@@ -134,7 +118,7 @@ def table_beside(
     counted = [
         r for s, r in zip(surfaces, rows, strict=True) if s not in evidence.stand_ins_left_out
     ]
-    last = _footer_rows(counted, len(columns), footers)
+    last = _footer_rows(counted, columns, footers)
     places = _places(columns, rows)
     remarks = [*notes, *([absent] if absent else []), *places.values(), *_sizes(surfaces)]
     return Table(
@@ -163,22 +147,45 @@ def _row(
 
 
 def _footer_rows(
-    rows: Sequence[tuple[Value, ...]], width: int, footers: Sequence[Footer]
+    rows: Sequence[tuple[Value, ...]], columns: Sequence[Column], footers: Sequence[Footer]
 ) -> list[tuple[Value, ...]]:
     if not footers:
         return []
-    columns = [[r[k].number for r in rows if r[k].number is not None] for k in range(2, width)]
-    lines = []
-    for footer in footers:
-        cells = [
-            Value(footer.show(footer.of(c)), footer.of(c), "derived")  # type: ignore[arg-type]
-            if c
-            else missing("no figure in this column")
-            for c in columns
-        ]
-        lines.append((words(footer.label), words(""), *cells))
-    counts = [count(len(c)) for c in columns]
-    return [*lines, (words("n, surfaces counted"), words(""), *counts)]
+    lines, counts = [], [words("n, surfaces counted"), words("")]
+    for number, footer in enumerate(footers):
+        cells = [words(footer.label), words("")]
+        for k, column in enumerate(columns[2:], start=2):
+            if footer.titles and column.title not in footer.titles:
+                cells.append(words(""))
+                counts += [] if number else [words("")]
+                continue
+            found = _numbers(rows, columns, k, footer.over)
+            value = footer.of(found) if found else None
+            nothing = "nothing to compare" if footer.over else "no figure in this column"
+            cells.append(
+                missing(nothing) if value is None else Value(footer.show(value), value, "derived")
+            )
+            counts += [] if number else [count(len(found))]
+        lines.append(tuple(cells))
+    return [*lines, tuple(counts)]
+
+
+def _numbers(
+    rows: Sequence[tuple[Value, ...]], columns: Sequence[Column], k: int, over: str
+) -> list[float]:
+    """Return the numbers of a column; with `over`, divided by those of that group's column."""
+    places = [
+        p
+        for p, column in enumerate(columns)
+        if (column.group, column.title) == (over, columns[k].title)
+    ]
+    found = []
+    for row in rows:
+        base = row[places[0]].number if places else 1.0 if not over else None
+        number = row[k].number
+        if number is not None and base:
+            found.append(number / base if over else number)
+    return found
 
 
 def _places(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> dict[str, str]:
@@ -207,11 +214,6 @@ def absent_models(evidence: Evidence) -> list[str]:
     """Return the models of the paper without a surface in the run."""
     there = {s.paper_row for s in evidence.models}
     return [model for model in paper.table(1) if model not in there]
-
-
-def metric(name: str) -> Callable[[Record], Number]:
-    """Return a function that gets this metric from a record; None if infinite or missing."""
-    return lambda record: record.outcome.metrics.get(name)
 
 
 def in_policy(evidence: Evidence, policy: str) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from cembench import __version__
 from cembench.report.content import policies
-from cembench.report.content.beside_others import beside_others
 from cembench.report.content.both_policies import has_both_policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
@@ -30,13 +29,11 @@ from cembench.report.content.machines import machines_section
 from cembench.report.content.many.found import many_findings
 from cembench.report.content.many.section import is_many, many_section
 from cembench.report.content.many.worst import hardest
-from cembench.report.content.other_targets import other_targets
+from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
-from cembench.report.content.table_1 import table_1
 from cembench.report.content.table_2 import table_2
-from cembench.report.content.table_3 import table_3
-from cembench.report.content.table_4 import table_4
+from cembench.report.declared import declared_table
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
 from cembench.report.shared_drawing import each
@@ -213,9 +210,13 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
 
 
 def _tables(evidence: Evidence) -> Section:
-    items: list[Item] = []
-    for make in (table_1, work_tables, table_2, table_3, table_4):
-        items += make(evidence)
+    items: list[Item] = [
+        *printed_tables(evidence, 1),
+        *work_tables(evidence),
+        *table_2(evidence),
+        *printed_tables(evidence, 3),
+        *printed_tables(evidence, 4),
+    ]
     return Section("tables", "Tables 1 to 4", tuple(items))
 
 
@@ -284,7 +285,9 @@ def _beyond_the_paper(
     else:
         items.append(policies.one_policy_gap(evidence))
     if by_surface:
-        items += [table for make in (other_targets, beside_others) if (table := make(evidence))]
+        external = any(record.external for record in evidence.records)
+        names = ("other-targets", *(("beside-others",) if external else ()))
+        items += [table for name in names if (table := declared_table(evidence, name))]
     return Section("beyond", "Beyond the paper", tuple(items))
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from cembench.report.content.averages import (
     COMPARED,
     READINGS,
@@ -13,61 +11,29 @@ from cembench.report.content.averages import (
     percent,
     printed_rates,
 )
-from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence
+from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.linear_algebra_work import work_of
-from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import (
-    POLICIES,
-    Number,
-    Quantity,
     absent_models,
     in_policy,
     policy_suffix,
 )
+from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.document import Column, Table, Value, count, missing, words
-from cembench.results.records import Record
-
-CAPTION = (
-    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 if CEM takes half the time, negative if CEM is "
-    "slower. Here it is the median of the ratios within rounds. "
-)
 
 
 def table_2(evidence: Evidence) -> list[Table]:
     """Return the rates of speedup and their averages in both readings, for each policy."""
-    tables: list[Table] = []
+    tables = {table.name: table for table in printed_tables(evidence, 2)}
+    found: list[Table] = []
     for policy in evidence.policies:
-        tables += tables_of_kind(
-            evidence,
-            2,
-            "rate of speedup of CEM",
-            _quantities(evidence.rate),
-            policy=policy,
-            caption=CAPTION + f"Here {POLICIES.get(policy, policy)}.",
-            footers=READINGS,
-            algorithms=COMPARED,
-            notes=(
-                "averages of the printed column use its numbers as printed, including the misprint",
-            ),
-        )
-        if evidence.models:
-            tables.append(averages_table(evidence, policy))
-        tables += sure_speedups(evidence, policy)
-    return tables
-
-
-def _quantities(
-    rate: Callable[[Record], Number],
-) -> Callable[[AlgorithmSeries | None, str | None], list[Quantity]]:
-    def quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:
-        if series is not None and series.algorithm == REFERENCE:
-            return []
-        title = series.label if series else str(column).upper()
-        place = (2, column) if column else None
-        return [Quantity(title, series, rate, lambda x: f"{x:.2f}", place)]
-
-    return quantities
+        name = f"table-2{policy_suffix(policy, evidence)}"
+        known = (name, f"{name}-other-algorithms", f"{name}-other-surfaces")
+        found += [tables[one] for one in known if one in tables]
+        found += [averages_table(evidence, policy)] if evidence.models else []
+        found += sure_speedups(evidence, policy)
+    return found
 
 
 def averages_table(evidence: Evidence, policy: str) -> Table:

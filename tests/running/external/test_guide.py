@@ -13,8 +13,8 @@ from cembench import write_mesh
 from cembench.commands.external import KEYS
 from cembench.core.program import INPUTS, OUTPUTS
 from cembench.registry import load_registry
-from cembench.report.content.beside_others import beside_others
 from cembench.report.content.evidence import Evidence
+from cembench.report.declared import declared_table
 from cembench.results.records import FaultKind
 from tests.validation.in_this_process import LauncherHere, call_here
 
@@ -88,7 +88,7 @@ def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli, mon
     energies = re.findall(r"(?:igl-)?lscm(?: ‡)? (\d\.\d{4}) ", printed)
     assert len(energies) == 2
     assert energies[0] == energies[1]
-    table = beside_others(Evidence.of(cli.folder / "results/peers"))
+    table = declared_table(Evidence.of(cli.folder / "results/peers"), "beside-others")
     told = {(row[1].text, row[2].text): row[4].text for row in table.rows}
     assert told["free boundary", "LSCM of libigl ‡"] == told["free boundary", "LSCM"]
     assert ("disk", "CEM") in told

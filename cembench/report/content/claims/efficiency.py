@@ -27,9 +27,9 @@ from cembench.report.content.claims.verdicts import (
 )
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
-from cembench.report.content.printed_beside_measured import significant
 from cembench.report.document import Claim, Verdict
 from cembench.results import paper
+from cembench.results.columns import significant
 from cembench.results.comparison import Comparison, compare, seconds_interval
 from cembench.results.many import sign_test
 from cembench.results.records import DEFAULT_ROUNDS

@@ -6,7 +6,6 @@ from math import inf
 
 from cembench.report.content.evidence import ANGLE, Evidence, figure
 from cembench.report.content.findings import field_figures, field_words
-from cembench.report.content.many.success import records_of
 from cembench.report.content.standings import field_of, listed
 from cembench.report.document import Finding, Findings
 from cembench.results.outliers import outlier_lines
@@ -19,7 +18,11 @@ def many_findings(evidence: Evidence) -> Findings:
     All of it is under the run's first policy.
     """
     policy = evidence.policies[0]
-    held = {s.label: records_of(evidence, s, policy) for s in evidence.series if s.main}
+    held = {
+        s.label: [r for surface in evidence.surfaces if (r := evidence.find(surface, s, policy))]
+        for s in evidence.series
+        if s.main
+    }
     held = {label: records for label, records in held.items() if records}
     ok = {label: sum(r.outcome.status == "ok" for r in found) for label, found in held.items()}
     cells = sum(map(len, held.values()))

@@ -12,8 +12,9 @@ from cembench.report.content.many import MANY
 from cembench.report.content.many.accuracy_profiles import accuracy_profiles
 from cembench.report.content.many.difficulty import difficulties, errors_by_difficulty
 from cembench.report.content.many.pairwise_wins import pairwise_wins
-from cembench.report.content.many.success import success_table
-from cembench.report.content.many.worst import hardest_gallery, hardest_table, spread_table
+from cembench.report.content.many.worst import hardest_gallery
+from cembench.report.content.printed_tables import hardest_table
+from cembench.report.declared import declared_table
 from cembench.report.document import Item, Section, Text
 from cembench.report.plots import write_plot
 
@@ -34,7 +35,7 @@ def many_section(
     items: list[Item] = []
     if len(evidence.policies) > 1:
         items.append(Text(f"Unless stated otherwise, the linear-algebra policy is {policy}."))
-    items += [success_table(evidence, policy), spread_table(evidence, policy)]
+    items += [t for name in ("success", "spread") if (t := declared_table(evidence, name))]
     plots = (
         accuracy_profiles(evidence, policy),
         performance_profile(evidence),

@@ -1,0 +1,328 @@
+"""Tables that are declared: a title, the rows, and for each column what it shows.
+
+A declaration is a part of a TOML file, ``tables.toml`` here or one that ``report --tables`` names.
+Its rows are records, or algorithms with figures over their records::
+
+    [by-target]
+    title = "Angle errors by algorithm"
+    rows = "algorithm"
+    where = "target == 'disk'"
+    columns = [
+      { title = "maps", value = "count(ok)" },
+      { title = "median", unit = "degrees", value = "median(angle_error_mean_deg)", form = ".2f" },
+    ]
+
+Columns of records name a column of the frame (:mod:`cembench.results.columns`); those of algorithms
+are expressions (:mod:`cembench.results.frame`). Every entry keeps its record's key, its origin, and
+why it has no number.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from cembench.core.errors import ParameterError
+from cembench.core.names import slug
+from cembench.report.content.evidence import DISK, Evidence
+from cembench.report.document import Column, Item, Section, Table, Text, Value, words
+from cembench.results.columns import COLUMNS, FrameColumn, worded
+from cembench.results.comparison import UNSTABLE_WIDTH
+from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.frame import evaluate
+from cembench.results.records import Record
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: Columns of a table of records that say which it is, and how it ended.
+_NAMES = ("surface", "algorithm", "starred", "marked", "target", "solves", "status", "cause")
+_HEADINGS = {"starred": "algorithm", "marked": "algorithm"}
+
+
+class DeclaredColumn(BaseModel):
+    """A column: of a record's figure (`column`) or of an expression over a group (`value`)."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: str = ""
+    value: str = ""
+    title: str = ""
+    group: str = ""
+    unit: str = ""
+    form: str = "significant"
+    #: Whether its entries are texts.
+    words: bool = False
+    #: Left out where it is zero in every row.
+    optional: bool = False
+    #: An expression for the key of the record behind the entry.
+    record: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, given: Any) -> Any:
+        return {"column": given} if isinstance(given, str) else given
+
+    @model_validator(mode="after")
+    def _known(self) -> DeclaredColumn:
+        if bool(self.column) == bool(self.value):
+            raise ValueError('a column has either "column" or "value"')
+        if self.column and self.column not in COLUMNS and self.column not in _NAMES:
+            known = ", ".join((*_NAMES, *COLUMNS))
+            raise ValueError(f"there is no column {self.column!r}; known: {known}")
+        return self
+
+    @property
+    def heading(self) -> Column:
+        """The heading in the table."""
+        known = COLUMNS.get(self.column)
+        title = self.title or _HEADINGS.get(self.column) or (known.heading if known else "")
+        unit = self.unit or ("" if known is None or self.group else _unit(known))
+        numeric = not (self.words or self.column in _NAMES)
+        return Column(title or self.column, self.group, unit, numeric)
+
+
+def _unit(column: FrameColumn) -> str:
+    return column.unit if column.unit in ("s", "MiB") else ""
+
+
+class DeclaredTable(BaseModel):
+    """A table; `where` is an expression, true for the records that it is about."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    title: str
+    columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
+    rows: Literal["record", "algorithm"] = "record"
+    where: str = ""
+    #: "first": the run's first linear-algebra policy; "all".
+    policy: Literal["first", "all"] = "first"
+    #: Columns of the frame by which the records of a surface are sorted.
+    sort: tuple[str, ...] = ()
+    caption: str = ""
+    #: What is said below the table: what marks mean, why cells did not end ok, their notices.
+    notes: tuple[Literal["marks", "targets", "causes", "notices"], ...] = ()
+
+    @model_validator(mode="after")
+    def _fits(self) -> DeclaredTable:
+        wrong = [c for c in self.columns if bool(c.value) != (self.rows == "algorithm")]
+        if wrong:
+            what = "expressions (value)" if self.rows == "algorithm" else "columns (column)"
+            raise ValueError(f'rows = "{self.rows}" takes {what}, not {wrong[0].title!r}')
+        return self
+
+
+def read_declarations(path: Path) -> dict[str, DeclaredTable]:
+    """Return the tables that a TOML file declares, by name.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, or a declaration is wrong.
+
+    """
+    try:
+        return _declarations(path.read_text(encoding="utf-8"), str(path))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ParameterError(f"{path} cannot be read: {error}. Name a TOML file.") from error
+
+
+def _declarations(text: str, where: str) -> dict[str, DeclaredTable]:
+    try:
+        given = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ParameterError(f"{where} is not TOML: {error}.") from error
+    found = {}
+    for name, table in given.items():
+        try:
+            found[name] = DeclaredTable.model_validate(table)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = " / ".join([name, *map(str, first["loc"])])
+            raise ParameterError(f"{where}, {place}: {first['msg']}.") from error
+    return found
+
+
+@cache
+def own_tables() -> Mapping[str, DeclaredTable]:
+    """Return the tables that every report can have."""
+    text = (files("cembench.report") / "tables.toml").read_text(encoding="utf-8")
+    return _declarations(text, "tables.toml")
+
+
+def declared_table(
+    evidence: Evidence,
+    name: str,
+    declared: DeclaredTable | None = None,
+    *,
+    keys: Iterable[str] | None = None,
+    called: str = "",
+    **texts: str,
+) -> Table | None:
+    """Return a declared table over a run; None if no record is in it.
+
+    Parameters
+    ----------
+    evidence : Evidence
+        The run.
+    name : str
+        Name of the table.
+    declared : DeclaredTable, optional
+        The table; default: the one of :func:`own_tables` with this name.
+    keys : iterable of str, optional
+        Only these records.
+    called : str
+        Another name for the table's file and anchor.
+    texts : str
+        What braces in title and caption stand for, besides ``{policy}``.
+
+    """
+    spec = declared or own_tables()[name]
+    frame = evidence.frame
+    policy = evidence.policies[0]
+    if spec.policy == "first":
+        frame = frame[frame["solves"] == policy]
+    if keys is not None:
+        frame = frame[frame["key"].isin(list(keys))]
+    if spec.where:
+        frame = frame[evaluate(spec.where, frame).astype(bool)]
+    if spec.sort:
+        frame = frame.sort_values(["place", *spec.sort], kind="stable", na_position="last")
+    if frame.empty:
+        return None
+    make = _of_records if spec.rows == "record" else _of_algorithms
+    columns, rows = make(evidence, spec, frame)
+    told = {"policy": policy, "n": str(len(frame)), **texts}
+    return Table(
+        called or name,
+        spec.title.format_map(told),
+        columns,
+        rows,
+        spec.caption.format_map(told),
+        tuple(dict.fromkeys(_notes(evidence, spec, frame))),
+    )
+
+
+def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
+    """Return the tables that these files declare, each file's as a section.
+
+    Raises
+    ------
+    ParameterError
+        A declaration is wrong, or does not fit the run.
+
+    """
+    sections: list[Section] = []
+    for number, path in enumerate(paths, start=1):
+        items: list[Item] = []
+        for name, declared in read_declarations(path).items():
+            called = f"declared-{number}-{slug(name)}"
+            made = declared_table(evidence, name, declared, called=called)
+            items.append(made or Text(f"{declared.title}: no record of this run is in this table."))
+        sections.append(Section(f"declared-{number}", f"Tables of {path.name}", tuple(items)))
+    return sections
+
+
+def _of_records(
+    evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame
+) -> tuple[tuple[Column, ...], tuple[tuple[Value, ...], ...]]:
+    columns = tuple(one.heading for one in spec.columns)
+    rows = tuple(
+        tuple(_entry(evidence, row, one) for one in spec.columns)
+        for row in frame.to_dict("records")
+    )
+    return columns, rows
+
+
+def _entry(evidence: Evidence, row: Mapping[Any, Any], one: DeclaredColumn) -> Value:
+    record, name = evidence.by_key[row["key"]], one.column
+    if name == "status":
+        return Value(record.outcome.status, None, "", row["key"], record.outcome.cause or "")
+    if name == "starred":
+        return words(row["label"] + ("" if record.target == DISK else " *"))
+    if name == "marked":
+        return words(f"{row['label']} {mark_of(record)}".rstrip())
+    if name in _NAMES:
+        return words(str(row["label" if name == "algorithm" else name] or ""))
+    if one.words:
+        return words(str(COLUMNS[name].of(record) or "-"))
+    return figure_entry(evidence, record, COLUMNS[name])
+
+
+def figure_entry(evidence: Evidence, record: Record, column: FrameColumn) -> Value:
+    """Return a figure of a record as an entry: with its origin, or why there is none."""
+    number = column.of(record)
+    key = record.cell.key
+    if number is None:
+        ended = record.outcome.status == "ok"
+        why = column.why_lacking(record) if ended else evidence.missing_reason(record)
+        return Value("-", None, "", key, why)
+    text, why = column.text(number), ""
+    if column.timed:
+        text, why = timed(evidence, record, text)
+    return Value(text, float(number), evidence.origin_of(record), key, why)
+
+
+def timed(evidence: Evidence, record: Record, text: str) -> tuple[str, str]:
+    """Return a time with its marks, and why it has one."""
+    why = ""
+    if evidence.row(record)["unstable"]:
+        why = f"unstable: its 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
+    return f"{text}{'!' if why else ''} {evidence.machines.of(record)}".rstrip(), why
+
+
+def _of_algorithms(
+    evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame
+) -> tuple[tuple[Column, ...], tuple[tuple[Value, ...], ...]]:
+    groups = list(frame.sort_values("series", kind="stable").groupby("label", sort=False))
+    made = [(one.heading, [_aggregate(one, group) for _, group in groups]) for one in spec.columns]
+    kept = [
+        (heading, values)
+        for one, (heading, values) in zip(spec.columns, made, strict=True)
+        if not one.optional or any(value.number for value in values)
+    ]
+    columns = (Column("algorithm", numeric=False), *(heading for heading, _ in kept))
+    rows = [
+        (words(str(label)), *(values[k] for _, values in kept))
+        for k, (label, _) in enumerate(groups)
+    ]
+    return columns, tuple(rows)
+
+
+def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
+    found = evaluate(one.value, group)
+    if one.words:
+        return words("-" if found is None else str(found))
+    key = str(evaluate(one.record, group) or "") if one.record else ""
+    if isinstance(found, str):
+        return Value(found, None, "derived")
+    if found is None:
+        return Value("-", None, "", key, "no figure")
+    return Value(worded(found, one.form), found, "derived", key)
+
+
+def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iterable[str]:
+    records = [evidence.by_key[key] for key in frame["key"]]
+    if "marks" in spec.notes:
+        yield from marks_explained(records)
+    several = frame["place"].nunique() > 1
+    for label, surface, record in zip(frame["label"], frame["surface"], records, strict=True):
+        where = f"{f'{surface}, ' if several else ''}{label} ({record.cell.solves})"
+        if "causes" in spec.notes and record.outcome.status != "ok":
+            yield f"{where}: {evidence.missing_reason(record)}"
+        if "notices" in spec.notes:
+            if told := seconds_words(record):
+                yield f"{where}: {told}"
+            yield from (f"{where}: {note}" for note in record.outcome.notes)
+    others = sorted(set(frame["target"]) - {DISK})
+    if "targets" in spec.notes and others:
+        yield (
+            f"* not a map to the disk ({', '.join(others)}): its E_C is not comparable with those "
+            "of disks"
+        )

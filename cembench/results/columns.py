@@ -1,0 +1,295 @@
+"""The columns of a run's frame: each figure of a record is named, read and worded here, once.
+
+Rows, exports, tables and plots take their columns from here. A column for all of them is added here
+and nowhere else; a metric is added in :mod:`cembench.conformal.metrics`, and is a column with that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from cembench.conformal.atlas import ATLAS_METRICS
+from cembench.conformal.metrics import METRICS, Metric
+from cembench.results.comparison import is_unstable, seconds_interval
+from cembench.results.external_words import solve_words
+from cembench.results.records import LinearAlgebraWork, Outcome, Record
+
+MIB, MILLION = 2**20, 1e6
+#: The metrics of maps, those of atlases last.
+FIGURES = (*METRICS, *ATLAS_METRICS)
+
+
+def significant(number: float, digits: int = 3) -> str:
+    """Return a number with this many significant digits, without an exponent if possible."""
+    if number == 0 or not 1e-5 <= abs(number) < 10**6:
+        return f"{number:.{digits}g}"
+    whole = len(f"{abs(number):.0f}") if abs(number) >= 1 else 0
+    if whole >= digits:
+        return f"{number:,.0f}"
+    leading = 0
+    while whole == 0 and abs(number) < 10 ** -(leading + 1):
+        leading += 1
+    return f"{number:.{digits - whole + leading}f}"
+
+
+@dataclass(frozen=True)
+class FrameColumn:
+    """A column of the frame.
+
+    Parameters
+    ----------
+    name : str
+        Name in rows, exports and declarations.
+    of : function of a record
+        Its value; None where there is none.
+    heading, unit : str
+        How a table heads it.
+    form : str
+        Format of a number, "significant" for three significant digits, or "tenths".
+    lacking : str or function of a record
+        Why a record that ended ok has no value.
+    timed : bool
+        Whether it is a time: marked if unstable, and with the letter of its machine.
+    exported : bool
+        Whether rows and exports have it; the others are derived, for tables.
+
+    """
+
+    name: str
+    of: Callable[[Record], Any]
+    heading: str = ""
+    unit: str = ""
+    form: str = "g"
+    lacking: str | Callable[[Record], str] = "not measured"
+    timed: bool = False
+    exported: bool = True
+
+    def why_lacking(self, record: Record) -> str:
+        """Return why a record that ended ok has no value."""
+        if self.name in record.outcome.metrics:
+            return "infinite"
+        return self.lacking if isinstance(self.lacking, str) else self.lacking(record)
+
+    def text(self, number: float) -> str:
+        """Return a number as a table has it."""
+        return worded(number, self.form)
+
+
+def worded(number: float, form: str) -> str:
+    """Return a number in the form of a :class:`FrameColumn`."""
+    if form == "significant":
+        return significant(number)
+    if form == "tenths":
+        return f"{round(number, 1):g}"
+    return format(int(number) if form.endswith("d") else number, form)
+
+
+def _of_work(name: str) -> Callable[[Record], Any]:
+    def of(record: Record) -> Any:
+        work = record.outcome.work
+        return getattr(work, name) if work else None
+
+    return of
+
+
+def _of_outcome(name: str) -> Callable[[Record], Any]:
+    return lambda record: getattr(record.outcome, name)
+
+
+def _of_mesh(name: str) -> Callable[[Record], Any]:
+    return lambda record: getattr(record.mesh, name)
+
+
+def _of_cell(name: str) -> Callable[[Record], Any]:
+    return lambda record: getattr(record.cell, name)
+
+
+def _of_program(name: str) -> Callable[[Record], Any]:
+    def of(record: Record) -> Any:
+        return getattr(record.outcome.program, name) if record.outcome.program else None
+
+    return of
+
+
+def _metric(metric: Metric) -> FrameColumn:
+    def of(record: Record) -> Any:
+        return record.outcome.metrics.get(metric.name)
+
+    return FrameColumn(
+        metric.name, of, metric.heading, metric.unit, metric.form, _without(metric.name)
+    )
+
+
+def _without(name: str) -> str | Callable[[Record], str]:
+    """Return why a map has no such metric: it is of another kind, or the record is older."""
+    if name != "common_gauge_energy":
+        return "not measured"
+    return lambda record: (
+        "the map does not go to the disk"
+        if record.target in ("free boundary", "atlas")
+        else "not measured"
+    )
+
+
+def _uncounted(record: Record) -> str:
+    return "the library does not report it" if counted(record) else "not counted"
+
+
+def _end(record: Record, which: str) -> float | None:
+    found = seconds_interval(record)
+    return None if found is None else float(getattr(found, which))
+
+
+def _fastest(record: Record) -> float | None:
+    return min((min(r.calls) for r in record.outcome.rounds), default=None)
+
+
+def _call(record: Record) -> float | None:
+    return None if record.is_program else record.outcome.median_seconds
+
+
+def _wall(record: Record) -> float | None:
+    return record.outcome.median_seconds if record.is_program else None
+
+
+def _solve_from(record: Record) -> str | None:
+    has = record.is_program and record.outcome.solve_seconds
+    return solve_words(record) if has else None
+
+
+def half_width(record: Record) -> float | None:
+    """Return half the width of the 95 % interval of a cell's seconds, in percent of them."""
+    found, seconds = seconds_interval(record), record.outcome.median_seconds
+    return 50 * (found.high - found.low) / seconds if found and seconds else None
+
+
+def counted(record: Record) -> LinearAlgebraWork | None:
+    """Return the linear algebra that was counted in a cell's call; None if none was."""
+    work = record.outcome.work
+    return work if work is not None and work.numeric else None
+
+
+def _in(scale: float, name: str) -> Callable[[Record], float | None]:
+    def of(record: Record) -> float | None:
+        work = counted(record)
+        found = getattr(work, name) if work else None
+        return found / scale if found else None
+
+    return of
+
+
+def _busy(outcome: Outcome) -> int:
+    return sum(bool(r.neighbours and r.neighbours.busy) for r in outcome.rounds)
+
+
+def _memory(record: Record) -> float | None:
+    found = record.outcome.memory_increase_bytes
+    return None if found is None else found / MIB
+
+
+_SECONDS = {"unit": "s", "form": "significant"}
+_C = FrameColumn
+
+#: Exported columns in their order, the metrics among them; then the derived ones.
+COLUMNS: Mapping[str, FrameColumn] = MappingProxyType(
+    {
+        column.name: column
+        for column in (
+            _C("mesh", _of_cell("mesh"), "surface"),
+            _C("algorithm", _of_cell("algorithm"), "algorithm"),
+            _C("title", lambda r: r.title, "algorithm"),
+            _C("target", lambda r: r.target, "target"),
+            _C("external", lambda r: r.external.kind if r.external else None),
+            _C("external_name", lambda r: r.external.name if r.external else None),
+            _C("external_version", _of_program("version")),
+            _C("parameters", _of_cell("parameters")),
+            _C("status", _of_outcome("status"), "status"),
+            _C("cause", _of_outcome("cause"), "cause"),
+            *map(_metric, FIGURES),
+            _C(
+                "folded_before_repair", _of_outcome("folded_before_repair"), "folds before",
+                form=",d", lacking="not counted by the algorithm",
+            ),
+            _C("boundaries", lambda r: [b.model_dump() for b in r.outcome.boundaries]),
+            _C("iterations", _of_outcome("iterations"), "iterations", form="d"),
+            _C("seconds", _of_outcome("median_seconds"), "seconds", timed=True, **_SECONDS),
+            _C("seconds_raw", lambda r: list(r.outcome.seconds)),
+            _C("seconds_low", lambda r: _end(r, "low")),
+            _C("seconds_high", lambda r: _end(r, "high")),
+            _C("seconds_min", _fastest),
+            _C("seconds_calls", lambda r: [list(x.calls) for x in r.outcome.rounds]),
+            _C("unstable", is_unstable),
+            _C("ended", _of_outcome("ended")),
+            _C("cpu_seconds", _of_outcome("cpu_seconds"), "CPU", **_SECONDS),
+            _C("busy_rounds", lambda r: _busy(r.outcome)),
+            _C("start_seconds", _of_outcome("start_seconds"), "start", lacking="none", **_SECONDS),
+            _C("own_seconds", _of_outcome("own_seconds")),
+            _C(
+                "solve_seconds",
+                lambda r: r.outcome.solve_seconds if r.is_program else None,
+                "solve", lacking="none", **_SECONDS,
+            ),
+            _C("input_bytes", _of_program("input_bytes")),
+            _C("output_bytes", _of_program("output_bytes")),
+            _C("phases", _of_outcome("phases")),
+            _C("factorisations", _of_work("numeric")),
+            _C("analyses", _of_work("symbolic")),
+            _C("right_hand_sides", _of_work("right_hand_sides")),
+            _C("matrix_order", _of_work("order")),
+            _C("factor_entries", _of_work("entries")),
+            _C("peak_memory_bytes", _of_outcome("peak_memory_bytes")),
+            _C("memory_increase_bytes", _of_outcome("memory_increase_bytes")),
+            _C("notes", lambda r: [str(note) for note in r.outcome.notes]),
+            _C("energy_history", lambda r: list(r.outcome.energy_history)),
+            _C("extras", _of_outcome("extras")),
+            _C("vertices", _of_mesh("vertices"), "vertices", form=",d"),
+            _C("faces", _of_mesh("faces"), "faces", form=",d"),
+            _C("boundary_vertices", _of_mesh("boundary_vertices"), "boundary vertices", form=",d"),
+            _C("non_delaunay_share", _of_mesh("non_delaunay_share"), "not Delaunay", form=".1%"),
+            _C("notices", lambda r: [str(notice) for notice in r.mesh.notices]),
+            _C("origin", _of_mesh("origin")),
+            _C("paper_row", lambda r: r.mesh.paper_row or None),
+            _C("solves", _of_cell("solves"), "solves"),
+            _C("backend", _of_cell("backend")),
+            _C("threads", _of_cell("threads")),
+            _C("mesh_hash", _of_cell("mesh_hash")),
+            _C("repeats", lambda r: r.cell.repeats or None),
+            _C("precision", _of_cell("precision")),
+            _C("rounds", lambda r: len(r.outcome.rounds), "rounds", form="d"),
+            _C("environment", lambda r: r.environment),
+            _C("started_at", lambda r: r.started_at),
+            _C("key", _of_cell("key")),
+            _C(
+                "relative_energy", _of_outcome("relative_energy"), "E_C / A",
+                form=".4f", exported=False,
+            ),
+            _C(
+                "half_width", half_width, "±%",
+                form=".0f", lacking="fewer than six rounds", exported=False,
+            ),
+            _C("memory_mib", _memory, "memory", "MiB", ",.0f", exported=False),
+            _C("call_seconds", _call, "call", lacking="none", exported=False, **_SECONDS),
+            _C("wall_seconds", _wall, "wall", lacking="none", exported=False, **_SECONDS),
+            _C(
+                "counted_factorisations", _in(1, "numeric"), "factored",
+                form=".0f", lacking="not counted", exported=False,
+            ),
+            _C(
+                "counted_columns", _in(1, "right_hand_sides"), "solved",
+                form="tenths", lacking="not counted", exported=False,
+            ),
+            _C(
+                "factor_millions", _in(MILLION, "entries"), "factor, M",
+                form=".3g", lacking=_uncounted, exported=False,
+            ),
+            _C("solve_from", _solve_from, "solve from", exported=False),
+            _C(
+                "faults", lambda r: sorted({fault.kind.value for fault in r.outcome.faults}),
+                exported=False,
+            ),
+        )
+    }
+)  # fmt: skip

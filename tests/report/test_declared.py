@@ -1,0 +1,130 @@
+"""Tables that are declared in a file, and what is said of wrong declarations."""
+
+import pytest
+
+from cembench.core.errors import ParameterError
+from cembench.report.declared import declared_table, further_tables, own_tables, read_declarations
+from cembench.report.document import Table, Text
+from cembench.report.write_report import write_report
+from cembench.results.columns import COLUMNS
+from cembench.results.frame import evaluate
+from cembench.results.record_rows import row
+
+MINE = """
+[by-target]
+title = "Angle errors by algorithm, {policy}"
+rows = "algorithm"
+where = "target == 'disk'"
+columns = [
+  { title = "maps", value = "count(ok)", form = "d" },
+  { title = "worst", value = "largest(angle_error_mean_deg)", form = ".1f", \
+record = "at_largest(angle_error_mean_deg, key)" },
+]
+
+[slow]
+title = "Slow maps"
+where = "seconds > 2.5"
+columns = ["surface", "algorithm", "seconds", { column = "iterations", title = "steps" }]
+
+[none]
+title = "Impossible maps"
+where = "seconds < 0"
+columns = ["surface"]
+"""
+
+
+@pytest.fixture
+def mine(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE)
+    return file
+
+
+def test_a_table_from_outside_is_a_few_lines(evidence, mine):
+    (section,) = further_tables(evidence, [mine])
+    by_target, slow, none = section.items
+    assert by_target.title == "Angle errors by algorithm, reuse"
+    assert [column.title for column in by_target.columns] == ["algorithm", "maps", "worst"]
+    maps = {row[0].text: row[1].number for row in by_target.rows}
+    assert maps == {"QIEM": 2, "FDM": 2, "LDM": 2, "CEM": 3, "Harmonic": 3}
+    cem = next(row for row in by_target.rows if row[0].text == "CEM")
+    worst = evidence.by_key[cem[2].record].outcome.metrics["angle_error_mean_deg"]
+    assert cem[2].number == worst
+    assert {row[1].text for row in slow.rows} == {"QIEM", "FDM"}
+    assert [column.title for column in slow.columns][-1] == "steps"
+    assert none == Text("Impossible maps: no record of this run is in this table.")
+
+
+def test_the_report_has_it_in_all_forms(small_run, mine, tmp_path, quick_drawing):
+    folder = tmp_path / "report"
+    report = write_report(small_run, folder, "cembench report run", tables=[mine])
+    assert report.sections[-1].title == "Tables of mine.toml"
+    for form in ("csv", "tex"):
+        assert (folder / "tables" / f"declared-1-slow.{form}").is_file()
+    assert "Slow maps" in (folder / "index.html").read_text()
+    assert "Slow maps" in (folder / "report.md").read_text()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[a", "is not TOML"),
+        ("a = 3", "mine.toml, a: "),
+        ('[a]\ntitle = "A"\ncolumns = ["sekonds"]', "no column 'sekonds'; known: surface"),
+        ('[a]\ntitle = "A"\ncolumns = []', "a / columns: Tuple should have at least 1 item"),
+        ('[a]\ntitle = "A"\ncolumns = ["mesh"]\ncolour = 1', "a / colour: Extra inputs"),
+        (
+            '[a]\ntitle = "A"\nrows = "algorithm"\ncolumns = ["seconds"]',
+            "takes expressions (value)",
+        ),
+        ('[a]\ntitle = "A"\ncolumns = [{ title = "b" }]', 'either "column" or "value"'),
+    ],
+)
+def test_a_wrong_declaration_says_where_and_what_is_allowed(tmp_path, text, said):
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    with pytest.raises(ParameterError) as caught:
+        read_declarations(file)
+    assert said in str(caught.value)
+
+
+def test_a_file_that_is_not_there_is_an_error_before_anything_is_written(small_run, tmp_path):
+    with pytest.raises(ParameterError, match="cannot be read"):
+        write_report(small_run, tmp_path / "report", "x", tables=[tmp_path / "no.toml"])
+    assert not (tmp_path / "report").exists()
+
+
+@pytest.mark.parametrize(
+    ("expression", "said"),
+    [
+        ("seconds >", "is no expression"),
+        ("sekonds > 1", "names 'sekonds'; known are the functions count"),
+        ("__import__('os')", "names '__import__'"),
+        ("seconds.to_csv('x')", "asks for 'to_csv'; allowed are"),
+        ("seconds.__class__", "asks for '__class__'"),
+        ("[s for s in seconds]", "more than an expression"),
+        ("first(mesh) + 1", "fails on this run"),
+    ],
+)
+def test_an_expression_reads_columns_and_does_nothing_else(evidence, expression, said):
+    with pytest.raises(ParameterError) as caught:
+        evaluate(expression, evidence.frame)
+    assert said in str(caught.value)
+
+
+def test_every_column_of_a_row_is_declared_and_the_frame_has_them_all(evidence):
+    for record in evidence.records:
+        assert set(row(record)) <= set(COLUMNS)
+    assert set(COLUMNS) <= set(evidence.frame)
+    assert len(evidence.frame) == len(evidence.records)
+
+
+@pytest.mark.parametrize("name", sorted(own_tables()))
+def test_entries_are_of_records_or_derived_from_them(evidence, name):
+    table = declared_table(evidence, name, surface="A surface")
+    assert isinstance(table, Table)
+    for line in table.rows:
+        for value in line:
+            assert value.number is None or value.origin
+            if value.record:
+                assert value.record in evidence.by_key
