@@ -100,7 +100,7 @@ def peers(
         page = str(folder / "index.html")
         print_json({"cells": rows(records), "not_here": lacking, "report": page})
     else:
-        _show(records, lacking)
+        _show(output, records, lacking)
         out.print(f"Report: {(folder / 'index.html').resolve()}", soft_wrap=True, markup=False)
     ours = [r for r in records if r.external is None and r.outcome.status != "ok"]
     for record in ours:
@@ -118,10 +118,12 @@ def _usual(registry: Registry) -> list[Algorithm]:
     return [*ours, *registry.peers.values()]
 
 
-def _show(records: Sequence[Record], lacking: dict[str, str]) -> None:
-    from cembench.report.render.terminal_peers import peers_table
+def _show(output: Path, records: Sequence[Record], lacking: dict[str, str]) -> None:
+    from cembench.report.content.evidence import Evidence
+    from cembench.report.render.terminal_peers import peers_tables
+    from cembench.results.store import Store
 
-    out.print(peers_table(records))
+    out.print(peers_tables(Evidence(Store(output), tuple(records), ())))
     for name, why in lacking.items():
         out.print(f"{name} is not available: {why}.", style="dim", markup=False, soft_wrap=True)
 

@@ -42,8 +42,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: Columns of a table of records that say which it is, and how it ended.
-_NAMES = ("surface", "algorithm", "starred", "marked", "target", "solves", "status", "cause")
-_HEADINGS = {"starred": "algorithm", "marked": "algorithm"}
+_NAMES = (
+    "surface", "algorithm", "starred", "marked", "target", "solves", "status", "ending", "cause",
+)  # fmt: skip
+_HEADINGS = {"starred": "algorithm", "marked": "algorithm", "ending": ""}
 
 
 class DeclaredColumn(BaseModel):
@@ -82,10 +84,11 @@ class DeclaredColumn(BaseModel):
     def heading(self) -> Column:
         """The heading in the table."""
         known = COLUMNS.get(self.column)
-        title = self.title or _HEADINGS.get(self.column) or (known.heading if known else "")
+        usual = known.heading if known else self.column
+        title = self.title or _HEADINGS.get(self.column, usual)
         unit = self.unit or ("" if known is None or self.group else _unit(known))
         numeric = not (self.words or self.column in _NAMES)
-        return Column(title or self.column, self.group, unit, numeric)
+        return Column(title, self.group, unit, numeric)
 
 
 def _unit(column: FrameColumn) -> str:
@@ -244,6 +247,9 @@ def _entry(evidence: Evidence, row: Mapping[Any, Any], one: DeclaredColumn) -> V
     record, name = evidence.by_key[row["key"]], one.column
     if name == "status":
         return Value(record.outcome.status, None, "", row["key"], record.outcome.cause or "")
+    if name == "ending":
+        folds = record.outcome.metrics.get("flipped_triangles")
+        return words(f"{folds:,} folds" if folds else record.outcome.status)
     if name == "starred":
         return words(row["label"] + ("" if record.target == DISK else " *"))
     if name == "marked":

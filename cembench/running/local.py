@@ -9,7 +9,8 @@ left; where that does not last for the first look of all, the dearest end early.
 possible the processes are forked from one that has loaded the libraries
 (:mod:`cembench.running.fork_server`), one for the checks and another one each round: what differs
 from one interpreter to the next (addresses, hash seeds) is the same for all cells of a round, and
-averaged over.
+averaged over. A round may also have one process that all cells of a surface share
+(:mod:`cembench.running.pairing`).
 """
 
 from __future__ import annotations
@@ -211,7 +212,8 @@ def run_tasks(
 ) -> list[Record]:
     """Measure the cells that the store does not hold; return records in the tasks' order.
 
-    Each process's result is on disk before the next one starts. A second run into the same store
+    Each process's result is on disk before the next one starts; where cells share a process, those
+    of a surface's round are, together, before the next surface. A second run into the same store
     waits for the first. `launcher` makes what starts the processes, given a folder for its files;
     `environment` is this machine's, where the caller has just described it.
     """
