@@ -40,17 +40,24 @@ def ratios(records: Path, algorithm: str, policy: str) -> list[list[float]]:
     """
     there = [row for row in _rows(records) if row["solves"] == policy and row["status"] == "ok"]
     counts = Counter((row["algorithm"], row["parameters"]) for row in there)
-    found: dict[tuple[str, str], dict[str, list[float]]] = {}
+    found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in sorted(there, key=lambda row: counts[row["algorithm"], row["parameters"]]):
-        seconds = json.loads(row["seconds_raw"] or "[]")
-        if row["paper_row"] and seconds:
-            found.setdefault((row["paper_row"], row["origin"]), {})[row["algorithm"]] = seconds
+        if row["paper_row"] and row["seconds"]:
+            found.setdefault((row["paper_row"], row["origin"]), {})[row["algorithm"]] = row
     both = {
-        model: [a / b for a, b in zip(by[algorithm], by["cem"], strict=False)]
+        model: _paired(by[algorithm], by["cem"])
         for (model, _), by in sorted(found.items(), key=lambda one: one[0][1] == "model")
         if algorithm in by and "cem" in by
     }
     return list(both.values())
+
+
+def _paired(row: dict[str, str], base: dict[str, str]) -> list[float]:
+    """Return the ratios of the rounds; older records hold the seconds alone."""
+    if row.get("ratios"):
+        return list(map(float, json.loads(row["ratios"])))
+    ours, theirs = (json.loads(one["seconds_raw"]) for one in (row, base))
+    return [a / b for a, b in zip(ours, theirs, strict=False)]
 
 
 def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:

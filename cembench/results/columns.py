@@ -147,6 +147,10 @@ def _fastest(record: Record) -> float | None:
     return min((min(r.calls) for r in record.outcome.rounds), default=None)
 
 
+def _together(record: Record) -> list[float | None]:
+    return [r.together_seconds for r in record.outcome.rounds if r.together]
+
+
 def _call(record: Record) -> float | None:
     return None if record.is_program else record.outcome.median_seconds
 
@@ -217,6 +221,7 @@ COLUMNS: Mapping[str, FrameColumn] = MappingProxyType(
             _C("iterations", _of_outcome("iterations"), "iterations", form="d"),
             _C("seconds", _of_outcome("median_seconds"), "seconds", timed=True, **_SECONDS),
             _C("seconds_raw", lambda r: list(r.outcome.seconds)),
+            _C("seconds_together", _together),
             _C("seconds_low", lambda r: _end(r, "low")),
             _C("seconds_high", lambda r: _end(r, "high")),
             _C("seconds_min", _fastest),

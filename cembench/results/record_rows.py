@@ -11,6 +11,7 @@ from cembench.results.comparison import (
     circumstances,
     compare,
     compare_cpu,
+    paired_ratios,
     references,
 )
 from cembench.results.many import corrected
@@ -25,7 +26,7 @@ def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str
     """Return all records of a run as flat rows, each compared with the reference on its surface.
 
     `verdict` is for each comparison alone; `verdict_corrected` is corrected for all rows (Holm),
-    and so is `p`.
+    and so is `p`. `ratios` are those to the reference's seconds that decide, one for each round.
     """
     compared = against_reference(records, reference)
     together = iter(corrected([found for _, found in compared if found is not None]))
@@ -33,7 +34,8 @@ def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str
     for record, (base, found) in zip(records, compared, strict=True):
         cpu = compare_cpu(record, base) if base is not None and found is not None else None
         both = next(together) if found is not None else None
-        told.append(row(record) | _compared(base, found, both, cpu))
+        ratios = paired_ratios(record, base) if base is not None and found is not None else []
+        told.append(row(record) | _compared(base, found, both, cpu) | {"ratios": ratios})
     return told
 
 
