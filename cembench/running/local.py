@@ -490,9 +490,9 @@ class _Run:
             return
         calls = [self.checks[task.cell.label].rounds for task in tasks]
         known = [rounds[0].seconds for rounds in calls if rounds]
-        price = sum(BESIDE_CALLS + each_round(seconds) for seconds in known)
+        prices = [BESIDE_CALLS + each_round(seconds) for seconds in known]
         twins = BESIDE_CALLS + 2 * each_round(known[tasks.index(chosen)]) if all(calls) else inf
-        if PROCESSES * twins > WORTH * min(self._seconds_left(), USUAL_ROUNDS * price):
+        if PROCESSES * twins > WORTH * min(self._seconds_left(), USUAL_ROUNDS * sum(prices)):
             return
         checked = Checked.of(self.checks[chosen.cell.label])
         found = []
@@ -505,10 +505,7 @@ class _Run:
         scatter = Scatter.of(found)
         if asked == "auto":
             self.pairs = scatter.pairing_is_narrower
-        rounds = self.options.most_rounds
-        if self.options.budget is not None:
-            rounds = min(rounds, int(self._seconds_left() / (price * (1 + self.pairs))))
-        self.watcher.says(scatter.words(rounds, self.options.most_rounds, pairs=self.pairs))
+        self.watcher.says(scatter.words(prices, self._seconds_left(), pairs=self.pairs))
 
     def _groups(self, tasks: Sequence[Task]) -> list[list[Task]]:
         """Return the cells that are compared with each other, and so may share a process."""

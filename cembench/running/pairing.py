@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from math import sqrt
 from statistics import NormalDist
 from typing import Literal
@@ -55,16 +56,21 @@ class Scatter:
         quantile = NormalDist().inv_cdf(1 - ERROR * share(rounds) / 2)
         return quantile * scatter / sqrt(_EFFICIENCY * rounds)
 
-    def words(self, rounds: int, most: int, *, pairs: bool) -> str:
-        """Return a sentence on what so many rounds of each cell can show."""
+    def words(self, prices: Sequence[float], seconds: float, *, pairs: bool) -> str:
+        """Return a sentence on what can be expected.
+
+        `prices` are the seconds of a round of each cell, `seconds` those that the run has left.
+        """
         told = (
             f"this machine: ratios of equal calls scatter by {self.separate:.1%} between processes "
             f"and by {self.together:.1%} within one, so algorithms are compared "
             f"{'within one process of each round' if pairs else 'between processes'}; "
         )
-        if rounds < LOOKS[0]:
-            few = "about one round" if rounds < 2 else f"about {rounds} rounds"
-            return f"{told}the time is enough for {few} of each cell, too few for all intervals"
-        width = self.half_width(rounds, pairs=pairs)
-        all_ = "all " if rounds >= most else "about "
-        return f"{told}{all_}{rounds} rounds of each cell make ratios certain to about ±{width:.1%}"
+        first = LOOKS[0]
+        costs = accumulate(sorted((COST if pairs else 1.0) * first * price for price in prices))
+        bought = sum(cost <= seconds for cost in costs)
+        if not bought:
+            return f"{told}the time is not enough for the {first} rounds that an interval takes"
+        width = self.half_width(first, pairs=pairs)
+        those = "each cell" if bought == len(prices) else f"about {bought} of {len(prices)} cells"
+        return f"{told}{first} rounds of {those} make ratios certain to about ±{width:.1%}"
