@@ -18,7 +18,6 @@ from cembench.report.content.printed_beside_measured import (
     table_beside,
 )
 from cembench.report.document import Table
-from cembench.results import paper
 
 #: Returns the quantities of an algorithm; the second argument is its column in the paper, or None.
 Quantities = Callable[[AlgorithmSeries | None, str | None], Sequence[Quantity]]
@@ -33,10 +32,12 @@ def tables_of_kind(
     policy: str | None = None,
     caption: str = "",
     footers: Sequence[Footer] = (),
-    algorithms: Sequence[str] = paper.ALGORITHMS,
+    algorithms: Sequence[str] = (),
     notes: Sequence[str] = (),
 ) -> list[Table]:
     """Return the paper's table `number`, then other algorithms and other surfaces, if any."""
+    known = evidence.paper.algorithms
+    algorithms = algorithms or known
     tail = policy_suffix(policy, evidence) if policy else ""
     add = in_policy(evidence, policy) if policy else ""
     name = f"table-{number}{tail}"
@@ -51,7 +52,7 @@ def tables_of_kind(
                 policy=policy, caption=caption, footers=footers, notes=notes, absent=absent,
             )
         )  # fmt: skip
-    others = [s for s in evidence.disk_series if not (s.algorithm in paper.ALGORITHMS and s.main)]
+    others = [s for s in evidence.disk_series if not (s.algorithm in known and s.main)]
     if evidence.models and others:
         columns = [q for s in others for q in quantities(s, None)]
         tables.append(
@@ -66,7 +67,7 @@ def tables_of_kind(
         columns = [
             q
             for s in evidence.disk_series
-            if s.algorithm in algorithms or s.algorithm not in paper.ALGORITHMS
+            if s.algorithm in algorithms or s.algorithm not in known
             for q in quantities(s, None)
         ]
         tables.append(

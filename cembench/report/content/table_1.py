@@ -9,7 +9,7 @@ from cembench.report.document import Table
 
 CAPTION = (
     "Seconds from the arrays V and F in memory to the map: the median of the rounds here, and what "
-    "the paper printed for MATLAB programs on a laptop of 2.60 GHz. Machines, languages and "
+    "the paper printed for {}. Machines, languages and "
     "libraries differ, so compare only the ratios between algorithms, not printed with measured "
     "seconds. "
 )
@@ -19,7 +19,7 @@ def table_1(evidence: Evidence) -> list[Table]:
     """Return the table of seconds and iterations for each policy of the run."""
     tables = []
     for policy in evidence.policies:
-        caption = CAPTION + f"Here {POLICIES.get(policy, policy)}."
+        caption = CAPTION.format(evidence.paper.machine) + f"Here {POLICIES.get(policy, policy)}."
         tables += tables_of_kind(
             evidence,
             1,

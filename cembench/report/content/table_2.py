@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from cembench.report.content.averages import (
-    COMPARED,
     READINGS,
-    STATED_RATE,
-    STATED_SAVING,
     geometric_rate,
     percent,
     printed_rates,
@@ -46,7 +43,7 @@ def table_2(evidence: Evidence) -> list[Table]:
             policy=policy,
             caption=CAPTION + f"Here {POLICIES.get(policy, policy)}.",
             footers=READINGS,
-            algorithms=COMPARED,
+            algorithms=evidence.paper.compared,
             notes=(
                 "averages of the printed column use its numbers as printed, including the misprint",
             ),
@@ -73,17 +70,17 @@ def _quantities(
 def averages_table(evidence: Evidence, policy: str) -> Table:
     """Return both readings of the averages: stated, printed for all or these models, measured."""
     columns = [Column("reading", numeric=False)]
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         columns += [
             Column(heading, algorithm.upper())
             for heading in ("stated", "printed, all", "printed, these", "here")
         ]
-    stated = {0: STATED_RATE, 2: STATED_SAVING}
+    stated = {0: evidence.paper.stated.get("rate", {}), 2: evidence.paper.stated.get("saving", {})}
     rows = []
-    sets = {a: _rate_sets(evidence, a, policy) for a in COMPARED}
+    sets = {a: _rate_sets(evidence, a, policy) for a in evidence.paper.compared}
     for k, reading in enumerate(READINGS):
         cells = [words(reading.label)]
-        for algorithm in COMPARED:
+        for algorithm in evidence.paper.compared:
             claim = stated.get(k, {}).get(algorithm)
             show = _stated if k == 0 else percent
             cells.append(
@@ -99,10 +96,10 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
                 else:
                     cells.append(missing("no rate to average"))
         rows.append(tuple(cells))
-    if any(work_ratios(evidence, a, policy) for a in COMPARED):
+    if any(work_ratios(evidence, a, policy) for a in evidence.paper.compared):
         rows.append(_work_row(evidence, policy))
     counts = [words("n, models counted")]
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         counts.append(words(""))
         counts += [count(len(r)) for r in sets[algorithm]]
     origins = sorted({s.origin for s in evidence.models})
@@ -129,7 +126,7 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
 def _work_row(evidence: Evidence, policy: str) -> tuple[Value, ...]:
     """Return the row that no machine's speed is in: factorisations over CEM's."""
     cells = [words("factorisations over CEM's, geometric mean")]
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         ratios = work_ratios(evidence, algorithm, policy)
         mean = geometric_rate([ratio - 1 for ratio in ratios]) + 1 if ratios else None
         cells += [missing("the paper does not count them")] * 3
@@ -160,7 +157,8 @@ def _stated(number: float) -> str:
 def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[float], ...]:
     """Return the rates printed for all models, printed for those measured, and measured."""
     measured, there = measured_rates(evidence, algorithm, policy)
-    return printed_rates(algorithm), printed_rates(algorithm, there), measured
+    paper = evidence.paper
+    return printed_rates(paper, algorithm), printed_rates(paper, algorithm, there), measured
 
 
 def measured_rates(

@@ -8,7 +8,6 @@ import numpy as np
 
 from cembench.report.content.claims.verdicts import tested_on, verdict_of
 from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
-from cembench.report.content.figures.angle_histograms import MODELS
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
 from cembench.results.records import Record
@@ -89,7 +88,8 @@ def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
         for surface in evidence.surfaces
         if label in inspections[surface.mesh_hash].angles
     }
-    named = {s: share for s, share in shares.items() if s.paper_row in MODELS}
+    faces = evidence.paper.panel("angle_histograms").models
+    named = {s: share for s, share in shares.items() if s.paper_row in faces}
     held = sum(share > 0.5 for share in named.values())
     every = sum(share > 0.5 for share in shares.values())
     listed = "; ".join(f"{s.title}: {share:.1%}" for s, share in named.items())

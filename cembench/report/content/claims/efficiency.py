@@ -8,9 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cembench.report.content.averages import (
-    COMPARED,
-    STATED_RATE,
-    STATED_SAVING,
     geometric_rate,
     mean_rate,
     mean_saving,
@@ -29,7 +26,6 @@ from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.printed_beside_measured import significant
 from cembench.report.document import Claim, Verdict
-from cembench.results import paper
 from cembench.results.comparison import Comparison, compare, seconds_interval
 from cembench.results.many import sign_test
 from cembench.results.records import DEFAULT_ROUNDS
@@ -69,7 +65,7 @@ class _Compared:
 def _compared(evidence: Evidence) -> Iterator[_Compared]:
     """Yield each algorithm under each policy that was measured with CEM on some model."""
     for policy in evidence.policies:
-        for algorithm in COMPARED:
+        for algorithm in evidence.paper.compared:
             series = evidence.series_of(algorithm)
             records = [
                 evidence.find(surface, series, policy) if series else None
@@ -115,7 +111,7 @@ def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
     rows = [
         evidence.row(record)
         for record in evidence.records
-        if record.cell.algorithm in COMPARED and record.mesh.paper_row
+        if record.cell.algorithm in evidence.paper.compared and record.mesh.paper_row
     ]
     sure = sum(row["verdict_corrected"] == "slower" for row in rows)
     return Claim(
@@ -143,7 +139,9 @@ def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
     """Test the claim that the average rates of speedup are 8.5 / 17.2 / 4.1."""
     found, verdict = _tally(
         evidence,
-        lambda algorithm, rates: mean_rate(rates) >= ABOUT * STATED_RATE[algorithm],
+        lambda algorithm, rates: (
+            mean_rate(rates) >= ABOUT * evidence.paper.stated["rate"][algorithm]
+        ),
         lambda rates: f"mean {mean_rate(rates):.1f}, geometric {geometric_rate(rates):.1f}",
     )
     return Claim(
@@ -164,7 +162,9 @@ def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
     """Test the claim that CEM saves 89 / 94 / 80 % of the time."""
     found, verdict = _tally(
         evidence,
-        lambda algorithm, rates: saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm],
+        lambda algorithm, rates: (
+            saving_of_mean(rates) >= ABOUT * evidence.paper.stated["saving"][algorithm]
+        ),
         lambda rates: (
             f"{percent(saving_of_mean(rates))} of the mean rate, "
             f"{percent(mean_saving(rates))} on average"
@@ -244,10 +244,11 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
 def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
     """Test whether the printed Table 2 follows from the printed Table 1."""
     agree, tested, odd = 0, 0, []
-    for model, times in paper.table(1).items():
-        for algorithm in COMPARED:
+    paper = evidence.paper
+    for model, times in paper.tables[1].items():
+        for algorithm in evidence.paper.compared:
             other, ours = times[algorithm], times[REFERENCE]
-            printed = paper.table(2)[model][algorithm]
+            printed = paper.tables[2][model][algorithm]
             if other is None or ours is None or printed is None:
                 continue
             tested += 1
@@ -258,7 +259,7 @@ def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
                 odd.append(
                     f"{model} / {algorithm.upper()}: {printed}, by Table 1 {other / ours - 1:.2f}"
                 )
-    spread = float(np.mean([r["fdm"] or 0 for r in paper.table(2).values() if r["fdm"]]))
+    spread = float(np.mean([r["fdm"] or 0 for r in paper.tables[2].values() if r["fdm"]]))
     return Claim(
         "table-2-follows",
         "The rate of speedup of CEM algorithm with respect to QIEM, FDM, and LDM, defined by "

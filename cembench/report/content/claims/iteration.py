@@ -12,7 +12,6 @@ from cembench.report.content.claims.verdicts import tested_on, verdict_of
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim
-from cembench.results import paper
 
 Inspections = Mapping[str, Inspection]
 #: A rise below this share of the energy is rounding.
@@ -126,7 +125,8 @@ def at_most_20_iterations(evidence: Evidence, inspections: Inspections) -> Claim
     """Test the claim of at most 20 iterations, and compare with the printed numbers."""
     pairs = []
     for surface, record in cem_records(evidence):
-        printed = paper.table(1)[surface.paper_row]["cem_iterations"] if surface.paper_row else None
+        row = evidence.paper.tables[1].get(surface.paper_row, {})
+        printed = row.get("cem_iterations")
         if printed is not None and record.outcome.iterations is not None:
             pairs.append((surface, int(printed), record.outcome.iterations))
     within = sum(n <= 20 for _, _, n in pairs)

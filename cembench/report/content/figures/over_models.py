@@ -7,7 +7,6 @@ from collections.abc import Callable
 from cembench.report.content.evidence import Evidence
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
-from cembench.results import paper
 
 
 def energy_over_models(evidence: Evidence) -> Plot:
@@ -48,9 +47,10 @@ def _pair(
     evidence: Evidence, metric: str, axis: Axis, table: int, column: Callable[[str], str]
 ) -> tuple[PlotPanel, PlotPanel]:
     """Return the measured and the printed panel for the same models."""
-    style = series_styles(paper.ALGORITHMS)
+    paper = evidence.paper
+    style = series_styles(paper.algorithms)
     measured, printed = [], []
-    for algorithm in paper.ALGORITHMS:
+    for algorithm in paper.algorithms:
         series = evidence.series_of(algorithm)
         names = [s.title for s in evidence.models]
         values = []
@@ -61,7 +61,7 @@ def _pair(
         title = series.title if series else algorithm.upper()
         if series:
             measured.append(PlotSeries(title, names, values, "both", style[algorithm]))
-        rows = [paper.table(table)[s.paper_row][column(algorithm)] for s in evidence.models]
+        rows = [paper.tables[table][s.paper_row][column(algorithm)] for s in evidence.models]
         printed.append(PlotSeries(title, names, rows, "both", style[algorithm], named=not series))
     origins = sorted({s.origin for s in evidence.models})
     return (
