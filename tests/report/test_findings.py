@@ -4,15 +4,15 @@ import re
 from dataclasses import replace
 
 import pytest
-
-from cembench.report.content.as_good import as_good
-from cembench.report.content.claims.efficiency import (
+from cembench.papers.cem.efficiency import (
     always_faster,
     average_rates,
     average_savings,
     more_than_80_percent,
     table_2_follows,
 )
+
+from cembench.report.content.as_good import as_good
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.figures.performance_profile import shown_series
 from cembench.report.content.findings import findings

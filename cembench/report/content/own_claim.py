@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from cembench.report.content.averages import mean_rate
-from cembench.report.content.claims.verdicts import under
+from cembench.report.content.claims import under
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.sure_speedups import paired_rounds
 from cembench.report.content.table_2 import measured_rates
