@@ -33,7 +33,9 @@ if TYPE_CHECKING:
 GROUP = "cembench.papers"
 REMEDY = "Repair it; papers/cem is an example."
 #: The file that a part of a paper is in; others are in paper.toml.
-_FILES = {part: f"{part}.toml" for part in ("tables", "runs", "claims")} | {"errata": "tables.toml"}
+_FILES = {"runs": "runs.toml", "claims": "claims.toml"} | dict.fromkeys(
+    ("tables", "printed", "errata"), "tables.toml"
+)
 
 #: Printed figures of a model by column; None where the paper has a dash.
 Row = Mapping[str, float | None]
@@ -86,6 +88,14 @@ class ExpectedExhibit(_Part):
     figure: str
     shows: str
     command: str
+
+
+class PrintedTable(_Part):
+    """What is said of a table that shows its printed figures beside measured ones."""
+
+    title: str
+    caption: str = ""
+    notes: tuple[str, ...] = ()
 
 
 class Erratum(_Part):
@@ -145,6 +155,7 @@ class Paper(_Part):
     exhibits: tuple[ExpectedExhibit, ...] = ()
     #: The printed tables with their misprints, by number, model and column.
     tables: Mapping[int, Mapping[str, Row]] = {}
+    printed: Mapping[int, PrintedTable] = {}
     errata: tuple[Erratum, ...] = ()
     runs: tuple[HowRun, ...] = ()
     claims: tuple[StatedClaim, ...] = ()
@@ -264,19 +275,22 @@ def read_paper(folder: Path, package: str = "") -> Paper:
     about = _read_toml(folder / "paper.toml")
     listed = _read_toml(folder / "tables.toml")
     claimed = _read_toml(folder / "claims.toml", optional=True)
-    tables = {}
-    for entry in _entries(folder / "tables.toml", listed, "tables"):
-        if not isinstance(entry.get("number"), int) or not isinstance(entry.get("file"), str):
+    words = {"machine": about.get("machine", "")}
+    printed, tables = {}, {}
+    for entry in _spelled_out(folder / "tables.toml", listed, "tables", words):
+        number, file = entry.pop("number", None), entry.pop("file", None)
+        if not isinstance(number, int) or not isinstance(file, str):
             raise _wrong(folder / "tables.toml", "tables", "needs a number and the name of a file")
-        if entry["number"] in tables:
-            raise _wrong(folder / "tables.toml", "tables", f"table {entry['number']} occurs twice")
-        tables[entry["number"]] = _read_table(folder / entry["file"])
+        if number in tables:
+            raise _wrong(folder / "tables.toml", "tables", f"table {number} occurs twice")
+        printed[number], tables[number] = entry, _read_table(folder / file)
     parts = {
         **about,
         "tables": tables,
+        "printed": printed,
         "errata": listed.get("errata", ()),
         "runs": _read_toml(folder / "runs.toml", optional=True).get("runs", ()),
-        "claims": _spelled_out(folder / "claims.toml", claimed),
+        "claims": _spelled_out(folder / "claims.toml", claimed, "claims", words),
         "folder": folder,
         "package": package,
     }
@@ -365,19 +379,24 @@ def _read_table(file: Path) -> dict[str, dict[str, str | None]]:
     return found
 
 
-def _spelled_out(file: Path, claimed: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the claims of a file with its ``[words]`` in place of their names in braces."""
-    words = claimed.get("words", {})
+def _spelled_out(
+    file: Path, read: Mapping[str, Any], name: str, words: Mapping[str, str]
+) -> list[dict[str, Any]]:
+    """Return the tables ``[[name]]`` of a file with words in place of their names in braces.
+
+    The words are those given, and the file's ``[words]``.
+    """
+    words = {**words, **read.get("words", {})}
     try:
         return [
             {key: text.format_map(words) if isinstance(text, str) else text
-             for key, text in claim.items()}
-            for claim in _entries(file, claimed, "claims")
+             for key, text in one.items()}
+            for one in _entries(file, read, name)
         ]  # fmt: skip
     except (LookupError, ValueError) as error:
         known = ", ".join(words) or "none"
         what = f"{{{error}}} is no word of [words]; known: {known}"
-        raise _wrong(file, "claims", what) from error
+        raise _wrong(file, name, what) from error
 
 
 @lru_cache(maxsize=1)

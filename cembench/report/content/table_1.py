@@ -7,23 +7,16 @@ from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import POLICIES, Quantity, significant
 from cembench.report.document import Table
 
-CAPTION = (
-    "Seconds from the arrays V and F in memory to the map: the median of the rounds here, and what "
-    "the paper printed for {}. Machines, languages and "
-    "libraries differ, so compare only the ratios between algorithms, not printed with measured "
-    "seconds. "
-)
-
 
 def table_1(evidence: Evidence) -> list[Table]:
     """Return the table of seconds and iterations for each policy of the run."""
     tables = []
     for policy in evidence.policies:
-        caption = CAPTION.format(evidence.paper.machine) + f"Here {POLICIES.get(policy, policy)}."
+        caption = f"{evidence.paper.printed[1].caption} Here {POLICIES.get(policy, policy)}."
         tables += tables_of_kind(
             evidence,
             1,
-            "computational cost in seconds, and iterations of CEM",
+            evidence.paper.printed[1].title,
             _quantities,
             policy=policy,
             caption=caption,

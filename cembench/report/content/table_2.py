@@ -25,11 +25,6 @@ from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.records import Record
 
-CAPTION = (
-    "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 if CEM takes half the time, negative if CEM is "
-    "slower. Here it is the median of the ratios within rounds. "
-)
-
 
 def table_2(evidence: Evidence) -> list[Table]:
     """Return the rates of speedup and their averages in both readings, for each policy."""
@@ -38,15 +33,13 @@ def table_2(evidence: Evidence) -> list[Table]:
         tables += tables_of_kind(
             evidence,
             2,
-            "rate of speedup of CEM",
+            evidence.paper.printed[2].title,
             _quantities(evidence.rate),
             policy=policy,
-            caption=CAPTION + f"Here {POLICIES.get(policy, policy)}.",
+            caption=f"{evidence.paper.printed[2].caption} Here {POLICIES.get(policy, policy)}.",
             footers=READINGS,
             algorithms=evidence.paper.compared,
-            notes=(
-                "averages of the printed column use its numbers as printed, including the misprint",
-            ),
+            notes=evidence.paper.printed[2].notes,
         )
         if evidence.models:
             tables.append(averages_table(evidence, policy))

@@ -7,18 +7,11 @@ from cembench.report.content.paper_table import tables_of_kind
 from cembench.report.content.printed_beside_measured import Quantity, metric
 from cembench.report.document import Table
 
-CAPTION = (
-    "Angular distortion: the absolute difference between the angle on the surface and on the disk, "
-    "in degrees, over all corners of all triangles. It depends on the mesh: a stand-in has a "
-    "different value than the paper's model."
-)
-
 
 def table_4(evidence: Evidence) -> list[Table]:
     """Return the table of means and standard deviations of angular distortions."""
-    return tables_of_kind(
-        evidence, 4, "angular distortion in degrees, mean and SD", _quantities, caption=CAPTION
-    )
+    words = evidence.paper.printed[4]
+    return tables_of_kind(evidence, 4, words.title, _quantities, caption=words.caption)
 
 
 def _quantities(series: AlgorithmSeries | None, column: str | None) -> list[Quantity]:
