@@ -75,11 +75,16 @@ class Picture(_Part):
     shows: tuple[Literal["checkerboard", "curvature", "mesh"], ...] = ("checkerboard",)
 
 
-class PanelFigure(_Part):
-    """A figure with a panel for each of some models."""
+class PlottedFigure(_Part):
+    """A figure that a plot of the report shows, with a panel for each model where it has any."""
 
-    figure: str
-    models: tuple[str, ...]
+    figure: str = ""
+    models: tuple[str, ...] = ()
+
+    @property
+    def anchor(self) -> str:
+        """Its name for files and links, e.g. "figure-8"."""
+        return self.figure.lower().replace(" ", "-")
 
 
 class ExpectedExhibit(_Part):
@@ -151,7 +156,7 @@ class Paper(_Part):
     #: Averages in its text, by what is averaged and by algorithm.
     stated: Mapping[str, Mapping[str, float]] = {}
     pictures: tuple[Picture, ...] = ()
-    panels: Mapping[str, PanelFigure] = {}
+    plots: Mapping[str, PlottedFigure] = {}
     exhibits: tuple[ExpectedExhibit, ...] = ()
     #: The printed tables with their misprints, by number, model and column.
     tables: Mapping[int, Mapping[str, Row]] = {}
@@ -189,9 +194,9 @@ class Paper(_Part):
         """Return the number of triangles of a model."""
         return self.count(model, "faces")
 
-    def panel(self, plot: str) -> PanelFigure:
-        """Return the figure, with its models, that is plotted in this way; empty for none."""
-        return self.panels.get(plot, PanelFigure(figure="", models=()))
+    def plotted(self, plot: str) -> PlottedFigure:
+        """Return the figure that is plotted in this way; an empty one if there is none."""
+        return self.plots.get(plot, PlottedFigure())
 
     def as_printed(self, model: str, algorithms: Iterable[Algorithm]) -> dict[str, Any]:
         """Return the parameters with which the paper ran algorithms on this model of its own.
@@ -317,7 +322,7 @@ def _check(paper: Paper) -> None:
         if column not in paper.tables.get(number, {}).get(model, {}):
             what = f"table {number} has no cell {column!r} of {model!r}"
             raise _wrong(paper.folder / "tables.toml", "errata", what)
-    of_models = [*paper.pictures, *paper.panels.values(), *paper.runs]
+    of_models = [*paper.pictures, *paper.plots.values(), *paper.runs]
     named = [m for one in of_models for m in ([one.model] if hasattr(one, "model") else one.models)]
     for model in named:
         if model not in paper.models:

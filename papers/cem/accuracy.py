@@ -67,7 +67,7 @@ def below_one_degree(evidence: Evidence, inspections: Inspections) -> Found:
         for surface in evidence.surfaces
         if label in inspections[surface.mesh_hash].angles
     }
-    faces = evidence.paper.panel("angle_histograms").models
+    faces = evidence.paper.plotted("angle_histograms").models
     named = {s: share for s, share in shares.items() if s.paper_row in faces}
     held = sum(share > 0.5 for share in named.values())
     every = sum(share > 0.5 for share in shares.values())

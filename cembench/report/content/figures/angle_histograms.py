@@ -23,7 +23,7 @@ def angle_histograms(
     """Return the plot of the paper's models in the run, and a gap for each missing one."""
     series = evidence.series_of(REFERENCE)
     panels, gaps = [], []
-    wanted = evidence.paper.panel("angle_histograms")
+    wanted = evidence.paper.plotted("angle_histograms")
     for model in wanted.models:
         surface = evidence.surface_for_model(model)
         seen = inspections[surface.mesh_hash] if surface else None
@@ -37,7 +37,7 @@ def angle_histograms(
     if not panels:
         return None, gaps
     plot = Plot(
-        wanted.figure.lower().replace(" ", "-"),
+        wanted.anchor,
         "Histograms of the angular distortion of CEM's maps",
         tuple(panels),
         f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps. Each "

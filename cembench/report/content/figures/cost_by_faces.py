@@ -1,4 +1,4 @@
-"""Figure 10: cost of a map against the number of triangles, with fitted exponents."""
+"""Cost of a map against the number of triangles, with fitted exponents."""
 
 from __future__ import annotations
 
@@ -68,19 +68,19 @@ def cost_by_faces(evidence: Evidence) -> Plot:
             for s in evidence.disk_series
         ]
         panels.append(_panel(groups, f"measured here, solves: {policy}"))
-    paper = evidence.paper
+    paper, figure = evidence.paper, evidence.paper.plotted("cost_by_faces")
     usual = series_styles(paper.algorithms)
     groups = [(a.upper(), usual[a], printed_points(paper, a)) for a in paper.algorithms]
     panels.append(_panel(groups, "printed in the paper (Table 1)"))
     return Plot(
-        "figure-10",
+        figure.anchor or "cost-by-faces",
         "Computational cost against number of triangles",
         tuple(panels),
         "Seconds against triangles on logarithmic axes. Lines are fitted power laws, whose "
         "exponents are in the table below. All surfaces of the run are included, even those not in "
         "the paper; the printed seconds are from a different machine.",
         "Points along straight lines that rise from left to right, one for each algorithm.",
-        "Figure 10",
+        figure.figure,
     )
 
 

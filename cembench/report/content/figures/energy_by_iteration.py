@@ -11,7 +11,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
     """Return the plot of the paper's models in the run, and a gap for each missing one."""
     panels = []
     gaps = []
-    wanted = evidence.paper.panel("energy_by_iteration")
+    wanted = evidence.paper.plotted("energy_by_iteration")
     for model in wanted.models:
         surface = evidence.surface_for_model(model)
         panel = surface and history_panel(evidence, surface, f"{model} ({surface.origin})")
@@ -22,7 +22,7 @@ def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
     if not panels:
         return None, gaps
     plot = Plot(
-        wanted.figure.lower().replace(" ", "-"),
+        wanted.anchor,
         "Conformal energy against iterations of CEM",
         tuple(panels),
         "E_C at the start (0) and after each iteration. The last value need not be the smallest: "

@@ -1,4 +1,4 @@
-"""Figures 11 and 12: energy, and mean and SD of the angular distortion, by model."""
+"""Energy, and mean and SD of the angular distortion, by model."""
 
 from __future__ import annotations
 
@@ -10,32 +10,34 @@ from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
 
 def energy_over_models(evidence: Evidence) -> Plot:
-    """Return Figure 11: the conformal energy of every algorithm on every model of the run."""
+    """Return the plot of the conformal energy of every algorithm on every model of the run."""
+    figure = evidence.paper.plotted("energy_over_models")
     axis = Axis("conformal energy E_C", log=True)
     return Plot(
-        "figure-11",
+        figure.anchor,
         "Conformal energy over the models",
         _pair(evidence, "conformal_energy", axis, 3, lambda a: a),
         "Left: this run's surfaces. Right: as printed for the models they are or stand in for.",
         "A line for each algorithm over the models; the lines are close together.",
-        "Figure 11",
+        figure.figure,
     )
 
 
 def angles_over_models(evidence: Evidence) -> Plot:
-    """Return Figure 12: mean and SD of the angular distortion on every model of the run."""
+    """Return the plot of the mean and SD of the angular distortion on every model of the run."""
+    figure = evidence.paper.plotted("angles_over_models")
     panels: tuple[PlotPanel, ...] = ()
     for what, words in (("mean", "mean"), ("sd", "SD")):
         axis = Axis(f"{words} of angular distortion (degrees)", log=True)
         column = _column(what)
         panels += _pair(evidence, f"angle_error_{what}_deg", axis, 4, column)
     return Plot(
-        "figure-12",
+        figure.anchor,
         "Mean and standard deviation of the angular distortion over the models",
         panels,
         "Top: mean; bottom: standard deviation. Left: measured here; right: as printed.",
         "A line for each algorithm over the models.",
-        "Figure 12",
+        figure.figure,
     )
 
 
