@@ -18,10 +18,9 @@ from typing import get_args
 from cembench.algorithms.cem import cem
 
 from benchmarks.pages import fill
-from benchmarks.paper_models import FOLDED, PAGE, cells, models, printed
+from benchmarks.paper_models import CEM_PAPER, FOLDED, PAGE, cells, models, printed
 from cembench.conformal.boundary_iteration import Stop
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.results import paper
 
 #: The stops, and whether the best iterate is the result or the last one.
 READINGS = tuple(product(get_args(Stop), (False, True)))
@@ -65,7 +64,7 @@ def lines(meshes: dict[str, DiskMesh]) -> Iterator[str]:
 
 def in_print(model: str) -> Figures:
     """Return the figures that the paper prints for CEM."""
-    return (*printed(model, "cem"), f"{paper.table(1)[model]['cem_iterations']:.0f}")
+    return (*printed(model, "cem"), f"{CEM_PAPER.tables[1][model]['cem_iterations']:.0f}")
 
 
 def measured(model: str, mesh: DiskMesh, stop: Stop, *, best: bool) -> Figures:

@@ -29,9 +29,10 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.reading import is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
-from cembench.results import paper
+from cembench.results.papers import find_paper
 from cembench.running.plan import paper_role_of
 
+CEM_PAPER = find_paper("cem")
 PAGE = ROOT / "docs/paper_models.md"
 #: The model whose maps fold by every method.
 FOLDED = "David Head"
@@ -82,12 +83,12 @@ def models(folder: Path) -> dict[str, DiskMesh]:
         raise SystemExit(
             f"{folder} lacks {', '.join(sorted(missing))}: cembench fetch --group paper"
         )
-    return {row: found[row] for row in paper.table(1) if row in found}
+    return {row: found[row] for row in CEM_PAPER.models if row in found}
 
 
 def printed(model: str, algorithm: str) -> tuple[str, str, str]:
     """Return the paper's cells of Tables 3 and 4."""
-    third, fourth = paper.table(3)[model], paper.table(4)[model]
+    third, fourth = CEM_PAPER.tables[3][model], CEM_PAPER.tables[4][model]
     return (
         f"{third[algorithm]:.4f}",
         f"{fourth[f'{algorithm}_mean']:.2f}",
@@ -97,7 +98,7 @@ def printed(model: str, algorithm: str) -> tuple[str, str, str]:
 
 def cem_as_printed(mesh: DiskMesh, model: str, *, repair: bool = False) -> Parameterization:
     """CEM stopped after the number of iterations that Table 1 prints."""
-    count = paper.table(1)[model]["cem_iterations"]
+    count = CEM_PAPER.tables[1][model]["cem_iterations"]
     assert count is not None
     return cem(mesh, max_iterations=int(count), tolerance=0, stop="change", repair=repair)
 

@@ -25,10 +25,11 @@ from cembench.mesh.datasets import is_fetched
 from cembench.mesh.files import read_mesh
 from cembench.registry import Registry, load_registry
 from cembench.report.surface_facts import factor_spans, find_facts, row_check
-from cembench.results import paper
+from cembench.results.papers import find_paper
 from cembench.results.records import MeshFacts
 from cembench.running.plan import mesh_facts, paper_role_of
 
+PAPER = find_paper("cem")
 PAGE = Path(__file__).parents[1] / "docs/surfaces.md"
 SHEET = Path(__file__).parents[1] / "reports/surfaces/contact_sheet.jpg"
 
@@ -88,7 +89,7 @@ def models(registry: Registry, files: Iterable[Path]) -> Iterable[Line]:
 
 def tables(lines: Iterable[Line]) -> str:
     """Both tables in Markdown, in the order of the paper's rows, the stand-in first."""
-    order = {model: k for k, model in enumerate(paper.table(1))}
+    order = {model: k for k, model in enumerate(PAPER.models)}
     ordered = sorted(
         lines, key=lambda line: (order[line.mesh.paper_row], line.mesh.origin == "model")
     )
@@ -112,10 +113,10 @@ def tables(lines: Iterable[Line]) -> str:
             f"| {mesh.non_delaunay_share:.1%} | {line.span:.1e} |"
         )
         printed = (
-            _shown(paper.table(1)[mesh.paper_row]["cem_iterations"], ".0f"),
-            _shown(paper.table(3)[mesh.paper_row]["cem"], ".4f"),
-            _shown(paper.table(4)[mesh.paper_row]["cem_mean"], ".2f"),
-            _shown(paper.table(4)[mesh.paper_row]["cem_sd"], ".2f"),
+            _shown(PAPER.tables[1][mesh.paper_row]["cem_iterations"], ".0f"),
+            _shown(PAPER.tables[3][mesh.paper_row]["cem"], ".4f"),
+            _shown(PAPER.tables[4][mesh.paper_row]["cem_mean"], ".2f"),
+            _shown(PAPER.tables[4][mesh.paper_row]["cem_sd"], ".2f"),
         )
         figures.append(
             f"| {line.name} | {what} | {line.iterations} | {found['conformal_energy']:.4f} "

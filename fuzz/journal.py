@@ -12,7 +12,7 @@ import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-SOURCES = ("cembench", "algorithms", "fuzz", "meshes_gen")
+SOURCES = ("cembench", "algorithms", "fuzz", "meshes_gen", "papers")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The twenty rows of the paper's Table 2, which the stand-ins match."""
+"""The twenty models of the CEM paper with their counts, which the stand-ins match."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cembench.results import paper
+from cembench.results.papers import find_paper
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,13 @@ class Row:
 
 
 def _rows() -> Mapping[str, Row]:
-    found = {}
-    for model, counts in paper.table(2).items():
-        vertices, faces = counts["vertices"], counts["faces"]
-        assert vertices is not None
-        assert faces is not None
-        name = model.lower().replace("'s ", " ").replace(" ", "-") + "-stand-in"
-        found[name] = Row(model, int(vertices), int(faces))
-    return found
+    paper = find_paper("cem")
+    return {
+        model.lower().replace("'s ", " ").replace(" ", "-") + "-stand-in": Row(
+            model, paper.count(model, "vertices"), paper.faces(model)
+        )
+        for model in paper.models
+    }
 
 
 #: The rows in the paper's order, under the names of their stand-ins ("ho-pouting-face-stand-in").

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 PROJECT = Path(__file__).parents[1]
-PACKAGES = ("algorithms", "benchmarks", "cembench", "examples", "meshes_gen")
+PACKAGES = ("algorithms", "benchmarks", "cembench", "examples", "meshes_gen", "papers")
 #: Functions that may write directly, and why.
 ALLOWED = {
     "cembench/core/atomic.py": "it is the place",

@@ -10,7 +10,11 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "cembench"
 #: Where the packages that are installed below ``cembench`` lie in the tree.
-ELSEWHERE = {"cembench.algorithms": "algorithms", "cembench.surfaces": "meshes_gen"}
+ELSEWHERE = {
+    "cembench.algorithms": "algorithms",
+    "cembench.papers": "papers",
+    "cembench.surfaces": "meshes_gen",
+}
 
 
 def layers():
@@ -42,7 +46,7 @@ def violations(rooms, package=PACKAGE):
             continue  # the package's own __init__ offers names of all layers
         for name in imported(file):
             there = room_of(name)
-            if there in ("algorithms", "surfaces"):
+            if there in ("algorithms", "papers", "surfaces"):
                 yield f"{file.name} imports the plug-in {name} by name"
             elif there in rooms and rooms.index(there) > rooms.index(here):
                 yield f"{file.relative_to(package)} imports {name}"
@@ -76,10 +80,10 @@ def test_every_package_of_the_tree_is_installed():
     assert set(declared["packages"]) == there
 
 
-@pytest.mark.parametrize("folder", ["algorithms", "meshes_gen"])
+@pytest.mark.parametrize("folder", ["algorithms", "meshes_gen", "papers"])
 def test_plug_ins_import_each_other_relatively(folder):
     """They have one name in the tree and another once installed."""
     for file in (ROOT / folder).rglob("*.py"):
         for name in imported(file):
-            assert room_of(name) not in ("algorithms", "surfaces"), file
-            assert name.split(".")[0] not in ("algorithms", "meshes_gen"), file
+            assert room_of(name) not in ("algorithms", "papers", "surfaces"), file
+            assert name.split(".")[0] not in ("algorithms", "meshes_gen", "papers"), file

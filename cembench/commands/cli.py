@@ -72,7 +72,7 @@ from cembench.commands.options import (
 from cembench.core.errors import ParameterError
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.looks import USUAL_MOST_ROUNDS
-from cembench.results.paper.profiles import Profile
+from cembench.results.profiles import Profile
 
 if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry, Surface
@@ -279,7 +279,7 @@ def run(
     """
     from cembench.commands.progress import run_with_progress
     from cembench.results import run_folder
-    from cembench.results.paper.profiles import algorithms_of, surfaces_of
+    from cembench.results.profiles import algorithms_of, surfaces_of
     from cembench.results.record_rows import REFERENCE
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores

@@ -14,7 +14,7 @@ import typer
 
 from cembench.core.errors import ParameterError
 from cembench.results.looks import LOOKS
-from cembench.results.paper.profiles import Profile
+from cembench.results.profiles import Profile
 
 #: A process needs more than a hundred MiB to load the libraries.
 LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50

@@ -14,7 +14,7 @@ from cembench.commands.console import Json, complain, err, print_json
 from cembench.commands.ending import resumable
 from cembench.commands.options import Fresh, budget_seconds, memory_bytes
 from cembench.core.extras import Extra, require
-from cembench.results.paper.profiles import Profile
+from cembench.results.profiles import Profile
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
@@ -52,7 +52,7 @@ def reproduce(
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.results.looks import USUAL_PRECISION
-    from cembench.results.paper.profiles import algorithms_of
+    from cembench.results.profiles import algorithms_of
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
@@ -97,7 +97,7 @@ def _surfaces(
 ) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
     """Return a surface for each row: the model if it is there, else its stand-in; and the roles."""
     from cembench.mesh.datasets import is_fetched, surface_file
-    from cembench.results.paper.profiles import surfaces_of
+    from cembench.results.profiles import surfaces_of
     from cembench.running.plan import gather_surfaces, paper_roles
     from cembench.workflows.reproduce import fetch_models, public_models
 

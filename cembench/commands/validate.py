@@ -19,7 +19,7 @@ from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.options import MOST_FACES, Parameters, Repeats, Timeout
 from cembench.core.errors import ParameterError
 from cembench.results.intervals import DEFAULT_ROUNDS
-from cembench.results.paper.profiles import Profile
+from cembench.results.profiles import Profile
 from cembench.validation.requirement import Requirement
 
 if TYPE_CHECKING:
@@ -162,7 +162,7 @@ def _chosen(
     faces: int | None,
 ) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
     """Return the surfaces the user names (none: the default ones), and their roles in the paper."""
-    from cembench.results.paper.profiles import surfaces_of
+    from cembench.results.profiles import surfaces_of
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     files = [*files, *(file for folder in folders for file in mesh_files(folder))]

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any, Literal, TypeAlias
 
-from cembench.results.paper import Citation
+from cembench.results.papers import Citation
 
 #: Origin of a number; a table never mixes two origins in a column without a mark.
 Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]

@@ -7,7 +7,6 @@ so that they are available at once the next time.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,7 @@ from cembench.core.notices import NoticeKind, of_kind
 from cembench.mesh.datasets import CACHE_VARIABLE
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
-from cembench.results import paper
+from cembench.results.papers import paper_of
 from cembench.results.records import MeshFacts
 from cembench.running.plan import generate_surface, mesh_facts, paper_roles
 from cembench.running.sources import code_hash
@@ -129,16 +128,16 @@ def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
     Deviations are relative to the row's counts; a disk with V vertices and F triangles has
     2 V - F - 2 vertices on its boundary.
     """
-    row: Mapping[str, float | None] = paper.table(2).get(mesh.paper_row, {})
-    vertices, faces = row.get("vertices"), row.get("faces")
-    if vertices is None or faces is None:
+    paper = paper_of(mesh.paper_row)
+    vertices, faces = paper.count(mesh.paper_row, "vertices"), paper.faces(mesh.paper_row)
+    if not vertices:
         return None
     boundary = 2 * vertices - faces - 2
     faces_off, boundary_off = mesh.faces / faces - 1, mesh.boundary_vertices / boundary - 1
     return {
-        "row_faces": int(faces),
-        "row_vertices": int(vertices),
-        "row_boundary": int(boundary),
+        "row_faces": faces,
+        "row_vertices": vertices,
+        "row_boundary": boundary,
         "faces_off": faces_off,
         "boundary_off": boundary_off,
         "ok": abs(faces_off) <= FACES_OFF

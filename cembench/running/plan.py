@@ -17,7 +17,7 @@ from cembench.mesh.reading import READERS, is_named_like_a_mesh, read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
-from cembench.results.paper.profiles import as_printed
+from cembench.results.papers import paper_of
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.running.sources import hash_of, sources_of
 
@@ -78,7 +78,7 @@ def plan_cells(
     In `parameters`, the key ``name`` sets a parameter of every algorithm that has it, and
     ``algorithm.name`` of that one only. `standing` is keyed by the surfaces' names; surfaces not in
     it are not the paper's. On the paper's own models algorithms have the parameters with which the
-    paper ran them (:func:`~cembench.results.paper.profiles.as_printed`), unless `parameters` sets
+    paper ran them (:meth:`~cembench.results.papers.Paper.as_printed`), unless `parameters` sets
     others.
 
     Raises
@@ -107,7 +107,8 @@ def plan_cells(
             )
         role = standing.get(mesh.name, PaperRole())
         facts = mesh_facts(mesh, role)
-        given = as_printed(role.origin, algorithms) | dict(parameters)
+        model = role.paper_row if role.origin == "model" else ""
+        given = paper_of(model).as_printed(model, algorithms) | dict(parameters)
         arguments = distribute_parameters(algorithms, given)
         for taker in takers:
             cell = Cell(

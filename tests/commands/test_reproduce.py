@@ -33,7 +33,7 @@ def one_model(cli, monkeypatch, tmp_path):
     known = replace(load_registry(), datasets={"nefertiti": model})
     monkeypatch.setattr(registry, "_installed", lambda: known)
     names = ["nefertiti-stand-in", "cowboy-hat-stand-in"]
-    monkeypatch.setattr("cembench.results.paper.profiles.surfaces_of", lambda *_: names)
+    monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path / "cache"))
     with ModelsServer() as server:
         monkeypatch.setenv("CEMBENCH_DATA_URL", server.url)
@@ -74,7 +74,7 @@ def test_offline_no_server_is_asked_and_a_failed_cell_ends_with_1(cli, one_model
 
     monkeypatch.setattr(Launcher, "check", failing)
     names = ["nefertiti-stand-in"]
-    monkeypatch.setattr("cembench.results.paper.profiles.surfaces_of", lambda *_: names)
+    monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
     code, out, err = cli("reproduce", "-o", "here", "--offline", "--budget", "0s")
     assert code == 1
     assert one_model.asked == 0

@@ -160,7 +160,7 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
     plugin = cli.folder / "stand_ins.py"
     plugin.write_text(
         "from cembench import DiskMesh, surface_family\n"
-        "from cembench.results import paper\n"
+        "from cembench.results.papers import find_paper\n"
         "from cembench.surfaces.flat_disk import flat_disk\n"
         "from dataclasses import replace\n"
         "def declare(k, row):\n"
@@ -169,7 +169,7 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
         "        return flat_disk(100 + 60 * k).renamed(f's{k}')\n"
         "    plate.__module__ = __name__\n"
         "    return plate\n"
-        "for k, row in enumerate(paper.table(1)):\n"
+        "for k, row in enumerate(find_paper('cem').models):\n"
         "    globals()[f's{k}'] = declare(k, row)\n"
     )
     arguments = ("run", "-a", "cem", "--plugin", plugin, "--dry-run", "--json")

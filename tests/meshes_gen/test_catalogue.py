@@ -21,7 +21,7 @@ from cembench.core.notices import NoticeKind
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.report.surface_facts import factor_spans, row_check
-from cembench.results.paper.profiles import Profile, surfaces_of
+from cembench.results.profiles import Profile, surfaces_of
 from cembench.running.plan import PaperRole, mesh_facts
 
 #: Made in seconds; the others are for the slow run.

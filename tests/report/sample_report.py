@@ -22,8 +22,9 @@ from cembench.report.document import (
     Value,
     missing,
 )
-from cembench.results.paper import CITATION
+from cembench.results.papers import find_paper
 
+CITATION = find_paper("cem").citation
 ALGORITHMS = ("cem", "qiem", "fdm", "ldm")
 SURFACES = ("Foot", "Chinese Lion", "Bourbon Bottle")
 #: A name that would be code in a page that does not escape it.

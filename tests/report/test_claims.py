@@ -2,23 +2,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from cembench.papers.cem import accuracy, efficiency, iteration, premises, start
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.conformal.metrics import all_metrics, dilatations
 from cembench.registry import load_registry
-from cembench.report.content.claims import (
-    CLAIMS,
-    accuracy,
-    claims,
-    efficiency,
-    iteration,
-    premises,
-    start,
-)
-from cembench.report.content.claims.premises import spectrum_of_iteration
-from cembench.report.content.claims.verdicts import verdict_of
+from cembench.report.content.claims import Found, claims
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
 from cembench.results.records import Cell, Outcome, Record, Round
@@ -43,12 +34,14 @@ def found(evidence, inspections):
 
 
 def test_a_verdict_follows_from_how_often_a_claim_held():
-    verdicts = [verdict_of(*counts) for counts in ((3, 3), (2, 3), (0, 3), (0, 0))]
+    verdicts = [Found(*counts, "").verdict for counts in ((3, 3), (2, 3), (0, 3), (0, 0))]
     assert verdicts == ["holds", "holds in part", "does not hold here", "not tested here"]
+    assert Found(0, 0, "", lacking=1).verdict == "too few rounds"
 
 
-def test_every_claim_has_a_verdict_of_its_own_figures(found):
-    assert len(found) == len(CLAIMS) >= 10
+def test_every_claim_has_a_verdict_of_its_own_figures(found, evidence):
+    assert list(found) == [claim.name for claim in evidence.paper.claims]
+    assert len(found) == 25
     # QIEM once and FDM twice slower, LDM faster once and equal once, under one policy.
     always = found["always-faster"]
     assert always.verdict == "holds in part"
@@ -86,7 +79,11 @@ def test_where_cem_is_always_faster_the_claim_holds(tmp_path):
     for record in store.records():
         if record.cell.algorithm == "ldm":
             (tmp_path / "run" / "records" / f"{record.cell.label}.json").unlink()
-    claim = efficiency.always_faster(Evidence.of(store.folder), {})
+    evidence = Evidence.of(store.folder)
+    assert efficiency.always_faster(evidence, {}).verdict == "holds"
+    one = next(claim for claim in evidence.paper.claims if claim.name == "always-faster")
+    paper = evidence.paper.model_copy(update={"claims": (one,)})
+    (claim,) = claims(replace(evidence, asked=paper), {})
     assert claim.verdict == "holds"
     assert "None is a model of the paper itself" in claim.remark
     assert "this project's implementations" in claim.remark
@@ -191,7 +188,7 @@ def test_a_rise_of_the_energy_is_counted_but_not_rounding():
 
 
 def test_the_iteration_matrix_of_a_delaunay_cap_is_as_the_theorem_says():
-    smallest, first, second = spectrum_of_iteration(spherical_cap(300))
+    smallest, first, second = premises.spectrum_of_iteration(spherical_cap(300))
     assert smallest > 0
     assert first == pytest.approx(1, abs=1e-10)
     assert second < 1 - 1e-3

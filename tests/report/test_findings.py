@@ -4,22 +4,22 @@ import re
 from dataclasses import replace
 
 import pytest
-
-from cembench.report.content.as_good import as_good
-from cembench.report.content.claims.efficiency import (
+from cembench.papers.cem.efficiency import (
     always_faster,
     average_rates,
     average_savings,
     more_than_80_percent,
     table_2_follows,
 )
+
+from cembench.report.content.as_good import as_good
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.figures.performance_profile import shown_series
 from cembench.report.content.findings import findings
 from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
 from cembench.report.content.report import is_of_the_paper
 from cembench.report.document import VERDICTS, Claim, plain
-from cembench.results import paper
+from cembench.results.papers import find_paper
 from tests.report.small_run import write_run
 
 
@@ -126,7 +126,7 @@ def test_the_papers_own_claim_has_intervals_over_enough_models(evidence):
 
     vase = without(evidence, lambda r: r.mesh.paper_row != "Chinese Vase")
     records = [r for r in vase.records if r.cell.solves == "reuse" and r.outcome.status == "ok"]
-    models = list(paper.table(1))[:6]
+    models = find_paper("cem").models[:6]
     six = tuple(on(r, 1 + k / 10, model) for k, model in enumerate(models) for r in records)
     told = claim_of_the_paper(replace(evidence, records=six))
     mean, low, high = re.search(r"here not measured, (\S+) \((\S+) to (\S+)\), -0.5", told).groups()

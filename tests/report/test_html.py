@@ -22,8 +22,7 @@ from cembench.report.document import Column, Figure, Report, Section, Table, Tex
 from cembench.report.pictures import with_transparent_background
 from cembench.report.render import html
 from cembench.report.render.html import write_html
-from cembench.results.paper import CITATION
-from tests.report.sample_report import HOSTILE, sample_report
+from tests.report.sample_report import CITATION, HOSTILE, sample_report
 
 VOID = {"meta", "link", "img", "br"}
 

@@ -24,9 +24,9 @@ from cembench.report.document import (
 from cembench.report.render.terminal_report import paper_tables
 from cembench.report.write_report import write_report
 from cembench.results.merging import merge
-from cembench.results.paper import CITATION
 from cembench.results.store import Store
 from tests.limits import tree
+from tests.report.sample_report import CITATION
 from tests.report.small_run import meshes, write_run
 
 

@@ -9,10 +9,12 @@ from cembench.report.content.surface_page import figures_table
 from cembench.report.content.table_2 import averages_table, measured_rates, table_2
 from cembench.report.declared import declared_table
 from cembench.report.document import marked
-from cembench.results import paper
 from cembench.results.columns import significant
+from cembench.results.papers import find_paper
 from cembench.results.records import LinearAlgebraWork
 from tests.report.small_run import ok, record, write_run
+
+PAPER = find_paper("cem")
 
 
 def by_name(tables):
@@ -45,7 +47,7 @@ def test_every_printed_cell_is_the_papers(evidence, number):
         for c, v in zip(table.columns, row, strict=True)
         if c.title == "printed"
     }
-    rows = [paper.table(number)[m] for m in ("Chinese Vase", "Liu's Neutral Face")]
+    rows = [PAPER.tables[number][m] for m in ("Chinese Vase", "Liu's Neutral Face")]
     assert printed == {v for row in rows for k, v in row.items() if k != "faces"}
 
 
@@ -117,7 +119,7 @@ def test_other_algorithms_and_surfaces_have_tables_of_their_own(evidence):
 
 
 def test_the_printed_averages_are_the_stated_ones_in_both_readings():
-    sets = [averages.printed_rates(a) for a in averages.COMPARED]
+    sets = [averages.printed_rates(PAPER, a) for a in PAPER.compared]
     assert [len(rates) for rates in sets] == [20, 18, 20]
     assert [round(averages.mean_rate(r), 1) for r in sets] == [8.5, 17.2, 4.1]
     assert [round(averages.geometric_rate(r), 1) for r in sets] == [6.8, 12.4, 3.5]
@@ -172,10 +174,10 @@ def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
 def test_the_misprint_is_marked(evidence):
     from cembench.report.content.printed_beside_measured import paper_value
 
-    value = paper_value(2, "Knit Cap Man", "fdm", 2)
+    value = paper_value(PAPER, 2, "Knit Cap Man", "fdm", 2)
     assert value.text == "29.07†"
     assert "28.07" in value.why
-    dash = paper_value(2, "Isis Statue", "fdm", 2)
+    dash = paper_value(PAPER, 2, "Isis Statue", "fdm", 2)
     assert (dash.number, dash.why) == (None, "Table 2 of the paper has a dash here")
 
 

@@ -11,14 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cembench.report.content.evidence import REFERENCE
 from cembench.report.content.printed_beside_measured import Footer
-from cembench.results import paper
-
-#: Figures in the paper's text below Table 2.
-STATED_RATE = {"qiem": 8.5, "fdm": 17.2, "ldm": 4.1}
-STATED_SAVING = {"qiem": 0.89, "fdm": 0.94, "ldm": 0.80}
-COMPARED = tuple(a for a in paper.ALGORITHMS if a != REFERENCE)
+from cembench.results.papers import Paper
 
 
 def mean_rate(rates: Sequence[float]) -> float:
@@ -59,20 +53,20 @@ READINGS = (
 )
 
 
-def printed_rates(algorithm: str, models: Sequence[str] | None = None) -> list[float]:
+def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = None) -> list[float]:
     """Return Table 2's rates for these models (default: all), misprints replaced from Table 1."""
     rates = []
-    for model in paper.table(2) if models is None else models:
-        rate = corrected_rate(model, algorithm)
+    for model in paper.models if models is None else models:
+        rate = corrected_rate(paper, model, algorithm)
         if rate is not None:
             rates.append(rate)
     return rates
 
 
-def corrected_rate(model: str, algorithm: str) -> float | None:
+def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:
     """Return a rate of Table 2, or for a misprint the one that follows from Table 1."""
-    if (2, model, algorithm) not in paper.ERRATA:
-        return paper.table(2)[model][algorithm]
-    times = paper.table(1)[model]
-    ours, theirs = times[REFERENCE], times[algorithm]
+    if (2, model, algorithm) not in paper.misprints:
+        return paper.tables[2][model][algorithm]
+    times = paper.tables[1][model]
+    ours, theirs = times[paper.reference], times[algorithm]
     return None if ours is None or theirs is None else theirs / ours - 1

@@ -18,13 +18,12 @@ from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.palette import SeriesStyle, series_styles
-from cembench.results import paper
 from cembench.results import record_rows as frame
 from cembench.results.columns import COLUMNS
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
-from cembench.results.paper.profiles import as_elsewhere
+from cembench.results.papers import NO_PAPER, Paper, papers
 from cembench.results.records import Cell, MeshOrigin, Record
 from cembench.results.store import Store
 
@@ -98,9 +97,11 @@ class Evidence:
     exhibits: tuple[Exhibit, ...]
     #: Number of records left out because the cell was measured again later.
     superseded: int = 0
+    #: The paper that the report is asked to be of; None for the one with most rows of the run.
+    asked: Paper | None = None
 
     @classmethod
-    def of(cls, run: Path) -> Evidence:
+    def of(cls, run: Path, paper: Paper | None = None) -> Evidence:
         """Read a run."""
         store = Store(run)
         records = store.records()
@@ -110,7 +111,18 @@ class Evidence:
                 "shows what was requested; run the same `cembench run` again to resume it."
             )
         kept = _latest(records)
-        return cls(store, tuple(kept), tuple(read_exhibits(run)), len(records) - len(kept))
+        exhibits = tuple(read_exhibits(run))
+        return cls(store, tuple(kept), exhibits, len(records) - len(kept), paper)
+
+    @cached_property
+    def paper(self) -> Paper:
+        """The paper that printed figures are from."""
+        held = Counter(record.mesh.paper_row for record in self.records)
+
+        def rows(paper: Paper) -> int:
+            return sum(held[model] for model in paper.models)
+
+        return self.asked or max(papers().values(), key=rows, default=NO_PAPER)
 
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
@@ -165,7 +177,7 @@ class Evidence:
     @cached_property
     def surfaces(self) -> tuple[MeasuredSurface, ...]:
         """The paper's models in the paper's order, then other surfaces by size."""
-        order = list(paper.table(1))
+        order = self.paper.models
         found: dict[str, MeasuredSurface] = {}
         for record in self.records:
             facts = record.mesh
@@ -225,7 +237,7 @@ class Evidence:
             about[name] = record
         titles = Counter(record.title for record in about.values())
         found = []
-        for name in sorted(variants, key=lambda n: (n not in paper.ALGORITHMS, _place(n), n)):
+        for name in sorted(variants, key=lambda n: (self._place(n), n)):
             choices = [choice for choice, _ in variants[name].most_common()]
             for k, choice in enumerate(choices):
                 title, target = about[name].title, about[name].target
@@ -237,6 +249,10 @@ class Evidence:
                     AlgorithmSeries(name, title, target, choice, label, k == 0, parameters=given)
                 )
         return tuple(found)
+
+    def _place(self, algorithm: str) -> int:
+        known = self.paper.algorithms
+        return known.index(algorithm) if algorithm in known else len(known)
 
     @property
     def disk_series(self) -> tuple[AlgorithmSeries, ...]:
@@ -266,7 +282,7 @@ class Evidence:
         found = {}
         for r in self.records:
             name, own = r.cell.algorithm, given[r.cell.key]
-            usual = _variant(r.cell, as_elsewhere(name, r.cell.parameters))
+            usual = _variant(r.cell, self.paper.as_elsewhere(name, r.cell.parameters))
             separate = (name, usual, r.cell.mesh_hash) in chosen or any(
                 (name, own, origin) in chosen for origin in ("stand-in", "surface")
             )
@@ -372,11 +388,6 @@ def model_surface(model: str) -> str:
 
     surfaces = load_registry().surfaces.values()
     return next((s.name for s in surfaces if s.paper_row == model), model)
-
-
-def _place(algorithm: str) -> int:
-    known = algorithm in paper.ALGORITHMS
-    return paper.ALGORITHMS.index(algorithm) if known else len(paper.ALGORITHMS)
 
 
 def _variant(cell: Cell, parameters: Mapping[str, Any]) -> Variant:

@@ -25,25 +25,17 @@ from cembench.report.pictures import pixel_suffix
 from cembench.results.exhibits import Exhibit, ExhibitTable, place_of
 from cembench.results.records import MeshOrigin
 
-#: The paper's figures that are exhibits, what they show, and the command that makes them.
-EXPECTED = (
-    ("Figure 1", "the steps of Koebe's method", "holes"),
-    ("Figure 7", "a surface with holes and its map to a disk with circular holes", "holes"),
-    ("Figure 13", "a morph between three faces", "morph"),
-    ("Figure 14", "how the registration maps are made", "morph"),
-)
-
 
 def exhibit_gaps(evidence: Evidence) -> list[Gap]:
     """Return gaps for the paper's figures whose exhibit is missing in the run."""
     return [
         Gap(
-            f"{figure}: {what}",
+            f"{one.figure}: {one.shows}",
             "the run has no exhibit for it.",
-            f"cembench {verb} --run {evidence.store.folder}",
+            f"cembench {one.command} --run {evidence.store.folder}",
         )
-        for figure, what, verb in EXPECTED
-        if not any(figure in figures_of(e) for e in evidence.exhibits)
+        for one in evidence.paper.exhibits
+        if not any(one.figure in figures_of(e) for e in evidence.exhibits)
     ]
 
 

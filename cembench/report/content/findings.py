@@ -22,7 +22,6 @@ from cembench.report.content.standings import (
 from cembench.report.document import Claim, Figure, Finding, Findings, Sentence
 from cembench.results.comparison import Comparison
 from cembench.results.outliers import outlier_lines
-from cembench.results.paper import ALGORITHMS
 from cembench.results.stability import scatter_words, stability_words
 
 
@@ -42,7 +41,7 @@ def findings(
         sentences = [(claim_of_the_paper(evidence),), verdicts_counted(claims)]
     told = field_words(field) if field else ["No map to the disk to compare."]
     if claims and field:
-        told[0] = _beside_the_paper(field, told[0])
+        told[0] = _beside_the_paper(evidence.paper.algorithms, field, told[0])
     told += [stability_words(evidence.records), scatter_words(evidence.records)]
     sentences += [(words,) for words in told if words]
     best = field.standings[0].label if field else REFERENCE
@@ -55,9 +54,9 @@ def findings(
     )
 
 
-def _beside_the_paper(field: Field, sentence: str) -> str:
+def _beside_the_paper(known: Sequence[str], field: Field, sentence: str) -> str:
     """Return a sentence with the algorithms that are not in the paper in front, if any."""
-    extra = [s.label for s in field.standings if s.series.algorithm not in ALGORITHMS]
+    extra = [s.label for s in field.standings if s.series.algorithm not in known]
     if not extra:
         return sentence
     are = "is" if len(extra) == 1 else "are"

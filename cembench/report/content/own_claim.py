@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from cembench.report.content.averages import COMPARED, STATED_RATE, mean_rate
-from cembench.report.content.claims.verdicts import under
+from cembench.report.content.averages import mean_rate
+from cembench.report.content.claims import under
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.sure_speedups import paired_rounds
 from cembench.report.content.table_2 import measured_rates
@@ -24,8 +24,9 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     A measured rate has its 95 % interval over models and rounds in brackets where there are enough
     of both (:func:`cembench.results.many.rate_interval`).
     """
-    names = ", ".join(algorithm.upper() for algorithm in COMPARED)
-    printed = ", ".join(f"{STATED_RATE[algorithm]:.1f}" for algorithm in COMPARED)
+    paper = evidence.paper
+    names = ", ".join(algorithm.upper() for algorithm in paper.compared)
+    printed = ", ".join(f"{paper.stated['rate'][algorithm]:.1f}" for algorithm in paper.compared)
     told = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
     here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
     origins = Counter(surface.origin for surface in evidence.one_per_model)
@@ -49,7 +50,7 @@ def claim_of_the_paper(evidence: Evidence) -> str:
 def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     """Return the measured averages as text, and whether one of them has an interval."""
     told, sure = [], False
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         rates, _ = measured_rates(evidence, algorithm, policy)
         series = evidence.series_of(algorithm)
         if not rates or series is None:

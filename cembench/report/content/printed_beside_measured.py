@@ -10,9 +10,9 @@ import numpy as np
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.declared import figure_entry
 from cembench.report.document import Column, Table, Value, count, missing, words
-from cembench.results import paper
 from cembench.results.columns import FrameColumn
 from cembench.results.many import geometric
+from cembench.results.papers import Paper
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ def geometric_mean(numbers: Sequence[float]) -> float:
     return float(geometric(np.asarray(numbers, dtype=float)))
 
 
-def paper_value(table: int, model: str, column: str, digits: int) -> Value:
+def paper_value(paper: Paper, table: int, model: str, column: str, digits: int) -> Value:
     """Return a figure as printed in the paper; a misprint has a dagger and an explanation."""
-    if model not in paper.table(table):
+    if model not in paper.tables[table]:
         return missing("the paper has no such model", "")
-    number = paper.table(table)[model][column]
+    number = paper.tables[table][model][column]
     if number is None:
         return missing(f"Table {table} of the paper has a dash here")
-    why = paper.ERRATA.get((table, model, column), "")
+    why = paper.misprints.get((table, model, column), "")
     text = f"{number:,.{digits}f}" + ("†" if why else "")
     return Value(text, number, "printed", why=f"misprint: {why}" if why else "")
 
@@ -120,7 +120,8 @@ def table_beside(
     ]
     last = _footer_rows(counted, columns, footers)
     places = _places(columns, rows)
-    remarks = [*notes, *([absent] if absent else []), *places.values(), *_sizes(surfaces)]
+    sizes = _sizes(evidence.paper, surfaces)
+    remarks = [*notes, *([absent] if absent else []), *places.values(), *sizes]
     return Table(
         name=name,
         title=title,
@@ -141,7 +142,8 @@ def _row(
     for quantity in quantities:
         if quantity.column is not None:
             number, column = quantity.column
-            cells.append(paper_value(number, surface.paper_row, column, quantity.digits))
+            place = number, surface.paper_row, column
+            cells.append(paper_value(evidence.paper, *place, quantity.digits))
         cells.append(here(evidence, surface, quantity, policy))
     return tuple(cells)
 
@@ -200,7 +202,7 @@ def _places(columns: Sequence[Column], rows: Sequence[tuple[Value, ...]]) -> dic
     return {why: f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in found.items()}
 
 
-def _sizes(surfaces: Sequence[MeasuredSurface]) -> list[str]:
+def _sizes(paper: Paper, surfaces: Sequence[MeasuredSurface]) -> list[str]:
     """Return the surfaces whose size differs from that of the model in their row."""
     odd = [
         f"{s.title}: {s.faces:,} here, {paper.faces(s.paper_row):,} in print"
@@ -213,7 +215,7 @@ def _sizes(surfaces: Sequence[MeasuredSurface]) -> list[str]:
 def absent_models(evidence: Evidence) -> list[str]:
     """Return the models of the paper without a surface in the run."""
     there = {s.paper_row for s in evidence.models}
-    return [model for model in paper.table(1) if model not in there]
+    return [model for model in evidence.paper.models if model not in there]
 
 
 def in_policy(evidence: Evidence, policy: str) -> str:

@@ -7,20 +7,17 @@ map to the disk, and other surfaces, have separate tables.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from cembench.report.content.averages import COMPARED, READINGS
+from cembench.report.content.averages import READINGS
 from cembench.report.content.evidence import (
     ANGLE,
     DISK,
-    REFERENCE,
     AlgorithmSeries,
     Evidence,
     MeasuredSurface,
 )
 from cembench.report.content.printed_beside_measured import (
     POLICIES,
-    Footer,
     Quantity,
     absent_models,
     in_policy,
@@ -28,152 +25,66 @@ from cembench.report.content.printed_beside_measured import (
     table_beside,
 )
 from cembench.report.document import Table
-from cembench.results import paper
 from cembench.results.columns import COLUMNS, FrameColumn
-
-
-@dataclass(frozen=True)
-class PrintedFigure:
-    """A figure of each algorithm in a table of the paper.
-
-    `column` names it in the frame, and `printed` in the paper's table, with the algorithm in
-    braces. `heading` follows the algorithm's title. With `only`, one algorithm has it.
-    """
-
-    column: str
-    printed: str = "{}"
-    heading: str = ""
-    digits: int = 2
-    only: str = ""
-
-
-@dataclass(frozen=True)
-class PrintedTable:
-    """A table of the paper: what it is about, and its figures."""
-
-    number: int
-    title: str
-    caption: str
-    figures: tuple[PrintedFigure, ...]
-    #: Whether it depends on the linear-algebra policy; then each policy has one.
-    by_policy: bool = False
-    algorithms: tuple[str, ...] = paper.ALGORITHMS
-    footers: tuple[Footer, ...] = ()
-    notes: tuple[str, ...] = ()
-
-
-PRINTED = (
-    PrintedTable(
-        1,
-        "computational cost in seconds, and iterations of CEM",
-        "Seconds from the arrays V and F in memory to the map: the median of the rounds here, and "
-        "what the paper printed for MATLAB programs on a laptop of 2.60 GHz. Machines, languages "
-        "and libraries differ, so compare only the ratios between algorithms, not printed with "
-        "measured seconds.",
-        (
-            PrintedFigure("seconds"),
-            PrintedFigure("iterations", "cem_iterations", "iterations", digits=0, only=REFERENCE),
-        ),
-        by_policy=True,
-    ),
-    PrintedTable(
-        2,
-        "rate of speedup of CEM",
-        "t / t_CEM - 1 (Eq. 33): 0 for equal times, 1 if CEM takes half the time, negative if CEM "
-        "is slower. Here it is the median of the ratios within rounds.",
-        (PrintedFigure("rate"),),
-        by_policy=True,
-        algorithms=COMPARED,
-        footers=READINGS,
-        notes=(
-            "averages of the printed column use its numbers as printed, including the misprint",
-        ),
-    ),
-    PrintedTable(
-        3,
-        "conformal energy",
-        "E_C = E_D - A (Eq. 7) is zero for a conformal map; A is the area enclosed by the image of "
-        "the boundary (Eq. 8). It does not depend on the machine, but on the mesh: a stand-in has "
-        "a different value than the paper's model.",
-        (PrintedFigure("conformal_energy", digits=4),),
-    ),
-    PrintedTable(
-        4,
-        "angular distortion in degrees, mean and SD",
-        "Angular distortion: the absolute difference between the angle on the surface and on the "
-        "disk, in degrees, over all corners of all triangles. It depends on the mesh: a stand-in "
-        "has a different value than the paper's model.",
-        (
-            PrintedFigure("angle_error_mean_deg", "{}_mean", "mean"),
-            PrintedFigure("angle_error_sd_deg", "{}_sd", "SD"),
-        ),
-    ),
-)
 
 
 def printed_tables(evidence: Evidence, number: int) -> list[Table]:
     """Return the paper's table `number`, then other algorithms and other surfaces, if any."""
-    table = next(table for table in PRINTED if table.number == number)
-    policies = evidence.policies if table.by_policy else (None,)
-    return [made for policy in policies for made in _tables(evidence, table, policy)]
+    policies = evidence.policies if evidence.paper.printed[number].by_policy else (None,)
+    return [made for policy in policies for made in printed_table(evidence, number, policy)]
 
 
-def _tables(evidence: Evidence, table: PrintedTable, policy: str | None) -> list[Table]:
+def printed_table(evidence: Evidence, number: int, policy: str | None) -> list[Table]:
+    """Return the same under one policy, or None for a table that has none."""
+    paper = evidence.paper
+    table = paper.printed[number]
     tail = policy_suffix(policy, evidence) if policy else ""
     add = in_policy(evidence, policy) if policy else ""
-    name = f"table-{table.number}{tail}"
-    title = f"{table.title[0].upper()}{table.title[1:]}"
+    name, title = f"table-{number}{tail}", f"{table.title[0].upper()}{table.title[1:]}"
+    shown = paper.compared if table.compares else paper.algorithms
+    footers = READINGS if table.compares else ()
     disks = evidence.disk_series
     tables = []
     if evidence.models:
-        own = [
-            quantity
-            for algorithm in table.algorithms
-            for quantity in _quantities(
-                evidence, table, evidence.series_of(algorithm), printed=algorithm
-            )
-        ]
-        left_out = absent_models(evidence)
+        own = [q for a in shown for q in _quantities(evidence, number, evidence.series_of(a), a)]
+        absent = ", ".join(absent_models(evidence))
         here = f" Here {POLICIES.get(policy, policy)}." if policy else ""
         tables.append(
             table_beside(
-                evidence, name, f"Table {table.number}: {table.title}{add}", evidence.models, own,
-                policy=policy, caption=table.caption + here, footers=table.footers,
-                notes=table.notes,
-                absent=f"not in this run: {', '.join(left_out)}" if left_out else "",
+                evidence, name, f"Table {number}: {table.title}{add}", evidence.models, own,
+                policy=policy, caption=table.caption + here, footers=footers, notes=table.notes,
+                absent=f"not in this run: {absent}" if absent else "",
             )
         )  # fmt: skip
-        others = [s for s in disks if not (s.algorithm in paper.ALGORITHMS and s.main)]
-        if more := [q for s in others for q in _quantities(evidence, table, s)]:
+        others = [s for s in disks if not (s.algorithm in paper.algorithms and s.main)]
+        if more := [q for s in others for q in _quantities(evidence, number, s)]:
             tables.append(
                 table_beside(
                     evidence, f"{name}-other-algorithms",
                     f"{title}: algorithms that are not in the paper{add}",
-                    evidence.models, more, policy=policy, footers=table.footers,
+                    evidence.models, more, policy=policy, footers=footers,
                 )
             )  # fmt: skip
     if evidence.others:
-        shown = [
-            s
-            for s in disks
-            if s.algorithm in table.algorithms or s.algorithm not in paper.ALGORITHMS
-        ]
+        left_out = set(paper.algorithms) - set(shown)
+        series = [s for s in disks if s.algorithm not in left_out]
         tables.append(
             table_beside(
                 evidence, f"{name}-other-surfaces",
                 f"{title}: surfaces that are not in the paper{add}",
-                evidence.others, [q for s in shown for q in _quantities(evidence, table, s)],
-                policy=policy, footers=table.footers,
+                evidence.others, [q for s in series for q in _quantities(evidence, number, s)],
+                policy=policy, footers=footers,
             )
         )  # fmt: skip
     return tables
 
 
 def _quantities(
-    evidence: Evidence, table: PrintedTable, series: AlgorithmSeries | None, printed: str = ""
+    evidence: Evidence, number: int, series: AlgorithmSeries | None, printed: str = ""
 ) -> list[Quantity]:
     """Return the figures of a series; with `printed`, the algorithm's name, beside the paper's."""
-    if series is not None and series.algorithm == REFERENCE and REFERENCE not in table.algorithms:
+    table = evidence.paper.printed[number]
+    if series is not None and table.compares and series.algorithm == evidence.paper.reference:
         return []
     title = series.label if series else printed.upper()
     return [
@@ -181,7 +92,7 @@ def _quantities(
             f"{title} {one.heading}".rstrip(),
             series,
             _figure(evidence, one.column),
-            (table.number, one.printed.format(printed)) if printed else None,
+            (number, one.printed.format(printed)) if printed else None,
             one.digits,
         )
         for one in table.figures

@@ -37,24 +37,15 @@ from cembench.report.declared import declared_table
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
 from cembench.report.shared_drawing import each
-from cembench.results.paper import CITATION
+from cembench.results.papers import Picture
 from cembench.results.records import MeshOrigin
 
 #: Receives progress: a text, the number of finished steps, and their total.
 Progress = Callable[[str, int, int], None]
 Inspections = Mapping[str, Inspection]
 
-#: The paper's figures that show one model with its map.
-PICTURES = (
-    ("Figure 2", "Left Hand"),
-    ("Figure 3", "Liu's Neutral Face"),
-    ("Figure 4", "Liu's Smile Face"),
-    ("Figure 5", "Liu's Wry Face"),
-    ("Figure 6", "Liu's Pouting Face"),
-)
-
-
-PAPER = f"{CITATION.title}: its claims, tables and figures, measured"
+#: The title of a paper's report goes before this.
+PAPER = ": its claims, tables and figures, measured"
 #: Names of plots for the head, the first that is there: accuracy against time, or its profiles.
 FIRST_PLOTS = ("accuracy-against-time", "accuracy-profiles")
 
@@ -109,13 +100,13 @@ def build_report(
     progress("done", n, n)
     found = many_findings(evidence) if many else findings(evidence, inspections, tested)
     return Report(
-        title=PAPER if of_paper else _title_of_own_surfaces(evidence),
+        title=evidence.paper.title + PAPER if of_paper else _title_of_own_surfaces(evidence),
         findings=replace(found, plot=first),
         command=command,
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
         records=evidence.rows,
-        paper=CITATION if of_paper else None,
+        paper=evidence.paper.citation if of_paper else None,
     )
 
 
@@ -223,12 +214,12 @@ def _tables(evidence: Evidence) -> Section:
 def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
     items: list[Item] = []
     gaps: list[Gap] = []
-    for figure, model in PICTURES:
-        found = _pictures(evidence, inspections, figure, model)
+    for picture in evidence.paper.pictures:
+        found = _pictures(evidence, inspections, picture)
         if found:
             items += found
         else:
-            gaps.append(model_gap(evidence, model, figure))
+            gaps.append(model_gap(evidence, picture.model, picture.figure))
     for plot, lacking in (
         energy_by_iteration(evidence),
         angle_histograms(evidence, inspections),
@@ -243,10 +234,9 @@ def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Sect
     return Section("figures", "Figures of the paper", (*items, *gaps))
 
 
-def _pictures(
-    evidence: Evidence, inspections: Inspections, figure: str, model: str
-) -> list[Figure]:
+def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> list[Figure]:
     """Return CEM's pictures of a model, as in the paper."""
+    figure, model = wanted.figure, wanted.model
     surface = evidence.surface_for_model(model)
     series = evidence.series_of(REFERENCE)
     if surface is None or series is None:
@@ -255,7 +245,8 @@ def _pictures(
     checkerboard = seen.checkerboards.get(series.label)
     if checkerboard is None:
         return []
-    chosen = [seen.curvature, seen.mesh] if figure == "Figure 2" else [checkerboard]
+    kinds = {"checkerboard": checkerboard, "curvature": seen.curvature, "mesh": seen.mesh}
+    chosen = [kinds[kind] for kind in wanted.shows]
     return [
         Figure(
             f"{figure.lower().replace(' ', '-')}-{k + 1}",

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from cembench.report.content.averages import (
-    COMPARED,
     READINGS,
-    STATED_RATE,
-    STATED_SAVING,
     geometric_rate,
     percent,
     printed_rates,
@@ -18,19 +15,16 @@ from cembench.report.content.printed_beside_measured import (
     in_policy,
     policy_suffix,
 )
-from cembench.report.content.printed_tables import printed_tables
+from cembench.report.content.printed_tables import printed_table
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.document import Column, Table, Value, count, missing, words
 
 
 def table_2(evidence: Evidence) -> list[Table]:
     """Return the rates of speedup and their averages in both readings, for each policy."""
-    tables = {table.name: table for table in printed_tables(evidence, 2)}
     found: list[Table] = []
     for policy in evidence.policies:
-        name = f"table-2{policy_suffix(policy, evidence)}"
-        known = (name, f"{name}-other-algorithms", f"{name}-other-surfaces")
-        found += [tables[one] for one in known if one in tables]
+        found += printed_table(evidence, 2, policy)
         found += [averages_table(evidence, policy)] if evidence.models else []
         found += sure_speedups(evidence, policy)
     return found
@@ -39,17 +33,17 @@ def table_2(evidence: Evidence) -> list[Table]:
 def averages_table(evidence: Evidence, policy: str) -> Table:
     """Return both readings of the averages: stated, printed for all or these models, measured."""
     columns = [Column("reading", numeric=False)]
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         columns += [
             Column(heading, algorithm.upper())
             for heading in ("stated", "printed, all", "printed, these", "here")
         ]
-    stated = {0: STATED_RATE, 2: STATED_SAVING}
+    stated = {0: evidence.paper.stated.get("rate", {}), 2: evidence.paper.stated.get("saving", {})}
     rows = []
-    sets = {a: _rate_sets(evidence, a, policy) for a in COMPARED}
+    sets = {a: _rate_sets(evidence, a, policy) for a in evidence.paper.compared}
     for k, reading in enumerate(READINGS):
         cells = [words(reading.label)]
-        for algorithm in COMPARED:
+        for algorithm in evidence.paper.compared:
             claim = stated.get(k, {}).get(algorithm)
             show = _stated if k == 0 else percent
             cells.append(
@@ -65,10 +59,10 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
                 else:
                     cells.append(missing("no rate to average"))
         rows.append(tuple(cells))
-    if any(work_ratios(evidence, a, policy) for a in COMPARED):
+    if any(work_ratios(evidence, a, policy) for a in evidence.paper.compared):
         rows.append(_work_row(evidence, policy))
     counts = [words("n, models counted")]
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         counts.append(words(""))
         counts += [count(len(r)) for r in sets[algorithm]]
     origins = sorted({s.origin for s in evidence.models})
@@ -95,7 +89,7 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
 def _work_row(evidence: Evidence, policy: str) -> tuple[Value, ...]:
     """Return the row that no machine's speed is in: factorisations over CEM's."""
     cells = [words("factorisations over CEM's, geometric mean")]
-    for algorithm in COMPARED:
+    for algorithm in evidence.paper.compared:
         ratios = work_ratios(evidence, algorithm, policy)
         mean = geometric_rate([ratio - 1 for ratio in ratios]) + 1 if ratios else None
         cells += [missing("the paper does not count them")] * 3
@@ -126,7 +120,8 @@ def _stated(number: float) -> str:
 def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[float], ...]:
     """Return the rates printed for all models, printed for those measured, and measured."""
     measured, there = measured_rates(evidence, algorithm, policy)
-    return printed_rates(algorithm), printed_rates(algorithm, there), measured
+    paper = evidence.paper
+    return printed_rates(paper, algorithm), printed_rates(paper, algorithm, there), measured
 
 
 def measured_rates(

@@ -15,7 +15,6 @@ from cembench.conformal.atlas import ATLAS_METRICS
 from cembench.conformal.metrics import METRICS, Metric, metrics_shown
 from cembench.report.render.grid import GridColumn, figures, grid, names, words
 from cembench.report.surface_facts import SurfaceFacts, row_check
-from cembench.results import paper
 from cembench.results.comparison import (
     UNSTABLE_WIDTH,
     Comparison,
@@ -28,6 +27,7 @@ from cembench.results.comparison import (
 from cembench.results.external_words import mark_of, marks_explained, seconds_words
 from cembench.results.machines import Environments, Marks, marks
 from cembench.results.many import corrected
+from cembench.results.papers import paper_of
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.results.runs_compared import Change
 from cembench.running.estimate import Estimate
@@ -338,7 +338,8 @@ def _printed(record: Record) -> str:
     """Return the paper's printed figures for this surface and algorithm, as text."""
     row, name = record.mesh.paper_row, record.cell.algorithm
     what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
-    printed = {**paper.table(3).get(row, {}), **paper.table(4).get(row, {})}
+    tables = paper_of(row).tables
+    printed = {**tables.get(3, {}).get(row, {}), **tables.get(4, {}).get(row, {})}
     energy, mean, sd = (printed.get(name + end) for end in ("", "_mean", "_sd"))
     if energy is None or mean is None or sd is None:
         return what

@@ -1,4 +1,4 @@
-"""Figure 9: histograms of the angular distortions."""
+"""Histograms of the angular distortions."""
 
 from __future__ import annotations
 
@@ -13,8 +13,6 @@ from cembench.report.document import Gap
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
-#: The models of the paper's figure, in its order.
-MODELS = ("Liu's Neutral Face", "Liu's Smile Face", "Liu's Wry Face", "Liu's Pouting Face")
 #: Degree threshold of the paper's figure.
 SHOWN = 4.0
 
@@ -25,26 +23,27 @@ def angle_histograms(
     """Return the plot of the paper's models in the run, and a gap for each missing one."""
     series = evidence.series_of(REFERENCE)
     panels, gaps = [], []
-    for model in MODELS:
+    wanted = evidence.paper.plotted("angle_histograms")
+    for model in wanted.models:
         surface = evidence.surface_for_model(model)
         seen = inspections[surface.mesh_hash] if surface else None
         angles = seen.angles.get(series.label) if seen and series else None
         if angles and surface:
             panels.append(_panel(f"{model} ({surface.origin})", angles))
         elif seen and not seen.kept:
-            gaps.append(Gap(f"Figure 9: {model}", seen.missing_reason))
+            gaps.append(Gap(f"{wanted.figure}: {model}", seen.missing_reason))
         else:
-            gaps.append(model_gap(evidence, model, "Figure 9"))
+            gaps.append(model_gap(evidence, model, wanted.figure))
     if not panels:
         return None, gaps
     plot = Plot(
-        "figure-9",
+        wanted.anchor,
         "Histograms of the angular distortion of CEM's maps",
         tuple(panels),
         f"Share of the corners in bins of {BIN:g} degrees, recomputed from the stored maps. Each "
         f"heading gives the share below one degree. Bars above {SHOWN:g} degrees are left out.",
         "Bars that are highest near zero degrees and fall off quickly.",
-        "Figure 9",
+        wanted.figure,
     )
     return plot, gaps
 

@@ -1,4 +1,4 @@
-"""Figure 10: cost of a map against the number of triangles, with fitted exponents."""
+"""Cost of a map against the number of triangles, with fitted exponents."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, through
-from cembench.results import paper
+from cembench.results.papers import Paper
 
 #: Minimum number of points for a meaningful exponent.
 FEWEST = 3
@@ -50,11 +50,11 @@ def measured_points(evidence: Evidence, label: str, policy: str) -> list[Point]:
     return found
 
 
-def printed_points(algorithm: str) -> list[Point]:
+def printed_points(paper: Paper, algorithm: str) -> list[Point]:
     """Return (faces, seconds, model) from the paper's Table 1."""
     return [
         Point(paper.faces(model), seconds, model)
-        for model, row in paper.table(1).items()
+        for model, row in paper.tables[1].items()
         if (seconds := row[algorithm]) is not None
     ]
 
@@ -68,18 +68,19 @@ def cost_by_faces(evidence: Evidence) -> Plot:
             for s in evidence.disk_series
         ]
         panels.append(_panel(groups, f"measured here, solves: {policy}"))
-    usual = series_styles(paper.ALGORITHMS)
-    groups = [(a.upper(), usual[a], printed_points(a)) for a in paper.ALGORITHMS]
+    paper, figure = evidence.paper, evidence.paper.plotted("cost_by_faces")
+    usual = series_styles(paper.algorithms)
+    groups = [(a.upper(), usual[a], printed_points(paper, a)) for a in paper.algorithms]
     panels.append(_panel(groups, "printed in the paper (Table 1)"))
     return Plot(
-        "figure-10",
+        figure.anchor or "cost-by-faces",
         "Computational cost against number of triangles",
         tuple(panels),
         "Seconds against triangles on logarithmic axes. Lines are fitted power laws, whose "
         "exponents are in the table below. All surfaces of the run are included, even those not in "
         "the paper; the printed seconds are from a different machine.",
         "Points along straight lines that rise from left to right, one for each algorithm.",
-        "Figure 10",
+        figure.figure,
     )
 
 
@@ -107,9 +108,8 @@ def exponents_table(evidence: Evidence) -> Table:
         columns += [Column("exponent", group), Column("n", group)]
     rows = []
     for series in evidence.disk_series:
-        printed = (
-            fit(printed_points(series.algorithm)) if series.algorithm in paper.ALGORITHMS else None
-        )
+        is_printed = series.algorithm in evidence.paper.algorithms
+        printed = fit(printed_points(evidence.paper, series.algorithm)) if is_printed else None
         cells = [words(series.label), *_fit_cells(printed)]
         for policy in evidence.policies:
             cells += _fit_cells(fit(measured_points(evidence, series.label, policy)))

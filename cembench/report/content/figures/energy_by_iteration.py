@@ -1,38 +1,35 @@
-"""Figure 8: the conformal energy after each iteration of CEM."""
+"""The conformal energy after each iteration of CEM."""
 
 from __future__ import annotations
 
 from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface, model_surface
 from cembench.report.document import Gap
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
-from cembench.results import paper
-
-#: The models of the paper's figure.
-MODELS = ("Chinese Vase", "Bourbon Bottle", "David Head", "Human Brain")
 
 
 def energy_by_iteration(evidence: Evidence) -> tuple[Plot | None, list[Gap]]:
     """Return the plot of the paper's models in the run, and a gap for each missing one."""
     panels = []
     gaps = []
-    for model in MODELS:
+    wanted = evidence.paper.plotted("energy_by_iteration")
+    for model in wanted.models:
         surface = evidence.surface_for_model(model)
         panel = surface and history_panel(evidence, surface, f"{model} ({surface.origin})")
         if panel:
             panels.append(panel)
         else:
-            gaps.append(model_gap(evidence, model, "Figure 8"))
+            gaps.append(model_gap(evidence, model, wanted.figure))
     if not panels:
         return None, gaps
     plot = Plot(
-        "figure-8",
+        wanted.anchor,
         "Conformal energy against iterations of CEM",
         tuple(panels),
         "E_C at the start (0) and after each iteration. The last value need not be the smallest: "
         "CEM's iteration ends after the first step that does not lower E_C by the tolerance. "
         "Curves other than CEM's are not in the paper.",
         "For each surface, a curve of the conformal energy that falls with the iterations.",
-        "Figure 8",
+        wanted.figure,
     )
     return plot, gaps
 
@@ -50,7 +47,7 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
             continue
         is_cem = series.algorithm == REFERENCE
         if not is_cem and (
-            series.algorithm in paper.ALGORITHMS or "energy_of" in record.outcome.extras
+            series.algorithm in evidence.paper.algorithms or "energy_of" in record.outcome.extras
         ):
             continue
         history = record.outcome.energy_history

@@ -6,14 +6,10 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from cembench.report.content.claims.verdicts import tested_on, verdict_of
+from cembench.report.content.claims import Found, Inspections
 from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
-from cembench.report.content.figures.angle_histograms import MODELS
-from cembench.report.content.inspection import Inspection
-from cembench.report.document import Claim
 from cembench.results.records import Record
 
-Inspections = Mapping[str, Inspection]
 #: "Similar" means within this share of the smallest of the three; "slightly", by at most that.
 SIMILAR = 0.25
 
@@ -25,25 +21,17 @@ def cem_records(evidence: Evidence) -> list[tuple[MeasuredSurface, Record]]:
     return [(s, r) for s, r in found if r is not None and r.outcome.metrics]
 
 
-def no_folding(evidence: Evidence, inspections: Inspections) -> Claim:
+def no_folding(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that CEM's maps have no folds, before they are repaired and after."""
     found = cem_records(evidence)
     after = {s: r.outcome.metrics.get("flipped_triangles") for s, r in found}
     before = {s: r.outcome.folded_before_repair for s, r in found}
     counted = {s: number for s, number in before.items() if number is not None}
     clean = [s for s in after if after[s] == 0 and not before[s]]
-    return Claim(
-        "no-folding",
-        "no folding would occur even when the geometry of the surface is a bit complicated",
-        "Section 5, on Fig. 2",
-        "Every triangle's image by CEM has positive area, on every surface of the run, without the "
-        "repair of folds that cembench adds.",
-        f"Before the repair, {_folds(counted)}; in the maps that are compared, {_folds(after)}.",
-        verdict_of(len(clean), len(found)),
-        f"{tested_on([s for s, _ in found])} The paper shows it on Left Hand. Negative weights "
-        "can fold a triangle; patches around the folds are then laid out again, for all methods "
-        "alike.",
+    figures = (
+        f"Before the repair, {_folds(counted)}; in the maps that are compared, {_folds(after)}."
     )
+    return Found(len(clean), len(found), figures, [s for s, _ in found])
 
 
 def _folds(counts: Mapping[MeasuredSurface, float | None]) -> str:
@@ -55,7 +43,7 @@ def _folds(counts: Mapping[MeasuredSurface, float | None]) -> str:
     return told + (f" ({listed})" if listed else "")
 
 
-def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
+def angles_preserved(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that CEM's maps preserve angles."""
     found = cem_records(evidence)
     errors = [r.outcome.metrics.get("angle_error_mean_deg") for _, r in found]
@@ -67,20 +55,10 @@ def angles_preserved(evidence: Evidence, inspections: Inspections) -> Claim:
         if known
         else "No map by CEM in this run."
     )
-    return Claim(
-        "angles-preserved",
-        "The checkerboard patterns in figures 3-7 indicate that the conformal parameterizations "
-        "computed by CEM algorithm preserve angles",
-        "Section 5",
-        "The mean angular distortion is below 5 degrees, which the paper's worst model (Chinese "
-        "Vase, 4.50) meets.",
-        words,
-        verdict_of(small, len(known)),
-        f"{tested_on([s for s, _ in found])} The pictures are in this report; the bound is ours.",
-    )
+    return Found(small, len(known), words, [s for s, _ in found])
 
 
-def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
+def below_one_degree(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that most angular distortions of the paper's faces are below one degree."""
     series = evidence.series_of(REFERENCE)
     label = series.label if series else ""
@@ -89,58 +67,42 @@ def below_one_degree(evidence: Evidence, inspections: Inspections) -> Claim:
         for surface in evidence.surfaces
         if label in inspections[surface.mesh_hash].angles
     }
-    named = {s: share for s, share in shares.items() if s.paper_row in MODELS}
+    faces = evidence.paper.plotted("angle_histograms").models
+    named = {s: share for s, share in shares.items() if s.paper_row in faces}
     held = sum(share > 0.5 for share in named.values())
     every = sum(share > 0.5 for share in shares.values())
     listed = "; ".join(f"{s.title}: {share:.1%}" for s, share in named.items())
-    return Claim(
-        "below-one-degree",
-        "As shown in Fig. 9, most of the angular distortions are less than one degree",
-        "Section 5, on Fig. 9",
-        "On each of the four faces of Fig. 9 more than half of the corners change by less than one "
-        "degree; recomputed from the stored maps.",
-        (listed or "None of the four faces is in this run")
-        + f". This holds on {every} of all {len(shares)} surfaces of the run.",
-        verdict_of(held, len(named)),
-        tested_on(list(named)),
+    figures = (listed or "None of the four faces is in this run") + (
+        f". This holds on {every} of all {len(shares)} surfaces of the run."
     )
+    return Found(held, len(named), figures, list(named))
 
 
-def energy_similar(evidence: Evidence, inspections: Inspections) -> Claim:
+def energy_similar(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that the energies of FDM, LDM and CEM are similar."""
-    return _similar(
-        evidence, "energy-similar", "conformal_energy", "the conformal energy", "figures 11 and 12"
-    )
+    return _similar(evidence, "conformal_energy")
 
 
-def deviation_similar(evidence: Evidence, inspections: Inspections) -> Claim:
+def deviation_similar(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that the standard deviations by FDM, LDM and CEM are similar."""
-    what = "the standard deviation of the angular distortions"
-    return _similar(evidence, "deviation-similar", "angle_error_sd_deg", what, "Fig. 12")
+    return _similar(evidence, "angle_error_sd_deg")
 
 
-def _similar(evidence: Evidence, name: str, metric: str, what: str, figure: str) -> Claim:
+def _similar(evidence: Evidence, metric: str) -> Found:
     found = _triples(evidence, metric)
     spreads = {s: max(values) / min(values) - 1 for s, values in found.items() if min(values) > 0}
     held = sum(spread <= SIMILAR for spread in spreads.values())
     worst = max(spreads, key=lambda s: spreads[s], default=None)
-    return Claim(
-        name,
-        "both the conformal energy and the standard deviation of angular distortions produced by "
-        f"FDM, LDM and CEM are similar [here: {what}]",
-        f"Section 5, on {figure}",
-        f"On each model the largest of the three is within {SIMILAR:.0%} of the smallest.",
+    figures = (
         f"{held} of {len(spreads)} models; the widest apart is {worst.title}: "
         f"{spreads[worst]:.0%}, the median {float(np.median(list(spreads.values()))):.1%}"
         if worst
-        else "No model with all three in this run.",
-        verdict_of(held, len(spreads)),
-        f"{tested_on(list(spreads))} The meaning of 'similar' is our reading."
-        + _reading_of_fdm(evidence),
+        else "No model with all three in this run."
     )
+    return Found(held, len(spreads), figures, list(spreads), remark=_reading_of_fdm(evidence))
 
 
-def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim:
+def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that the mean distortions of FDM and LDM are slightly better than CEM's."""
     found = _triples(evidence, "angle_error_mean_deg")
     better, held = 0, 0
@@ -150,19 +112,13 @@ def means_slightly_better(evidence: Evidence, inspections: Inspections) -> Claim
         gaps.append(gap)
         better += fdm <= cem and ldm <= cem
         held += fdm <= cem and ldm <= cem and gap <= SIMILAR
-    return Claim(
-        "means-slightly-better",
-        "the mean of angular distortions by FDM and LDM are slightly better than that of CEM",
-        "Section 5, on Fig. 12",
-        "On each model both means are not above CEM's, and CEM's is within "
-        f"{SIMILAR:.0%} of the smaller.",
+    figures = (
         f"both not above CEM's on {better} of {len(found)} models, and close on {held}; CEM's is "
         f"{float(np.median(gaps)):+.1%} from the better one in the median"
         if gaps
-        else "No model with all three in this run.",
-        verdict_of(held, len(found)),
-        tested_on(list(found)),
+        else "No model with all three in this run."
     )
+    return Found(held, len(found), figures, list(found))
 
 
 def _reading_of_fdm(evidence: Evidence) -> str:
@@ -174,11 +130,11 @@ def _reading_of_fdm(evidence: Evidence) -> str:
         return ""
     where = "" if all(public) else f" on {sum(public)} of {len(public)} surfaces"
     return (
-        f" FDM is its authors' public program{where}, which turns the map by a + b/2 where the "
+        f"FDM is its authors' public program{where}, which turns the map by a + b/2 where the "
         "middle (a + b)/2 of an edge is meant: the figures printed for the paper's models contain "
         "that error."
         if any(public)
-        else " FDM is the corrected reading; the printed figures contain a slip of its authors' "
+        else "FDM is the corrected reading; the printed figures contain a slip of its authors' "
         "public program, which fdm.public_program=true reproduces."
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,38 +12,27 @@ from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.core.notices import Notice, NoticeKind, of_kind
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
-from cembench.report.content.claims.verdicts import tested_on, verdict_of
+from cembench.report.content.claims import Found, Inspections
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.inspection import Inspection
-from cembench.report.document import Claim
 
-Inspections = Mapping[str, Inspection]
 #: Rounding tolerance for points outside a convex hull of size 1.
 ROUNDING = 1e-12
 #: Maximum number of vertices for the dense eigenvalues of K.
 DENSE = 3_000
+NO_SURFACE = f"This run stores no surface of at most {DENSE:,} vertices."
 
 
-def delaunay(evidence: Evidence, inspections: Inspections) -> Claim:
+def delaunay(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the premise that the meshes are Delaunay."""
     surfaces = evidence.surfaces
     good = [s for s in surfaces if s.non_delaunay_share == 0]
     odd = [f"{s.title}: {s.non_delaunay_share:.1%}" for s in surfaces if s.non_delaunay_share]
-    return Claim(
-        "delaunay",
-        "Hereafter, we suppose that M is a well-conditioned Delaunay triangulation mesh",
-        "Section 2",
-        "No interior edge has opposite angles that sum to more than 180 degrees: all off-diagonal "
-        "entries of L are negative or zero.",
-        f"{len(good)} of {len(surfaces)} surfaces of the run"
-        + (f"; edges that are not Delaunay: {'; '.join(odd)}" if odd else ""),
-        verdict_of(len(good), len(surfaces)),
-        f"{tested_on(surfaces)} Stand-ins are made Delaunay on purpose. On the paper's own models "
-        "Nefertiti, Chinese Lion and Human Brain about 4 to 5 % of the edges are not.",
-    )
+    figures = f"{len(good)} of {len(surfaces)} surfaces of the run"
+    figures += f"; edges that are not Delaunay: {'; '.join(odd)}" if odd else ""
+    return Found(len(good), len(surfaces), figures, surfaces)
 
 
-def well_conditioned(evidence: Evidence, inspections: Inspections) -> Claim:
+def well_conditioned(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that meshes satisfy Definition 1."""
     notices: dict[str, tuple[Notice, ...]] = {}
     for record in evidence.records:
@@ -53,20 +42,13 @@ def well_conditioned(evidence: Evidence, inspections: Inspections) -> Claim:
     }
     broken = {title: found for title, found in bad.items() if found}
     n = len(evidence.surfaces)
-    return Claim(
-        "well-conditioned",
-        "In practical applications, the triangular meshes of the simply-connected open surfaces "
-        "are usually well-conditioned as in Definition 1",
-        "Section 4, before Corollary 1",
-        "Each surface satisfies (i) to (iv) of Definition 1.",
-        f"{n - len(broken)} of {n} surfaces of the run"
-        + "".join(f"; {title}: {', '.join(map(str, found))}" for title, found in broken.items()),
-        verdict_of(n - len(broken), n),
-        tested_on(evidence.surfaces),
+    figures = f"{n - len(broken)} of {n} surfaces of the run" + "".join(
+        f"; {title}: {', '.join(map(str, found))}" for title, found in broken.items()
     )
+    return Found(n - len(broken), n, figures, evidence.surfaces)
 
 
-def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Claim:
+def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Found:
     """Test that K is positive and 1 is its simple, largest eigenvalue (Corollary 1)."""
     held, tested = 0, []
     parts = []
@@ -81,17 +63,7 @@ def iteration_matrix(evidence: Evidence, inspections: Inspections) -> Claim:
         parts.append(
             f"{surface.title}: rho = {first:.12f}, next {second:.6f}, least entry {smallest:.1e}"
         )
-    return Claim(
-        "iteration-matrix",
-        "rho(K) = 1 is the largest eigenvalue of K with algebraic multiplicity one, and all the "
-        "other eigenvalues are strictly smaller than 1 in modulus",
-        "Corollary 1; K is positive by Theorem 2",
-        f"All eigenvalues of K (Eq. 27) on every surface of the run with at most {DENSE:,} "
-        "vertices, and the sign of its entries.",
-        "; ".join(parts) or f"This run stores no surface of at most {DENSE:,} vertices.",
-        verdict_of(held, len(tested)),
-        tested_on(tested),
-    )
+    return Found(held, len(tested), "; ".join(parts) or NO_SURFACE, tested)
 
 
 def spectrum_of_iteration(mesh: TriangleMesh) -> tuple[float, float, float]:
@@ -119,7 +91,7 @@ def _small_disks(evidence: Evidence) -> Iterator[tuple[MeasuredSurface, Triangle
             yield surface, mesh
 
 
-def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
+def convex_hull(evidence: Evidence, inspections: Inspections) -> Found:
     """Test that K maps boundary points into their convex hull (Remark 4)."""
     out: dict[MeasuredSurface, float] = {}
     for surface, mesh in _small_disks(evidence):
@@ -127,18 +99,7 @@ def convex_hull(evidence: Evidence, inspections: Inspections) -> Claim:
         out[surface] = largest_escape(K)
     held = sum(escape <= ROUNDING for escape in out.values())
     listed = "; ".join(f"{s.title}: {escape:.1e}" for s, escape in out.items())
-    return Claim(
-        "convex-hull",
-        "the matrix K, defined as in Theorem 2, maps all the entries of a vector f to their "
-        "convex hull",
-        "Remark 4",
-        "For points on the unit circle and a hundred random sets, no image is outside their "
-        "convex hull by more than rounding; the largest distance is given.",
-        listed or f"This run stores no surface of at most {DENSE:,} vertices.",
-        verdict_of(held, len(out)),
-        f"{tested_on(list(out))} It follows from K > 0 and K 1 = 1, so it can fail where a weight "
-        "is negative.",
-    )
+    return Found(held, len(out), listed or NO_SURFACE, list(out))
 
 
 def largest_escape(K: NDArray[np.float64], sets: int = 100) -> float:
@@ -157,7 +118,7 @@ def largest_escape(K: NDArray[np.float64], sets: int = 100) -> float:
     return float(max(escape.max() for escape in found))
 
 
-def other_weights(evidence: Evidence, inspections: Inspections) -> Claim:
+def other_weights(evidence: Evidence, inspections: Inspections) -> Found:
     """Test that Corollary 1 holds for any positive weights (Remark 5)."""
     held, tested, parts = 0, [], []
     for surface, mesh in _small_disks(evidence):
@@ -172,18 +133,8 @@ def other_weights(evidence: Evidence, inspections: Inspections) -> Claim:
         parts.append(
             f"{surface.title}: next eigenvalue {', '.join(f'{second:.4f}' for *_, second in found)}"
         )
-    return Claim(
-        "other-weights",
-        "Corollary 1 can be generalized to the Laplacian matrix of weighted graphs with positive "
-        "weights that satisfies the conditions (i)-(iv) in Definition 1",
-        "Remark 5",
-        "K > 0, its largest eigenvalue 1 and all others smaller, with the weight 1 on every edge "
-        "(Tutte) and with random weights from 0.01 to 100, on each small surface that satisfies "
-        "Definition 1.",
-        "; ".join(parts) or f"This run stores no such surface of at most {DENSE:,} vertices.",
-        verdict_of(held, len(tested)),
-        tested_on(tested),
-    )
+    none = f"This run stores no such surface of at most {DENSE:,} vertices."
+    return Found(held, len(tested), "; ".join(parts) or none, tested)
 
 
 def _positive_laplacians(mesh: TriangleMesh) -> Iterator[sparse.csc_array]:
@@ -196,7 +147,7 @@ def _positive_laplacians(mesh: TriangleMesh) -> Iterator[sparse.csc_array]:
         yield sparse.csc_array(sparse.diags_array(W.sum(axis=0)) - W)
 
 
-def circular_holes(evidence: Evidence, inspections: Inspections) -> Claim:
+def circular_holes(evidence: Evidence, inspections: Inspections) -> Found:
     """Test that the generalized CEM maps surfaces with holes to a disk with circular holes."""
     found = [
         (r, float(off))
@@ -208,15 +159,7 @@ def circular_holes(evidence: Evidence, inspections: Inspections) -> Claim:
     exhibits = [e.title for e in evidence.exhibits if e.figure in ("Figure 1", "Figure 7")]
     shown = f" The exhibits show it: {', '.join(exhibits)}." if exhibits else ""
     listed = "; ".join(f"{r.cell.mesh} / {r.title}: {off:.1e}" for r, off in found)
-    return Claim(
-        "circular-holes",
-        "the generalized CEM algorithm is aimed to find a conformal map f that maps M to a unit "
-        "disk with circular holes",
-        "Section 3.3",
-        "Every boundary's image is within 1 % of its radius from a circle.",
-        (listed or "No algorithm for surfaces with holes in this run.") + shown,
-        verdict_of(round_, len(found)),
-        tested_on(
-            [s for s in evidence.surfaces if s.mesh_hash in {r.cell.mesh_hash for r, _ in found}]
-        ),
-    )
+    figures = (listed or "No algorithm for surfaces with holes in this run.") + shown
+    hashes = {r.cell.mesh_hash for r, _ in found}
+    surfaces = [s for s in evidence.surfaces if s.mesh_hash in hashes]
+    return Found(round_, len(found), figures, surfaces)

@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cembench.report.content.averages import (
-    COMPARED,
-    STATED_RATE,
-    STATED_SAVING,
     geometric_rate,
     mean_rate,
     mean_saving,
     percent,
     saving_of_mean,
 )
-from cembench.report.content.claims.verdicts import (
-    OURS,
-    lacking_words,
-    tested_on,
-    timed_verdict,
-    under,
-    verdict_of,
-)
+from cembench.report.content.claims import Found, Inspections, lacking_words, under
 from cembench.report.content.evidence import REFERENCE, Evidence
-from cembench.report.content.inspection import Inspection
-from cembench.report.document import Claim, Verdict
-from cembench.results import paper
 from cembench.results.columns import significant
 from cembench.results.comparison import Comparison, compare, seconds_interval
 from cembench.results.many import sign_test
 from cembench.results.records import DEFAULT_ROUNDS
 
-Inspections = Mapping[str, Inspection]
 #: A figure agrees with the paper's if it reaches this share of it.
 ABOUT = 0.9
 
@@ -69,7 +55,7 @@ class _Compared:
 def _compared(evidence: Evidence) -> Iterator[_Compared]:
     """Yield each algorithm under each policy that was measured with CEM on some model."""
     for policy in evidence.policies:
-        for algorithm in COMPARED:
+        for algorithm in evidence.paper.compared:
             series = evidence.series_of(algorithm)
             records = [
                 evidence.find(surface, series, policy) if series else None
@@ -88,8 +74,8 @@ def _tally(
     evidence: Evidence,
     holds: Callable[[str, list[float]], bool],
     told: Callable[[list[float]], str],
-) -> tuple[str, Verdict]:
-    """Return the figures of the average rates, and the verdict on them."""
+) -> Found:
+    """Return what the average rates are, and for how many algorithms a claim holds."""
     found = list(_compared(evidence))
     words = [
         f"{c.label}: {told(c.rates) if c.rates else 'no average'} (n = {len(c.rates)}"
@@ -98,11 +84,12 @@ def _tally(
     ]
     held = sum(holds(c.algorithm, c.rates) for c in found if c.rates)
     lacking = sum(c.lacking for c in found)
-    verdict = timed_verdict(held, sum(bool(c.rates) for c in found), lacking)
-    return "; ".join(words) or "No pair of times in this run.", verdict
+    figures = "; ".join(words) or "No pair of times in this run."
+    tested = sum(bool(c.rates) for c in found)
+    return Found(held, tested, figures, evidence.one_per_model, lacking)
 
 
-def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
+def always_faster(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that CEM is faster than QIEM, FDM and LDM on every model."""
     found = list(_compared(evidence))
     parts = []
@@ -115,96 +102,60 @@ def always_faster(evidence: Evidence, inspections: Inspections) -> Claim:
     rows = [
         evidence.row(record)
         for record in evidence.records
-        if record.cell.algorithm in COMPARED and record.mesh.paper_row
+        if record.cell.algorithm in evidence.paper.compared and record.mesh.paper_row
     ]
     sure = sum(row["verdict_corrected"] == "slower" for row in rows)
-    return Claim(
-        "always-faster",
-        "According to Table 2, CEM algorithm always has a better efficiency than QIEM/FDM/LDM",
-        "Section 5, below Eq. (33)",
-        "The rate of speedup (Eq. 33) is above 0 for every model and each of the three algorithms, "
-        "and so is its 95 % interval.",
-        (
-            f"rates surely above 0: {'; '.join(parts)}. When corrected for all comparisons of the "
-            f"run (Holm), the interval excludes equality in {sure} cells."
-        )
+    figures = (
+        f"rates surely above 0: {'; '.join(parts)}. When corrected for all comparisons of the "
+        f"run (Holm), the interval excludes equality in {sure} cells."
         if parts
-        else "No pair of times in this run.",
-        timed_verdict(
-            sum(c.faster for c in found),
-            sum(len(c.rates) for c in found),
-            sum(c.lacking for c in found),
-        ),
-        f"{tested_on(evidence.one_per_model)} {OURS} An interval needs {DEFAULT_ROUNDS} rounds.",
+        else "No pair of times in this run."
+    )
+    return Found(
+        sum(c.faster for c in found),
+        sum(len(c.rates) for c in found),
+        figures,
+        evidence.one_per_model,
+        sum(c.lacking for c in found),
+        f"An interval needs {DEFAULT_ROUNDS} rounds.",
     )
 
 
-def average_rates(evidence: Evidence, inspections: Inspections) -> Claim:
+def average_rates(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that the average rates of speedup are 8.5 / 17.2 / 4.1."""
-    found, verdict = _tally(
+    return _tally(
         evidence,
-        lambda algorithm, rates: mean_rate(rates) >= ABOUT * STATED_RATE[algorithm],
+        lambda algorithm, rates: (
+            mean_rate(rates) >= ABOUT * evidence.paper.stated["rate"][algorithm]
+        ),
         lambda rates: f"mean {mean_rate(rates):.1f}, geometric {geometric_rate(rates):.1f}",
     )
-    return Claim(
-        "average-rates",
-        "with the average rate of the speedup 8.5/17.2/4.1",
-        "Section 5, below Eq. (33)",
-        f"The arithmetic mean of the rates, as the paper takes it, reaches {ABOUT:.0%} of the "
-        "stated value for each algorithm; the geometric mean is given too.",
-        found,
-        verdict,
-        f"{tested_on(evidence.one_per_model)} {OURS} "
-        "In print the geometric means are 6.8 / 12.4 / 3.5, "
-        "and n is 20 / 18 / 20.",
-    )
 
 
-def average_savings(evidence: Evidence, inspections: Inspections) -> Claim:
+def average_savings(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that CEM saves 89 / 94 / 80 % of the time."""
-    found, verdict = _tally(
+    return _tally(
         evidence,
-        lambda algorithm, rates: saving_of_mean(rates) >= ABOUT * STATED_SAVING[algorithm],
+        lambda algorithm, rates: (
+            saving_of_mean(rates) >= ABOUT * evidence.paper.stated["saving"][algorithm]
+        ),
         lambda rates: (
             f"{percent(saving_of_mean(rates))} of the mean rate, "
             f"{percent(mean_saving(rates))} on average"
         ),
     )
-    return Claim(
-        "average-savings",
-        "CEM algorithm saves about 89%/94%/80% of the computational time of QIEM/FDM/LDM in "
-        "average",
-        "Section 5, below Eq. (33)",
-        f"1 - 1/(1 + mean rate), as the paper takes it, reaches {ABOUT:.0%} of the stated value.",
-        found,
-        verdict,
-        f"{tested_on(evidence.one_per_model)} {OURS} "
-        "The mean of the savings on each model, which the "
-        "words suggest, is 83 / 89 / 73 % in print.",
-    )
 
 
-def more_than_80_percent(evidence: Evidence, inspections: Inspections) -> Claim:
+def more_than_80_percent(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that CEM saves more than 80 % of the cost on average."""
-    found, verdict = _tally(
+    return _tally(
         evidence,
         lambda _, rates: mean_saving(rates) > 0.8,
         lambda rates: percent(mean_saving(rates)),
     )
-    return Claim(
-        "more-than-80-percent",
-        "saves more than 80% of computational cost on average",
-        "Section 5, summary",
-        "The mean over the models of 1 - t_CEM / t is above 80 % for each of the three algorithms.",
-        found,
-        verdict,
-        f"{tested_on(evidence.one_per_model)} {OURS} "
-        "By the printed times themselves this mean is 83 / "
-        "89 / 73 %: for LDM it does not reach 80 %.",
-    )
 
 
-def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
+def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that CEM maps more than 100,000 triangles in less than a second."""
     series = evidence.series_of(REFERENCE)
     times: list[tuple[float, str, int, str]] = []
@@ -228,26 +179,18 @@ def less_than_one_second(evidence: Evidence, inspections: Inspections) -> Claim:
         if smallest
         else "No time on a surface of more than 100,000 triangles in this run"
     ) + f"{lacking_words(lacking, len(times))}."
-    return Claim(
-        "less-than-one-second",
-        "a conformal parameterization can be computed in less than one second for a mesh model of "
-        "more than 100,000 triangular elements by CEM algorithm",
-        "Section 7",
-        "CEM takes less than a second on the smallest surface above 100,000 triangles ('can be'); "
-        "it need not on all larger ones.",
-        words,
-        timed_verdict(int(bool(smallest and smallest[0] < 1)), int(bool(times)), lacking),
-        f"{OURS} The head of the report describes the machine.",
-    )
+    held = int(bool(smallest and smallest[0] < 1))
+    return Found(held, int(bool(times)), words, None, lacking)
 
 
-def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
+def table_2_follows(evidence: Evidence, inspections: Inspections) -> Found:
     """Test whether the printed Table 2 follows from the printed Table 1."""
     agree, tested, odd = 0, 0, []
-    for model, times in paper.table(1).items():
-        for algorithm in COMPARED:
+    paper = evidence.paper
+    for model, times in paper.tables[1].items():
+        for algorithm in evidence.paper.compared:
             other, ours = times[algorithm], times[REFERENCE]
-            printed = paper.table(2)[model][algorithm]
+            printed = paper.tables[2][model][algorithm]
             if other is None or ours is None or printed is None:
                 continue
             tested += 1
@@ -258,15 +201,9 @@ def table_2_follows(evidence: Evidence, inspections: Inspections) -> Claim:
                 odd.append(
                     f"{model} / {algorithm.upper()}: {printed}, by Table 1 {other / ours - 1:.2f}"
                 )
-    spread = float(np.mean([r["fdm"] or 0 for r in paper.table(2).values() if r["fdm"]]))
-    return Claim(
-        "table-2-follows",
-        "The rate of speedup of CEM algorithm with respect to QIEM, FDM, and LDM, defined by "
-        "Eq. (33)",
-        "Table 2",
-        "Each printed rate agrees with the printed seconds to within their rounding.",
+    spread = float(np.mean([r["fdm"] or 0 for r in paper.tables[2].values() if r["fdm"]]))
+    figures = (
         f"{agree} of {tested} cells agree; not: {'; '.join(odd) or 'none'}. With the misprint the "
-        f"mean over FDM would be {spread:.2f}.",
-        verdict_of(agree, tested),
-        "This concerns the printed tables only; nothing measured is used.",
+        f"mean over FDM would be {spread:.2f}."
     )
+    return Found(agree, tested, figures)

@@ -2,15 +2,10 @@ import pytest
 
 from cembench import DiskMesh, RegistryError, surface_family
 from cembench.registry import Registry, load_registry
-from cembench.results import paper
-from cembench.results.paper.profiles import (
-    Profile,
-    algorithms_of,
-    as_elsewhere,
-    as_printed,
-    models,
-    surfaces_of,
-)
+from cembench.results.papers import find_paper
+from cembench.results.profiles import Profile, algorithms_of, models, surfaces_of
+
+PAPER = find_paper("cem")
 
 
 def registry_of(rows):
@@ -24,7 +19,7 @@ def registry_of(rows):
     return Registry({}, {name: declared(name, row) for name, row in rows.items()})
 
 
-ALL = {f"stand-in-{k}": model for k, model in enumerate(sorted(paper.table(1)))} | {"plain": ""}
+ALL = {f"stand-in-{k}": model for k, model in enumerate(sorted(PAPER.models))} | {"plain": ""}
 
 
 @pytest.mark.parametrize(
@@ -56,20 +51,4 @@ def test_quick_takes_the_paper_s_algorithms_and_the_others_all():
     known = load_registry()
     assert algorithms_of(Profile.quick, known) == ["qiem", "fdm", "ldm", "cem"]
     assert algorithms_of(Profile.paper, known) == known.usual_algorithms
-    assert set(paper.ALGORITHMS) < set(paper.table(1)["Foot"])
-
-
-def test_on_the_paper_s_own_models_fdm_is_the_public_program():
-    cem, fdm = (load_registry().algorithm(name) for name in ("cem", "fdm"))
-    assert fdm.arguments({})["public_program"] is False
-    assert as_printed("model", [cem, fdm]) == {"fdm.public_program": True}
-    assert as_printed("model", [cem]) == {}
-    for origin in ("stand-in", "surface"):
-        assert as_printed(origin, [cem, fdm]) == {}
-
-
-def test_a_parameter_as_printed_is_undone_and_others_stay():
-    usual = {"public_program": False, "tolerance": 1e-3}
-    assert as_elsewhere("fdm", {"public_program": True, "tolerance": 1e-3}) == usual
-    assert as_elsewhere("fdm", usual) == usual
-    assert as_elsewhere("cem", {"public_program": True}) == {"public_program": True}
+    assert set(PAPER.algorithms) < set(PAPER.tables[1]["Foot"])

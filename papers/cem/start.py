@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,15 +14,13 @@ from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.conformal.metrics import angle_errors
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.content.claims.verdicts import tested_on, verdict_of
+from cembench.report.content.claims import Found, Inspections
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.inspection import Inspection
-from cembench.report.document import Claim
 
-Inspections = Mapping[str, Inspection]
 Complex = NDArray[np.complex128]
 #: Maximum number of vertices of surfaces on which the initial map is recomputed.
 MOST_VERTICES = 20_000
+NO_DISK = f"This run stores no disk of at most {MOST_VERTICES:,} vertices."
 #: Solutions are equal if they differ by less, relative to their size.
 SAME = 1e-8
 #: Share of the triangles that count as near p, and their minimum number.
@@ -92,7 +90,7 @@ def _disks(evidence: Evidence) -> Iterator[tuple[MeasuredSurface, TriangleMesh]]
             yield surface, mesh
 
 
-def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
+def any_index(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that any vertex can be pinned (Theorem 1)."""
     off: dict[MeasuredSurface, float] = {}
     for surface, mesh in _disks(evidence):
@@ -101,22 +99,15 @@ def any_index(evidence: Evidence, inspections: Inspections) -> Claim:
         first, *others = (pinned(Solved(), L, rhs, k) for k in indices)
         off[surface] = max(apart(first, f) for f in others)
     held = sum(value <= SAME for value in off.values())
-    return Claim(
-        "any-index",
-        "the linear system Lf = b in (13) can be reduced into a nonsingular one by removing the "
-        "k-th entries ... Here the index k can be chosen as any number",
-        "Theorem 1",
-        "The last, the first and the middle vertex, one of the pole's and one of the boundary give "
-        f"the same map up to a constant, within {SAME:g} of its size.",
+    figures = (
         f"true on {held} of {len(off)} surfaces; the largest difference is {max(off.values()):.1e}"
         if off
-        else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
-        verdict_of(held, len(off)),
-        tested_on(list(off)),
+        else NO_DISK
     )
+    return Found(held, len(off), figures, list(off))
 
 
-def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
+def schur_complement(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that (21) gives the same as (18) with more work."""
     off: dict[MeasuredSurface, float] = {}
     less, work = 0, ""
@@ -131,23 +122,15 @@ def schur_complement(evidence: Evidence, inspections: Inspections) -> Claim:
             f"solved, (21) {other.factorisations} and {other.columns}"
         )
     same = sum(value <= SAME for value in off.values())
-    return Claim(
-        "schur-start",
-        "the linear systems (18) and (21) are mathematically equivalent. However ... solving Eq. "
-        "(18) is slightly more efficient than Eq. (21)",
-        "Section 3.1, below Eq. (21)",
-        f"Both give the same map up to a constant, within {SAME:g} of its size; and (18) factors "
-        "no more matrices and solves for fewer columns: counted, not timed.",
+    figures = (
         f"the same on {same} of {len(off)} surfaces, at most {max(off.values()):.1e} apart{work}"
         if off
-        else f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
-        verdict_of(min(same, less), len(off)),
-        f"{tested_on(list(off))} (21) is solved by Woodbury's formula, as the paper says it can "
-        "be: three columns, of orders that differ by two.",
+        else NO_DISK
     )
+    return Found(min(same, less), len(off), figures, list(off))
 
 
-def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
+def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Found:
     """Test the claim that the distortion of map (12) is large near p and small at the boundary."""
     ratios: dict[MeasuredSurface, tuple[float, float]] = {}
     for surface, mesh in _disks(evidence):
@@ -157,20 +140,7 @@ def distortion_near_pole(evidence: Evidence, inspections: Inspections) -> Claim:
         f"{s.title}: {near:.1f} near p, {rim:.2f} at the boundary"
         for s, (near, rim) in ratios.items()
     )
-    return Claim(
-        "distortion-near-p",
-        "the angular distortion of the map f in (12) is relatively large around the neighborhood "
-        "of p ... so that the angular distortion is relatively small on the boundary",
-        "Section 3.1, below Eq. (12)",
-        f"In degrees, the mean over the {NEAR:.0%} of the triangles nearest to p (at least "
-        f"{LEAST_NEAR}) is above that over the triangles at the boundary.",
-        listed or f"This run stores no disk of at most {MOST_VERTICES:,} vertices.",
-        verdict_of(held, len(ratios)),
-        f"{tested_on(list(ratios))} On a flat disk with p in its middle Eq. (11) with the natural "
-        "boundary has the solution 1 / z + conj(z), whose |mu| is |z|^2: conformal at p, where "
-        "only the mesh is too coarse for a pole, and a fold at the boundary. It is the boundary's "
-        "image alone that is right there, and all that CEM takes from it.",
-    )
+    return Found(held, len(ratios), listed or NO_DISK, list(ratios))
 
 
 def distortion_near_pole_and_boundary(mesh: TriangleMesh) -> tuple[float, float]:

@@ -1,0 +1,1 @@
+"""The papers that ship with cembench, one folder each."""

@@ -1,0 +1,163 @@
+"""A paper is read from its folder, and what is wrong in one is said with its file and place."""
+
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from cembench.core.errors import RegistryError
+from cembench.results import papers as module
+from cembench.results.papers import NO_PAPER, find_paper, paper_of, papers, read_paper, usual_paper
+
+FILES = {
+    "paper.toml": """
+title = "On maps"
+authors = "A. Author"
+place = "Journal 1 (2020)"
+doi = "10.1/x"
+algorithms = ["lscm", "cem"]
+reference = "cem"
+machine = "a laptop"
+""",
+    "tables.toml": """
+[[tables]]
+number = 1
+file = "seconds.csv"
+title = "seconds"
+caption = "On {machine}."
+""",
+    "seconds.csv": "model,faces,lscm,cem\nFoot,100,0.5,0.25\nHand,200,,0.5\n",
+    "claims.toml": """
+[words]
+ours = "Ours."
+
+[[claims]]
+name = "quick"
+quote = "cem is quick"
+place = "Section 1"
+test = "Less than a second."
+check = "checks:quick"
+remark = "{ours} Really."
+""",
+    "checks.py": "from .more import LIMIT\ndef quick(evidence, inspections):\n    return LIMIT\n",
+    "more.py": "LIMIT = 1\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+def test_a_paper_is_read_from_its_folder_with_its_checks(folder):
+    paper = find_paper(str(folder))
+    assert (paper.models, paper.faces("Hand"), paper.compared) == (("Foot", "Hand"), 200, ("lscm",))
+    assert paper.tables[1]["Hand"] == {"faces": 200, "lscm": None, "cem": 0.5}
+    assert paper.printed[1].caption == "On a laptop."
+    assert paper.claims[0].remark == "Ours. Really."
+    assert paper.check(paper.claims[0])(None, {}) == 1
+    assert paper.profiles.quick == 8
+    with pytest.raises(ValueError, match="frozen"):
+        paper.title = "Another"
+
+
+def test_cembench_s_own_paper_is_installed_and_the_usual_one():
+    assert papers()["cem"] is find_paper("cem") is usual_paper() is paper_of("Knit Cap Man")
+    assert paper_of("no such model") is NO_PAPER
+    assert paper_of("") is NO_PAPER
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "told"),
+    [
+        ("paper.toml", "title", "titel", r"paper.toml: title: field required; allowed are title, "),
+        ("paper.toml", "machine", "speed", r"paper.toml: speed: extra inputs .*; allowed are"),
+        ("paper.toml", "reference =", "reference", r"paper.toml is not TOML: .*line 7"),
+        (
+            "paper.toml",
+            '"cem"\n',
+            '"fdm"\n',
+            r"'fdm' is none of the paper's algorithms \(lscm, cem",
+        ),
+        ("tables.toml", "number = 1", "", "tables.toml: tables: needs a number and the name of a"),
+        ("tables.toml", '"seconds.csv"', '"s.csv"', r"s\.csv of a paper cannot be read: No such"),
+        ("tables.toml", "[[tables]]", "[tables]", r"tables: write each as a table \[\[tables\]\]"),
+        ("tables.toml", "{machine}", "{laptop}", r"\{'laptop'\} is no word of \[words\]; known: m"),
+        ("tables.toml", "title =", "heading =", "tables.toml: printed.1.title: field required"),
+        ("seconds.csv", "0.5,0.25", "fast,0.25", "tables.1.Foot.lscm: input should be a valid num"),
+        ("seconds.csv", "0.5,0.25", "0.25", "seconds.csv: line 2: 3 cells, under 4 headings"),
+        ("seconds.csv", "Hand", "Foot", "seconds.csv: line 3: the model 'Foot' occurs twice"),
+        ("seconds.csv", "faces", "triangles", "no table has the column 'faces' for 'Foot'"),
+        ("claims.toml", "checks:quick", "quick", "claim 'quick': check 'quick' is not module:func"),
+        ("claims.toml", "place", "plase", "claims.toml: claims.0.place: field required"),
+    ],
+)
+def test_what_is_wrong_in_a_paper_is_said_with_its_place(folder, file, old, new, told):
+    text = (folder / file).read_text()
+    assert old in text
+    (folder / file).write_text(text.replace(old, new))
+    with pytest.raises(RegistryError, match=told) as error:
+        read_paper(folder)
+    assert str(error.value).endswith("Repair it; papers/cem is an example.")
+
+
+ERRATUM = """
+[[errata]]
+table = 1
+model = "Foot"
+column = "fdm"
+reason = "a slip"
+"""
+PICTURE = """
+[[pictures]]
+figure = "Figure 1"
+model = "Nose"
+"""
+
+
+@pytest.mark.parametrize(
+    ("file", "more", "told"),
+    [
+        ("tables.toml", FILES["tables.toml"], "table 1 occurs twice"),
+        ("tables.toml", ERRATUM, "errata: table 1 has no cell 'fdm' of 'Foot'"),
+        ("claims.toml", FILES["claims.toml"].partition("\n\n")[2], "claim 'quick': occurs twice"),
+        ("paper.toml", PICTURE, "model 'Nose': no printed table has it; known: Foot, Hand"),
+    ],
+)
+def test_parts_of_a_paper_that_do_not_fit_are_said(folder, file, more, told):
+    (folder / file).write_text((folder / file).read_text() + more)
+    with pytest.raises(RegistryError, match=told):
+        read_paper(folder)
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        ("def slow(): pass", "checks.py has no function 'quick'; a check is module:function"),
+        ("import no_such_module", "module 'checks' cannot be imported: ModuleNotFoundError"),
+    ],
+)
+def test_a_check_that_is_not_there_is_said(folder, source, told):
+    (folder / "checks.py").write_text(source)
+    paper = read_paper(folder)
+    with pytest.raises(RegistryError, match=told):
+        paper.check(paper.claims[0])
+
+
+def test_a_name_that_is_no_paper_is_said(tmp_path):
+    with pytest.raises(RegistryError, match="'dem' is neither an installed paper nor a folder; in"):
+        find_paper("dem")
+    with pytest.raises(RegistryError, match=r"paper.toml of a paper cannot be read: No such file"):
+        find_paper(str(tmp_path))
+
+
+def test_an_entry_point_that_is_no_folder_is_said(monkeypatch):
+    entry = EntryPoint("bad", "json.decoder", module.GROUP)
+    monkeypatch.setattr(module, "entry_points", lambda **_: [entry])
+    papers.cache_clear()
+    try:
+        with pytest.raises(RegistryError, match=r"bad = 'json.decoder' .* is not the package of a"):
+            papers()
+    finally:
+        papers.cache_clear()
