@@ -22,12 +22,25 @@ Output = Annotated[
 ]
 
 
+PaperName = Annotated[
+    str | None,
+    typer.Option(
+        "--paper",
+        metavar="NAME|FOLDER",
+        help="The paper whose tables and claims it has: an installed one, or its folder.",
+    ),
+]
 #: Processes that draw, at most: each holds a surface with its maps.
 MOST_DRAWING = 2
 
 
 def report(
-    run: Run = DEFAULT_RUN, *, output: Output = None, verify: Verify = False, as_json: Json = False
+    run: Run = DEFAULT_RUN,
+    *,
+    output: Output = None,
+    paper: PaperName = None,
+    verify: Verify = False,
+    as_json: Json = False,
 ) -> None:
     """Write a report of a run: the paper's tables, figures and claims, as measured.
 
@@ -35,7 +48,7 @@ def report(
     report.tex, and each table, figure and its data as separate files. The four
     tables are printed here too.
     """
-    written, folder = make_report(run, output, verify=verify)
+    written, folder = make_report(run, output, paper=paper, verify=verify)
     if as_json:
         print_json(summary(written, folder))
     else:
@@ -43,19 +56,27 @@ def report(
 
 
 def make_report(
-    run: Path, output: Path | None, command: str = "", *, verify: bool = False
+    run: Path,
+    output: Path | None,
+    command: str = "",
+    *,
+    paper: str | None = None,
+    verify: bool = False,
 ) -> tuple[Report, Path]:
     """Write a report with progress on standard error; return the report and its folder."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from cembench.report.write_report import write_report
+    from cembench.results.papers import find_paper
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
     from cembench.running.environment import usable_cores
 
+    asked = find_paper(paper) if paper else None
     sound_records(Store(run), Depth.everything if verify else Depth.sample)
     folder = output or run / "report"
     told = f"cembench report {run}" + (f" -o {output}" if output else "")
+    told += f" --paper {paper}" if paper else ""
     bar = Progress(
         BarColumn(20), MofNCompleteColumn(), TextColumn("{task.description}", markup=False),
         console=err, transient=True,
@@ -69,7 +90,8 @@ def make_report(
                 err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
 
         jobs = min(usable_cores(), MOST_DRAWING)
-        return write_report(run, folder, command or told, progress, jobs=jobs), folder
+        told = command or told
+        return write_report(run, folder, told, progress, jobs=jobs, paper=asked), folder
 
 
 def show_report(report: Report, folder: Path) -> None:

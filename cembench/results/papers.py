@@ -15,7 +15,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -175,12 +175,12 @@ class Paper(_Part):
         """The algorithms that the reference is compared with."""
         return tuple(a for a in self.algorithms if a != self.reference)
 
-    @cached_property
+    @property
     def models(self) -> tuple[str, ...]:
         """The models of the tables, in the paper's order."""
         return tuple(dict.fromkeys(model for rows in self.tables.values() for model in rows))
 
-    @cached_property
+    @property
     def misprints(self) -> Mapping[tuple[int, str, str], str]:
         """The reason for each misprinted cell, by table, model and column."""
         return {(one.table, one.model, one.column): one.reason for one in self.errata}

@@ -116,10 +116,12 @@ def build_report(
 def is_of_the_paper(evidence: Evidence) -> bool:
     """Whether a run was made for the paper, and not over surfaces of the user's own.
 
-    It was if all of its surfaces are models of the paper or stand-ins for them, or, with a stand-in
-    among them, more than half. Nine meshes of which eight are public models of the paper are the
-    user's own run: it has no claims, and no gaps for the other models.
+    It was if the paper is asked for, or all of its surfaces are models of the paper or stand-ins
+    for them, or, with a stand-in among them, more than half. Nine meshes of which eight are public
+    models of the paper are the user's own run: it has no claims, and no gaps for other models.
     """
+    if evidence.asked is not None:
+        return True
     models, others = len(evidence.models), len(evidence.others)
     has_stand_in = any(surface.origin == "stand-in" for surface in evidence.models)
     return models > others if has_stand_in else not others
@@ -205,9 +207,11 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
 
 def _tables(evidence: Evidence) -> Section:
     items: list[Item] = []
-    for make in (table_1, work_tables, table_2, table_3, table_4):
-        items += make(evidence)
-    return Section("tables", "Tables 1 to 4", tuple(items))
+    numbers = sorted(evidence.paper.tables)
+    for number, make in ((1, table_1), (0, work_tables), (2, table_2), (3, table_3), (4, table_4)):
+        if number in (0, *numbers):
+            items += make(evidence)
+    return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
 
 
 def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
@@ -227,8 +231,10 @@ def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Sect
         gaps += lacking
     items += _drawn([cost_by_faces(evidence)], folder)
     items.append(exponents_table(evidence))
-    if evidence.models:
-        items += _drawn([energy_over_models(evidence), angles_over_models(evidence)], folder)
+    over_models = (("energy", energy_over_models), ("angles", angles_over_models))
+    for name, plot_of in over_models:
+        if evidence.models and f"{name}_over_models" in evidence.paper.plots:
+            items += _drawn([plot_of(evidence)], folder)
     gaps += exhibit_gaps(evidence)
     return Section("figures", "Figures of the paper", (*items, *gaps))
 
