@@ -27,6 +27,14 @@ Tables = Annotated[
     list[Path],
     typer.Option("--tables", help="A TOML file that declares more tables. Repeatable."),
 ]
+PaperName = Annotated[
+    str | None,
+    typer.Option(
+        "--paper",
+        metavar="NAME|FOLDER",
+        help="The paper whose tables and claims it has: an installed one, or its folder.",
+    ),
+]
 #: Processes that draw, at most: each holds a surface with its maps.
 MOST_DRAWING = 2
 
@@ -36,6 +44,7 @@ def report(
     *,
     output: Output = None,
     tables: Tables = [],  # noqa: B006 - typer copies defaults
+    paper: PaperName = None,
     verify: Verify = False,
     as_json: Json = False,
 ) -> None:
@@ -46,7 +55,7 @@ def report(
     tables are printed here too. --tables adds tables of your own; docs/tables.md
     says how they are declared.
     """
-    written, folder = make_report(run, output, tables=tables, verify=verify)
+    written, folder = make_report(run, output, tables=tables, paper=paper, verify=verify)
     if as_json:
         print_json(summary(written, folder))
     else:
@@ -59,20 +68,24 @@ def make_report(
     command: str = "",
     *,
     tables: Sequence[Path] = (),
+    paper: str | None = None,
     verify: bool = False,
 ) -> tuple[Report, Path]:
     """Write a report with progress on standard error; return the report and its folder."""
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
     from cembench.report.write_report import write_report
+    from cembench.results.papers import find_paper
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
     from cembench.running.environment import usable_cores
 
+    asked = find_paper(paper) if paper else None
     sound_records(Store(run), Depth.everything if verify else Depth.sample)
     folder = output or run / "report"
     told = f"cembench report {run}" + (f" -o {output}" if output else "")
     told += "".join(f" --tables {file}" for file in tables)
+    told += f" --paper {paper}" if paper else ""
     bar = Progress(
         BarColumn(20), MofNCompleteColumn(), TextColumn("{task.description}", markup=False),
         console=err, transient=True,
@@ -86,8 +99,9 @@ def make_report(
                 err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
 
         jobs = min(usable_cores(), MOST_DRAWING)
-        written = write_report(run, folder, command or told, progress, jobs=jobs, tables=tables)
-        return written, folder
+        told = command or told
+        more = {"jobs": jobs, "tables": tables, "paper": asked}
+        return write_report(run, folder, told, progress, **more), folder
 
 
 def show_report(report: Report, folder: Path) -> None:

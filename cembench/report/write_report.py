@@ -30,6 +30,7 @@ from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv
 from cembench.report.shared_drawing import shared_drawing
+from cembench.results.papers import Paper
 
 
 def write_report(
@@ -40,10 +41,12 @@ def write_report(
     *,
     jobs: int = 1,
     tables: Sequence[Path] = (),
+    paper: Paper | None = None,
 ) -> Report:
     """Write the report of a run in all its forms; `jobs` processes draw its pictures and plots.
 
-    `tables` are files with declarations of more tables (:mod:`cembench.report.declared`).
+    `tables` are files with declarations of more tables (:mod:`cembench.report.declared`). `paper`
+    is the one it is of; default: the one with most rows of the run.
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -56,12 +59,12 @@ def write_report(
     MissingExtra
         A package for reports is not installed.
     RecordError
-        The folder `run` holds no run, or no record; `folder` holds files that are not a report's
-        or were changed since, or cannot be written.
+        The folder `run` holds no run, no record, or no model of the paper; `folder` holds files
+        that are not a report's or were changed since, or cannot be written.
 
     """
     require(Extra.REPORT, "a report")
-    evidence = Evidence.of(run)
+    evidence = Evidence.of(run, paper)
     more = further_tables(evidence, tables)
     folders.check(folder, "report")
     try:

@@ -15,7 +15,7 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
@@ -146,13 +146,19 @@ class HowRun(_Part):
 
 
 class StatedClaim(_Part):
-    """A sentence of the paper with its test: a check is ``module:function`` of the folder."""
+    """A sentence of the paper with its test.
+
+    That is an expression (:mod:`cembench.results.frame`), which `holds` for the maps of a surface
+    by `algorithms`, or a `check`, which is ``module:function`` of the folder.
+    """
 
     name: str
     quote: str
     place: str
     test: str
-    check: str
+    check: str = ""
+    holds: str = ""
+    algorithms: tuple[str, ...] = ()
     remark: str = ""
 
 
@@ -195,12 +201,19 @@ class Paper(_Part):
         """The algorithms that the reference is compared with."""
         return tuple(a for a in self.algorithms if a != self.reference)
 
-    @cached_property
+    @property
     def models(self) -> tuple[str, ...]:
         """The models of the tables, in the paper's order."""
         return tuple(dict.fromkeys(model for rows in self.tables.values() for model in rows))
 
-    @cached_property
+    def table_of(self, column: str) -> int | None:
+        """Return the number of the printed table with this column of the frame, if any."""
+        return next(
+            (n for n, table in self.printed.items() if column in {f.column for f in table.figures}),
+            None,
+        )
+
+    @property
     def misprints(self) -> Mapping[tuple[int, str, str], str]:
         """The reason for each misprinted cell, by table, model and column."""
         return {(one.table, one.model, one.column): one.reason for one in self.errata}
@@ -357,7 +370,10 @@ def _check(paper: Paper) -> None:
         where = f"claim {claim.name!r}"
         if names.count(claim.name) > 1:
             raise _wrong(paper.folder / "claims.toml", where, "occurs twice")
-        if not all(claim.check.partition(":")):
+        if bool(claim.holds) == bool(claim.check) or bool(claim.holds) != bool(claim.algorithms):
+            what = 'it needs either "check", or "holds" and "algorithms"'
+            raise _wrong(paper.folder / "claims.toml", where, what)
+        if claim.check and not all(claim.check.partition(":")):
             what = f"check {claim.check!r} is not module:function"
             raise _wrong(paper.folder / "claims.toml", where, what)
 

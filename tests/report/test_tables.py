@@ -6,7 +6,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.policies import policies_table
 from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.surface_page import figures_table
-from cembench.report.content.table_2 import averages_table, measured_rates, table_2
+from cembench.report.content.table_2 import averages_table, measured_rates, rates_tables
 from cembench.report.declared import declared_table
 from cembench.report.document import marked
 from cembench.results.columns import significant
@@ -143,7 +143,7 @@ def test_aggregates_run_over_what_was_measured_and_say_their_n(evidence):
     table = averages_table(evidence, "reuse")
     counts = table.rows[-1]
     assert [v.number for v in counts[1:]] == [None, 20, 1, 1, None, 18, 2, 2, None, 20, 2, 2]
-    footer = by_name(table_2(evidence))["table-2"].rows[-1]
+    footer = by_name(rates_tables(evidence, 2))["table-2"].rows[-1]
     assert footer[0].text == "n, surfaces counted"
     assert [v.number for v in footer[2:]] == [2, 1, 2, 2, 2, 2]
 
@@ -212,14 +212,14 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
     rates, models = measured_rates(evidence, "ldm", "reuse")
     assert dict(zip(models, rates, strict=True))["Liu's Neutral Face"] == pytest.approx(7.0)
     assert len(models) == len(set(models)) == 2
-    table = by_name(table_2(evidence))["table-2"]
+    table = by_name(rates_tables(evidence, 2))["table-2"]
     assert len(table.rows) - table.footer_rows == 3
     _, counted = entry(table, "n, surfaces counted", "LDM", "here")
     assert counted.number == 2
 
 
 def test_how_sure_the_speedups_are_alone_together_and_over_surfaces(evidence):
-    tables = by_name(table_2(evidence))
+    tables = by_name(rates_tables(evidence, 2))
     table = tables["sure-speedups"]
     by_title = {
         (column.group, column.title): [row[k] for row in table.rows]

@@ -54,7 +54,7 @@ READINGS = (
 
 
 def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = None) -> list[float]:
-    """Return Table 2's rates for these models (default: all), misprints replaced from Table 1."""
+    """Return the printed rates for these models (default: all), misprints from the seconds."""
     rates = []
     for model in paper.models if models is None else models:
         rate = corrected_rate(paper, model, algorithm)
@@ -64,9 +64,10 @@ def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = N
 
 
 def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:
-    """Return a rate of Table 2, or for a misprint the one that follows from Table 1."""
-    if (2, model, algorithm) not in paper.misprints:
-        return paper.tables[2][model][algorithm]
-    times = paper.tables[1][model]
-    ours, theirs = times[paper.reference], times[algorithm]
+    """Return a printed rate, or for a misprint the one that follows from the printed seconds."""
+    rates, seconds = paper.table_of("rate"), paper.table_of("seconds")
+    if rates is not None and (rates, model, algorithm) not in paper.misprints:
+        return paper.tables[rates][model][algorithm]
+    times = paper.tables[seconds][model] if seconds is not None else {}
+    ours, theirs = times.get(paper.reference), times.get(algorithm)
     return None if ours is None or theirs is None else theirs / ours - 1

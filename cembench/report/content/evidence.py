@@ -88,7 +88,8 @@ class Evidence:
     Raises
     ------
     RecordError
-        Raised by :meth:`of` if the folder holds no run, or a run without records.
+        Raised by :meth:`of` if the folder holds no run, or a run without records or without a
+        model of the paper.
 
     """
 
@@ -102,7 +103,7 @@ class Evidence:
 
     @classmethod
     def of(cls, run: Path, paper: Paper | None = None) -> Evidence:
-        """Read a run."""
+        """Read a run, to be told of beside this paper; default: the one with most rows in it."""
         store = Store(run)
         records = store.records()
         if not records:
@@ -112,7 +113,13 @@ class Evidence:
             )
         kept = _latest(records)
         exhibits = tuple(read_exhibits(run))
-        return cls(store, tuple(kept), exhibits, len(records) - len(kept), paper)
+        found = cls(store, tuple(kept), exhibits, len(records) - len(kept), paper)
+        if paper is not None and not found.models:
+            raise RecordError(
+                f"no surface of {run} is, or stands in for, a model of {paper.title!r}; its models "
+                f"are {', '.join(paper.models)}. Leave --paper out, or name another."
+            )
+        return found
 
     @cached_property
     def paper(self) -> Paper:

@@ -38,7 +38,8 @@ def findings(
     field = field_of(evidence, evidence.policies[0])
     sentences: list[Sentence] = []
     if claims:
-        sentences = [(claim_of_the_paper(evidence),), verdicts_counted(claims)]
+        stated = [(claim_of_the_paper(evidence),)] if evidence.paper.stated else []
+        sentences = [*stated, verdicts_counted(claims)]
     told = field_words(field) if field else ["No map to the disk to compare."]
     if claims and field:
         told[0] = _beside_the_paper(evidence.paper.algorithms, field, told[0])

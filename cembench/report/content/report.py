@@ -32,7 +32,7 @@ from cembench.report.content.many.worst import hardest
 from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
-from cembench.report.content.table_2 import table_2
+from cembench.report.content.table_2 import rates_tables
 from cembench.report.declared import declared_table
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
@@ -113,10 +113,12 @@ def build_report(
 def is_of_the_paper(evidence: Evidence) -> bool:
     """Whether a run was made for the paper, and not over surfaces of the user's own.
 
-    It was if all of its surfaces are models of the paper or stand-ins for them, or, with a stand-in
-    among them, more than half. Nine meshes of which eight are public models of the paper are the
-    user's own run: it has no claims, and no gaps for the other models.
+    It was if the paper is asked for, or all of its surfaces are models of the paper or stand-ins
+    for them, or, with a stand-in among them, more than half. Nine meshes of which eight are public
+    models of the paper are the user's own run: it has no claims, and no gaps for other models.
     """
+    if evidence.asked is not None:
+        return True
     models, others = len(evidence.models), len(evidence.others)
     has_stand_in = any(surface.origin == "stand-in" for surface in evidence.models)
     return models > others if has_stand_in else not others
@@ -201,14 +203,18 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
 
 
 def _tables(evidence: Evidence) -> Section:
-    items: list[Item] = [
-        *printed_tables(evidence, 1),
-        *work_tables(evidence),
-        *table_2(evidence),
-        *printed_tables(evidence, 3),
-        *printed_tables(evidence, 4),
-    ]
-    return Section("tables", "Tables 1 to 4", tuple(items))
+    """Return the paper's tables, each comparison of seconds with its averages and certainty."""
+    printed = evidence.paper.printed
+    items: list[Item] = []
+    for number in sorted(printed):
+        if printed[number].compares:
+            items += rates_tables(evidence, number)
+        else:
+            items += printed_tables(evidence, number)
+        if any(figure.column == "seconds" for figure in printed[number].figures):
+            items += work_tables(evidence)
+    numbers = sorted(evidence.paper.tables)
+    return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
 
 
 def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
@@ -228,8 +234,10 @@ def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Sect
         gaps += lacking
     items += _drawn([cost_by_faces(evidence)], folder)
     items.append(exponents_table(evidence))
-    if evidence.models:
-        items += _drawn([energy_over_models(evidence), angles_over_models(evidence)], folder)
+    over_models = (("energy", energy_over_models), ("angles", angles_over_models))
+    for name, plot_of in over_models:
+        if evidence.models and f"{name}_over_models" in evidence.paper.plots:
+            items += _drawn([plot_of(evidence)], folder)
     gaps += exhibit_gaps(evidence)
     return Section("figures", "Figures of the paper", (*items, *gaps))
 

@@ -20,11 +20,11 @@ from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.document import Column, Table, Value, count, missing, words
 
 
-def table_2(evidence: Evidence) -> list[Table]:
+def rates_tables(evidence: Evidence, number: int) -> list[Table]:
     """Return the rates of speedup and their averages in both readings, for each policy."""
     found: list[Table] = []
     for policy in evidence.policies:
-        found += printed_table(evidence, 2, policy)
+        found += printed_table(evidence, number, policy)
         found += [averages_table(evidence, policy)] if evidence.models else []
         found += sure_speedups(evidence, policy)
     return found

@@ -54,8 +54,8 @@ def printed_points(paper: Paper, algorithm: str) -> list[Point]:
     """Return (faces, seconds, model) from the paper's Table 1."""
     return [
         Point(paper.faces(model), seconds, model)
-        for model, row in paper.tables[1].items()
-        if (seconds := row[algorithm]) is not None
+        for model, row in paper.tables.get(1, {}).items()
+        if (seconds := row.get(algorithm)) is not None
     ]
 
 

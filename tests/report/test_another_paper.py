@@ -1,0 +1,74 @@
+"""A second paper, given as a folder: its report has its tables, pictures and claims."""
+
+from pathlib import Path
+
+import pytest
+
+from cembench.core.errors import RecordError
+from cembench.report.content.evidence import Evidence
+from cembench.report.document import Claim, Gap, figures_of, plain, sections_of, tables_of
+from cembench.report.write_report import write_report
+from cembench.results.papers import find_paper
+
+FOLDER = Path(__file__).parents[1] / "papers/another"
+PAPER = find_paper(str(FOLDER))
+
+
+@pytest.fixture(scope="module")
+def report(small_run, tmp_path_factory):
+    return write_report(small_run, tmp_path_factory.mktemp("another"), "c", paper=PAPER)
+
+
+def test_a_paper_costs_few_lines():
+    files = [file for file in FOLDER.iterdir() if file.is_file()]
+    assert sum(len(file.read_text().splitlines()) for file in files) <= 60
+
+
+def test_its_title_tables_and_misprints_are_there(report):
+    assert report.title == "Maps onto Circles: its claims, tables and figures, measured"
+    assert report.paper == PAPER.citation
+    tables = {table.name: table for table in tables_of(report)}
+    assert {"table-1", "table-3"} <= tables.keys()
+    assert not {"table-2", "table-4", "averages"} & tables.keys()
+    table = tables["table-1"]
+    assert table.caption.startswith("What the paper printed is for programs on a machine of their")
+    groups = {column.group for column in table.columns}
+    assert groups == {"", "Harmonic", "CEM", "CEM iterations"}
+    assert table.absent == "not in this run: Teapot"
+    printed = {row[0].text: row[2].text for row in table.rows if row[2].origin == "printed"}
+    assert printed == {"Chinese Vase": "0.50", "Liu's Neutral Face": "0.60"}
+    assert any(section.title == "Tables 1 to 3" for _, section in sections_of(report))
+
+
+def test_its_claims_have_verdicts(report):
+    items = [item for _, section in sections_of(report) for item in section.items]
+    claims = {item.name: item for item in items if isinstance(item, Claim)}
+    assert list(claims) == ["lower-energy", "small-angles"]
+    assert claims["lower-energy"].verdict == "holds"
+    assert claims["lower-energy"].figures.startswith("true on ")
+    assert claims["small-angles"].verdict == "does not hold here"
+    assert "Chinese Vase" in claims["small-angles"].figures
+    assert claims["small-angles"].remark.endswith("Not much of a claim.")
+    told = plain(report.findings.sentences[0])
+    assert told.startswith("Of 2 claims of the paper, 1 does not hold here: small angles; 1 holds")
+
+
+def test_its_pictures_are_there_and_no_other_paper_s(report):
+    assert "Figure 1" in {figure.paper for figure in figures_of(report)}
+    items = [item for _, section in sections_of(report) for item in section.items]
+    gaps = [item.title for item in items if isinstance(item, Gap)]
+    assert not any(title.startswith("Figure") for title in gaps)
+
+
+def test_a_run_without_any_of_its_models_is_said(small_run):
+    paper = PAPER.model_copy(update={"tables": {1: {"Teapot": {"faces": 900}}}, "title": "Pots"})
+    with pytest.raises(RecordError, match=r"model of 'Pots'; its models are Teapot\. Leave"):
+        Evidence.of(small_run, paper)
+
+
+def test_the_command_takes_a_folder(cli, small_run):
+    told = cli("report", small_run, "-o", "out", "--paper", FOLDER, "--json")[1]
+    assert '"title": "Maps onto Circles: its claims' in told
+    code, _, error = cli("report", small_run, "-o", "out", "--paper", "nowhere")
+    assert code == 2
+    assert "neither an installed paper nor a folder" in " ".join(error.split())
