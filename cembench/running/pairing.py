@@ -73,4 +73,4 @@ class Scatter:
             return f"{told}the time is not enough for the {first} rounds that an interval takes"
         width = self.half_width(first, pairs=pairs)
         those = "each cell" if bought == len(prices) else f"about {bought} of {len(prices)} cells"
-        return f"{told}{first} rounds of {those} make ratios certain to about ±{width:.1%}"
+        return f"{told}{first} rounds of {those} make ratios certain to ±{width:.1%} at best"

@@ -35,8 +35,8 @@ def test_the_scatter_between_processes_is_told_from_that_within_one():
     ("seconds", "said"),
     [
         (10.0, "the time is not enough for the 7 rounds that an interval takes"),
-        (30.0, "7 rounds of about 1 of 2 cells make ratios certain to about ±"),
-        (200.0, "7 rounds of each cell make ratios certain to about ±"),
+        (30.0, "7 rounds of about 1 of 2 cells make ratios certain to ±"),
+        (200.0, "7 rounds of each cell make ratios certain to ±"),
     ],
 )
 def test_a_run_says_of_how_many_cells_there_will_be_intervals(seconds, said):
@@ -102,7 +102,7 @@ def test_where_processes_scatter_most_algorithms_share_one_and_the_run_says_what
     tasks = many()
     records = run_tasks(tasks, Store(tmp_path), options, listening, with_calls(Scattering))
     assert "within one process of each round" in listening.said[0]
-    assert "7 rounds of each cell make ratios certain to about" in listening.said[0]
+    assert "7 rounds of each cell make ratios certain to ±" in listening.said[0]
     by_name = {r.cell.algorithm: r for r in records if r.cell.mesh == "100"}
     for name in ("lscm", "fdm", "ldm"):
         found = compare(by_name[name], by_name["cem"])
