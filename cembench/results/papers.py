@@ -382,15 +382,20 @@ def _wrong(file: Path, where: str, what: str) -> RegistryError:
     return RegistryError(f"{file}: {where}: {what}. {REMEDY}")
 
 
+def _read_text(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise RegistryError(f"{file} of a paper cannot be read: {why}. {REMEDY}") from error
+
+
 def _read_toml(file: Path, *, optional: bool = False) -> dict[str, Any]:
     if optional and not file.exists():
         return {}
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        why = error.strerror or error
-        raise RegistryError(f"{file} of a paper cannot be read: {why}. {REMEDY}") from error
-    except ValueError as error:  # not TOML, or not UTF-8
+        return tomllib.loads(_read_text(file))
+    except tomllib.TOMLDecodeError as error:
         raise RegistryError(f"{file} is not TOML: {error}. {REMEDY}") from error
 
 
@@ -404,10 +409,7 @@ def _entries(file: Path, read: Mapping[str, Any], name: str) -> list[dict[str, A
 
 def _read_table(file: Path) -> dict[str, dict[str, str | None]]:
     """Return the rows of a CSV file by its first column; empty cells are None."""
-    try:
-        lines = list(csv.reader(file.read_text(encoding="utf-8").splitlines()))
-    except (OSError, ValueError) as error:
-        raise RegistryError(f"{file} of a paper cannot be read: {error}. {REMEDY}") from error
+    lines = list(csv.reader(_read_text(file).splitlines()))
     header, *rows = lines or [[]]
     found: dict[str, dict[str, str | None]] = {}
     for k, row in enumerate(rows, 2):
