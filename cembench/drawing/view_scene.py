@@ -1,8 +1,11 @@
 """The data for the interactive viewer of a page: one compressed block of bytes per surface.
 
-The block is gzip of: the length of the head (uint32), the head (JSON), and arrays one after another
-in the order that the head lists them, little-endian, each at a multiple of four bytes. Coordinates
-are integers from 0 to 65535 within a box. Distortions take one byte per triangle.
+The block is gzip of: the length of the head (uint32, little-endian), the head (JSON), and arrays
+one after another in the order that the head lists them. Coordinates and distortions are integers
+from 0 to the steps in the head, of a box or a scale. To be small, vertices and triangles are in an
+order that has neighbours together, and an array holds differences: from another array (a map from
+the first one), or from the row before. They are modulo 256^k and stored byte by byte: the lowest
+bytes of all entries, then the next ones.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from cembench.conformal.beltrami import dilatations
 from cembench.conformal.metrics import angle_errors
@@ -28,11 +33,13 @@ Complex = NDArray[np.complex128]
 #: Most triangles of a surface; larger ones are simplified.
 MOST = 50_000
 #: Triangles of all surfaces on one page together, to keep it small; each gets some.
-TOGETHER, LEAST = 200_000, 5_000
+TOGETHER, LEAST = 120_000, 5_000
 #: Ends of the colour scales: degrees, abs(mu), and powers of two of the area scaling.
 DEGREES, MU, DOUBLINGS = 10.0, 0.3, 6.0
-#: Up to this many maps, image coordinates are float32, for detail inside fingers.
-FEW = 2
+#: Steps of coordinates of the surface, of its images, and of distortions.
+STEPS = {"V": 2**14 - 1, "uv": 2**16 - 1, "share": 2**6 - 1}
+#: Up to this many maps, image coordinates have finer steps, for detail inside fingers.
+FEW, FINER = 2, 2**24 - 1
 
 
 @dataclass(frozen=True)
@@ -86,41 +93,46 @@ def view_scene(
         The block; the same input gives the same bytes.
 
     """
-    chosen = _simplified(mesh, most)
+    chosen = _neighbours_together(_simplified(mesh, most))
     first = upright(mesh, maps[0].z)
+    steps = STEPS | ({"uv": FINER} if len(maps) <= FEW else {})
     head: dict[str, Any] = {
         "title": title,
         "triangles": mesh.m,
         "view": view_rotation(mesh).round(6).ravel().tolist(),
         "scales": {"degrees": DEGREES, "mu": MU, "doublings": DOUBLINGS},
+        "steps": steps,
         "maps": [],
         "arrays": [],
     }
     content = bytearray()
+    added: dict[str, NDArray[np.int64]] = {}
 
-    def add(name: str, values: NDArray[Any]) -> None:
-        kind = {"uint8": "u1", "uint16": "u2", "uint32": "u4", "float32": "f4"}[values.dtype.name]
-        head["arrays"].append([name, kind, values.size])
-        content.extend(values.astype(values.dtype.newbyteorder("<")).tobytes())
-        content.extend(bytes(-len(content) % 4))
+    def add(name: str, values: NDArray[Any], base: str = "") -> None:
+        added[name] = rows = values.astype(np.int64).reshape(len(values), -1)
+        size = -(-int(rows.max(initial=1)).bit_length() // 8)
+        head["arrays"].append([name, rows.size, rows.shape[1], size, base])
+        before = added[base] if base else np.vstack([np.zeros_like(rows[:1]), rows[:-1]])
+        difference = ((rows - before) % 256**size).astype("<u4").ravel()
+        content.extend(difference.view(np.uint8).reshape(-1, 4)[:, :size].T.tobytes())
 
     V = mesh.V[chosen.vertices]
-    low, extent = V.min(axis=0), float(np.ptp(V, axis=0).max()) or 1.0
+    extent = float(np.ptp(V, axis=0).max()) or 1.0
     head["box"] = (np.ptp(V, axis=0) / extent).tolist()
-    add("V", (65535 * (V - low) / extent).round().astype(np.uint16))
-    add("F", chosen.F.astype(np.uint16 if len(V) <= 65536 else np.uint32))
+    add("V", _stepped((V - V.min(axis=0)) / extent, steps["V"]))
+    add("F", chosen.F)
     for k, shown in enumerate(maps):
-        turned = rotated_to_match(shown.z, first)
-        add(f"uv{k}", _in_box(turned, chosen.vertices, precise=len(maps) <= FEW))
-        for name, values in _distortions(mesh, shown.z).items():
-            add(f"{name}{k}", values[chosen.origin])
+        image = _in_box(rotated_to_match(shown.z, first))[chosen.vertices]
+        add(f"uv{k}", _stepped(image, steps["uv"]), "uv0" if k else "")
+        for name, shares in _distortions(mesh, shown.z).items():
+            values = _stepped(shares[chosen.origin], steps["share"])
+            add(f"{name}{k}", values, f"{name}0" if k else "")
         folded = np.isin(chosen.origin, folded_triangles(shown.z, mesh.F))
-        add(f"folded{k}", np.flatnonzero(folded).astype(np.uint32))
+        add(f"folded{k}", np.flatnonzero(folded))
         head["maps"].append({"label": shown.label, "about": shown.about})
     described = json.dumps(head, separators=(",", ":")).encode()
-    described += b" " * (-len(described) % 4)
     block = np.uint32(len(described)).astype("<u4").tobytes() + described + bytes(content)
-    return gzip.compress(block, 6, mtime=0)
+    return gzip.compress(block, 9, mtime=0)
 
 
 @dataclass(frozen=True)
@@ -143,22 +155,29 @@ def _simplified(mesh: TriangleMesh, most: int) -> _Simplified:
     return _Simplified(vertices, F, origin) if len(F) else everything
 
 
-def _in_box(z: Complex, vertices: NDArray[np.int64], *, precise: bool) -> NDArray[Any]:
-    """Centre a map in the unit square; (2 k,) u then v."""
-    low = complex(z.real.min(), z.imag.min())
-    size = complex(np.ptp(z.real), np.ptp(z.imag))
-    extent = max(size.real, size.imag) or 1.0
-    moved = ((z - low - size / 2) / extent + (0.5 + 0.5j))[vertices]
-    columns = np.stack([moved.real, moved.imag], axis=1)
-    if precise:
-        return columns.astype(np.float32)
-    return np.asarray((65535 * columns.clip(0, 1)).round().astype(np.uint16))
+def _neighbours_together(chosen: _Simplified) -> _Simplified:
+    """Order vertices by neighbourhood (reverse Cuthill-McKee), and triangles by their vertices."""
+    start, end = chosen.F.ravel(), np.roll(chosen.F, 1, axis=1).ravel()
+    n = len(chosen.vertices)
+    edges = coo_array((np.ones(2 * start.size), (np.r_[start, end], np.r_[end, start])), (n, n))
+    order = reverse_cuthill_mckee(edges.tocsr(), symmetric_mode=True)
+    F = np.argsort(order)[chosen.F]
+    F = np.take_along_axis(F, (F.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    rows = np.lexsort(F.T[::-1])
+    return _Simplified(chosen.vertices[order], F[rows], chosen.origin[rows])
 
 
-def _distortions(mesh: TriangleMesh, z: Complex) -> dict[str, NDArray[np.uint8]]:
-    """Return each triangle's largest angle error, |mu| and area scaling as bytes.
+def _in_box(z: Complex) -> Real:
+    """Centre a map in the unit square; (n, 2)."""
+    points = np.stack([z.real, z.imag], axis=1)
+    low, size = points.min(axis=0), np.ptp(points, axis=0)
+    return np.asarray((points - low - size / 2) / (size.max() or 1.0) + 0.5)
 
-    The scaling is relative to the whole image; 128 means even.
+
+def _distortions(mesh: TriangleMesh, z: Complex) -> dict[str, Real]:
+    """Return each triangle's largest angle error, |mu| and area scaling, as shares of their scales.
+
+    The scaling is relative to the whole image; half means even.
     """
     P = mesh.V[mesh.F]
     area = np.linalg.norm(np.cross(P[:, 1] - P[:, 0], P[:, 2] - P[:, 0]), axis=1) / 2
@@ -168,11 +187,11 @@ def _distortions(mesh: TriangleMesh, z: Complex) -> dict[str, NDArray[np.uint8]]
         stretch = dilatations(z, mesh.F, mesh.V)
         mu = np.where(np.isfinite(stretch), (stretch - 1) / (stretch + 1), 1.0)
     return {
-        "angle": _byte(angle_errors(mesh, z).max(axis=1) / DEGREES),
-        "mu": _byte(mu / MU),
-        "area": _byte(0.5 + np.nan_to_num(scaling, neginf=-99, posinf=99) / (2 * DOUBLINGS)),
+        "angle": angle_errors(mesh, z).max(axis=1) / DEGREES,
+        "mu": mu / MU,
+        "area": 0.5 + np.nan_to_num(scaling, neginf=-99, posinf=99) / (2 * DOUBLINGS),
     }
 
 
-def _byte(share: Real) -> NDArray[np.uint8]:
-    return np.asarray((255 * share.clip(0, 1)).round().astype(np.uint8))
+def _stepped(share: Real, steps: int) -> NDArray[np.int64]:
+    return np.asarray((steps * share.clip(0, 1)).round().astype(np.int64))

@@ -119,6 +119,8 @@ class Figure:
         Text for readers who cannot see it.
     paper : str
         The paper's figure that it reproduces, e.g. "Figure 8"; empty for others.
+    record : str
+        Key of the record whose map it shows; empty for others.
 
     """
 
@@ -130,6 +132,7 @@ class Figure:
     plot: Mapping[str, Any] | None = None
     alternative: str = ""
     paper: str = ""
+    record: str = ""
 
 
 @dataclass(frozen=True)

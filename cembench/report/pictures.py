@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import gzip
 import io
 import re
 from collections.abc import Sequence
@@ -15,19 +16,20 @@ from scipy import ndimage
 
 from cembench.core.errors import RenderError
 
-#: Maximum pixels of all pictures of a page together: at 0.13 bytes each (for small pictures of
-#: meshes and checkerboards; large, smooth ones take half) about 2.5 MB, and a third more as text.
-PIXELS = 12_000_000
-#: Pixels along the longer side of a picture, and of a thumbnail.
-LONGEST, THUMBNAIL = 1600, 360
-#: WebP quality at which the edges of a checkerboard are still clean.
-QUALITY = 76
+#: Maximum pixels of all pictures of a page together: at 0.11 bytes each (for small pictures of
+#: meshes and checkerboards; large, smooth ones take half) about 0.9 MB, and a third more as text.
+PIXELS = 8_000_000
+#: Pixels along the longer side of a picture.
+LONGEST = 1600
+#: WebP quality at which the edges of a checkerboard are still clean, and of the transparency.
+QUALITY, ALPHA_QUALITY = 70, 30
 #: A pixel with all channels at least this bright is white background.
 WHITE = 234
 #: Isolated spots below this share of a picture are JPEG artefacts.
 SPECK = 2e-4
-#: Maximum bytes of an embedded vector graphic; one with many marks is larger than its pixels.
-VECTOR_BYTES = 55_000
+#: Maximum compressed bytes of an embedded vector graphic; one with many marks is larger than its
+#: pixels.
+VECTOR_BYTES = 40_000
 #: CSS pixels per unit of an SVG's size.
 _SVG_UNITS = {"pt": 4 / 3, "px": 1.0, "": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54}
 
@@ -40,16 +42,12 @@ _NO_PICTURE = (OSError, Image.DecompressionBombError)
 
 @dataclass(frozen=True)
 class Embedded:
-    """A picture as a data URI, with its width and height in pixels."""
+    """A picture as the text of an SVG or as a data URI, with its width and height in pixels."""
 
-    uri: str
     width: int
     height: int
-
-
-def data_uri(content: bytes, media_type: str) -> str:
-    """Return content as a data URI."""
-    return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
+    uri: str = ""
+    svg: str = ""
 
 
 def pixel_cap(sizes: Sequence[tuple[int, int]], budget: int = PIXELS) -> float:
@@ -85,7 +83,7 @@ def size_of(path: Path) -> tuple[int, int]:
         raise unreadable(path, error) from error
 
 
-def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool) -> Embedded:
+def embed_pixels(path: Path, cap: float, *, exact: bool) -> Embedded:
     """Return a PNG or JPEG as WebP of at most `cap` pixels; `exact` keeps the lines of plots clean.
 
     Raises
@@ -101,13 +99,15 @@ def embed_pixels(path: Path, cap: float, *, longest: int = LONGEST, exact: bool)
         raise unreadable(path, error) from error
     if not exact and "A" not in picture.getbands():
         picture = with_transparent_background(picture)
-    scale = min(1.0, longest / max(picture.size), (cap / (picture.width * picture.height)) ** 0.5)
+    scale = min(1.0, LONGEST / max(picture.size), (cap / (picture.width * picture.height)) ** 0.5)
     if scale < 1:
         smaller = (max(1, round(side * scale)) for side in picture.size)
         picture = picture.resize(tuple(smaller), Image.Resampling.LANCZOS)
     file = io.BytesIO()
-    picture.save(file, "WEBP", quality=QUALITY, lossless=exact, method=4)
-    return Embedded(data_uri(file.getvalue(), "image/webp"), picture.width, picture.height)
+    quality = {"quality": QUALITY, "alpha_quality": ALPHA_QUALITY}
+    picture.save(file, "WEBP", lossless=exact, method=4, **quality)
+    content = base64.b64encode(file.getvalue()).decode()
+    return Embedded(*picture.size, uri=f"data:image/webp;base64,{content}")
 
 
 def with_transparent_background(picture: Image.Image) -> Image.Image:
@@ -134,14 +134,14 @@ def embed_vector(path: Path) -> Embedded | None:
         content = path.read_bytes()
     except OSError as error:
         raise unreadable(path, error) from error
-    if len(content) > VECTOR_BYTES:
+    if len(gzip.compress(content)) > VECTOR_BYTES:
         return None
     head = re.search(r"<svg\b[^>]*>", content[:4000].decode(errors="replace"))
     sides = [_svg_side(head.group(0), side) for side in ("width", "height")] if head else [None]
     width, height = sides[0], sides[-1]
     if width is None or height is None:
         return None
-    return Embedded(data_uri(content, "image/svg+xml"), round(width), round(height))
+    return Embedded(round(width), round(height), svg=content.decode(errors="replace"))
 
 
 def _svg_side(head: str, side: str) -> float | None:

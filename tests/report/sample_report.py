@@ -72,7 +72,8 @@ def sample_report(folder):
             _key(s, a): {
                 "mesh": s,
                 "algorithm": a,
-                "status": "ok",
+                "title": a.upper(),
+                "status": "timeout" if (s, a) == (SURFACES[2], "fdm") else "ok",
                 "seconds": 0.1 * k + 0.0123,
                 "seconds_raw": [0.1, 0.2, 0.3],
                 "phases": {"laplacian": 0.01, "solves": 0.02},
@@ -102,7 +103,10 @@ def _own(surfaces):
         *(Column(a, group) for group in ("angle", "folds") for a in ALGORITHMS),
     )
     rows = tuple(
-        (Value(s), *(Value(f"{k + n}", k + n, "surface", _key(s, "cem")) for n in range(8)))
+        (
+            Value(s),
+            *(Value(f"{k + n}", k + n, "surface", _key(s, ALGORITHMS[n % 4])) for n in range(8)),
+        )
         for k, s in enumerate(surfaces)
     )
     return Table("own", "All surfaces", columns, rows)
@@ -210,6 +214,7 @@ def _page(folder, place, name):
                 f"{algorithm.upper()} on {name}",
                 (file,),
                 alternative=f"The disk of {name} under a checkerboard, mapped by {algorithm}",
+                record=_key(name, algorithm),
             )
         )
     scene = _scene() if place == 0 else b""

@@ -75,7 +75,8 @@ def test_of_few_rounds_no_winner_is_named(evidence):
     verdicts = [claim.verdict for claim in tested]
     assert verdicts[:4] == ["too few rounds"] * 4
     assert verdicts[4] != "too few rounds"  # of the printed tables alone
-    assert "4 have too few rounds" in words_of(findings(few, {}, tested))[1]
+    told = [Claim(f"claim-{k}", *4 * [""], verdict) for k, verdict in enumerate(verdicts)]
+    assert "4 have too few rounds" in words_of(findings(few, {}, told))[1]
 
 
 def test_a_run_in_which_nothing_ended_ok_names_nobody(evidence):
@@ -257,6 +258,7 @@ def test_variants_tried_on_fewer_surfaces_are_left_out_of_a_profile(tmp_path):
 
 def test_the_head_says_how_many_times_are_unstable(evidence):
     timed = sum(bool(record.outcome.rounds) for record in evidence.records)
-    last = words_of(findings(evidence, {}, []))[-1]
-    assert f" of {timed} times " in last
-    assert " unstable (95 % interval wider than 10% of the figure)" in last
+    times, ratios = words_of(findings(evidence, {}, []))[-2:]
+    assert f" of {timed} times " in times
+    assert " unstable (95 % interval wider than 10% of the figure)" in times
+    assert ratios.startswith("Ratios of two algorithms scatter by ")

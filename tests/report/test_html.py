@@ -1,11 +1,9 @@
 """The page of a report as text; how a browser shows it is in test_html_browser.py."""
 
 import base64
-import csv
 import dataclasses
 import gzip
 import hashlib
-import io
 import json
 import math
 from collections import Counter
@@ -24,7 +22,7 @@ from cembench.report.render import html
 from cembench.report.render.html import write_html
 from tests.report.sample_report import CITATION, HOSTILE, sample_report
 
-VOID = {"meta", "link", "img", "br"}
+VOID = {"meta", "link", "img", "br", "input"}
 
 
 class Page(HTMLParser):
@@ -57,6 +55,12 @@ class Page(HTMLParser):
         ]
 
 
+def store_of(page):
+    """What the page holds compressed."""
+    packed = page.all("script", id="store")[0]["words"]
+    return json.loads(gzip.decompress(base64.b64decode(packed)))
+
+
 def page_of(report, folder):
     return Page(write_html(report, folder).read_text())
 
@@ -80,7 +84,7 @@ def test_it_is_one_file_that_names_no_other_place(sample):
     for element in sample.elements:
         assert element.get("src", "data:").startswith("data:")
         target = element.get("href", "#")
-        beside = "class" in element and element["class"] == "beside"
+        beside = "beside" in element.get("class", "").split()
         cited = target == CITATION.address  # a link; nothing is loaded from there
         assert target.startswith(("#", "data:")) or cited or (beside and "://" not in target)
 
@@ -102,8 +106,9 @@ def test_every_link_within_leads_somewhere_and_no_anchor_stands_twice(sample):
     anchors = Counter(e["id"] for e in sample.elements if "id" in e)
     assert set(anchors.values()) == {1}
     inner = {e["href"][1:] for e in sample.all("a") if e["href"].startswith("#")}
-    assert inner <= set(anchors)
-    assert any(name.startswith("record-") for name in inner)
+    records = {f"record-{key}" for key in store_of(sample)["records"]}
+    assert inner <= set(anchors) | records
+    assert inner & records
 
 
 def test_the_head_has_the_paper_the_verdicts_linked_the_suspects_and_the_own_table(sample):
@@ -126,7 +131,7 @@ def test_it_has_a_language_a_title_and_words_for_every_picture(sample):
 
 def test_a_surface_named_like_code_is_only_words(sample):
     kinds = Counter(script.get("type", "code") for script in sample.all("script"))
-    assert kinds == {"code": 1, "application/json": 1, "text/plain": 2}  # Plotly, and a view
+    assert kinds == {"code": 1, "text/plain": 3}  # Plotly, a view, and what else is compressed
     assert any(HOSTILE in heading["words"] for heading in sample.all("h2"))
     assert not any("onerror" in e or "onclick" in e for e in sample.elements)
 
@@ -134,8 +139,9 @@ def test_a_surface_named_like_code_is_only_words(sample):
 def test_code_in_a_plot_stays_in_its_data(tmp_path):
     plot = {"data": [{"name": "</script><script>alert(1)</script>", "y": [1.0, math.nan]}]}
     page = page_of(report_of(Figure("f", "F", (), plot=plot)), tmp_path)
-    drawing = json.loads(page.all("script", type="application/json")[0]["words"])
-    assert drawing["data"] == [{"name": plot["data"][0]["name"], "y": [1.0, None]}]
+    assert store_of(page)["plots"]["f"]["data"] == [
+        {"name": plot["data"][0]["name"], "y": [1.0, None]}
+    ]
 
 
 def test_the_same_report_gives_the_same_bytes(tmp_path):
@@ -194,9 +200,39 @@ def test_a_number_links_to_its_record_if_the_report_holds_it(tmp_path):
     records = {"known": {"mesh": "x", "algorithm": "cem", "seconds": 1.0, "cause": None}}
     page = page_of(report_of(table, records=records), tmp_path)
     assert [a["href"] for a in page.all("a", **{"class": "figure-link"})] == ["#record-known"]
-    article = page.all("article", id="record-known")[0]
-    assert "seconds" in article["words"]
-    assert "cause" not in article["words"]
+    fields = store_of(page)["records"]["known"]["fields"]
+    assert ["seconds", [["", "1.0"]]] in fields
+    assert "cause" not in dict(fields)
+
+
+def test_keys_of_records_are_as_long_as_they_must_be_to_differ(tmp_path):
+    keys = ["0123456789ab" + end for end in ("cdef", "c012", "ffff")]
+    row = (Value("x"), *(Value("1", 1.0, "model", key) for key in keys))
+    records = {key: {"mesh": "x", "algorithm": key} for key in keys}
+    page = page_of(report_of(table_of("abc", row), records=records), tmp_path)
+    links = [a["href"] for a in page.all("a", **{"class": "figure-link"})]
+    assert links == [f"#record-{key[:14]}" for key in keys]
+
+
+def test_a_filter_offers_what_records_differ_in_and_knows_the_names_of_tables(tmp_path):
+    rows = [("lion-stand-in", "Lion", "cem", "CEM"), ("foot", None, "cem", "CEM")]
+    rows += [("foot", None, "bff", "BFF"), ("foot", None, "bff-igl", "BFF")]
+    columns = ("mesh", "paper_row", "algorithm", "title", "status")
+    records = {f"k{n}": dict(zip(columns, (*row, "ok"), strict=True)) for n, row in enumerate(rows)}
+    page = page_of(report_of(records=records), tmp_path)
+    boxes = [(box["name"], box["value"]) for box in page.all("input", type="checkbox")]
+    assert boxes == [
+        ("surface", "foot"),
+        ("surface", "Lion"),
+        ("algorithm", "BFF (bff)"),
+        ("algorithm", "BFF (bff-igl)"),
+        ("algorithm", "CEM"),
+    ]
+    store = store_of(page)
+    assert store["cells"] == {"k0": [1, 2, 0], "k1": [0, 2, 0], "k2": [0, 0, 0], "k3": [0, 1, 0]}
+    assert store["names"]["lion-stand-in"] == store["names"]["Lion"] == [0, 1]
+    assert store["names"]["bff"] == [1, 0]
+    assert "BFF" not in store["names"]  # it could mean either
 
 
 def test_numbers_sort_by_all_their_digits_and_infinities_are_no_gaps(tmp_path):
@@ -224,15 +260,23 @@ def test_remarks_are_lettered_beyond_the_alphabet():
 def test_data_travels_with_the_page_unless_it_is_large(tmp_path, monkeypatch):
     (tmp_path / "a b.csv").write_text("x,y\n1,2\n")
     report = report_of(Figure("f", "F", (), data=PurePosixPath("a b.csv")))
-    link = page_of(report, tmp_path).all("a", download="a b.csv")[0]["href"]
-    kind, _, content = link.partition(",")
-    assert kind == "data:text/csv;charset=utf-8;base64"
-    assert list(csv.reader(io.StringIO(base64.b64decode(content).decode()))) == [
-        ["x", "y"],
-        ["1", "2"],
-    ]
+    page = page_of(report, tmp_path)
+    assert page.all("a", download="a b.csv")[0]["href"] == "a%20b.csv"  # until the script runs
+    assert store_of(page)["texts"] == {"a b.csv": "x,y\n1,2\n"}
     monkeypatch.setattr(html, "DATA_BYTES", 3)
-    assert page_of(report, tmp_path).all("a", download="a b.csv")[0]["href"] == "a%20b.csv"
+    assert store_of(page_of(report, tmp_path))["texts"] == {}
+
+
+def test_a_picture_in_several_places_is_embedded_once(tmp_path):
+    Image.new("RGB", (30, 20), "red").save(tmp_path / "p.png")
+    files = (PurePosixPath("p.png"),)
+    again = Section("page", "Page", (Figure("b", "B", files),), page=True)
+    report = Report(
+        "A title", "", (), (Section("part", "Part", (Figure("a", "A", files),), (again,)),)
+    )
+    images = page_of(report, tmp_path).all("img")
+    assert [(i["data-picture"], i["width"]) for i in images] == [("p.png", "30")] * 3
+    assert ["src" in image for image in images] == [True, False, False]
 
 
 @pytest.mark.parametrize(
@@ -272,8 +316,9 @@ def test_a_plot_without_script_is_its_drawing_if_that_is_small_and_its_pixels_if
     Image.new("RGB", (30, 20)).save(tmp_path / "p.png")
     files = (PurePosixPath("p.png"), PurePosixPath("p.svg"))
     report = report_of(Figure("p", "P", files, plot={"data": []}))
-    image = page_of(report, tmp_path).all("img")[0]
-    assert image["src"].startswith("data:image/svg+xml;base64,")
+    page = page_of(report, tmp_path)
+    image = page.all("img")[0]
+    assert store_of(page)["texts"][image["data-picture"]] == head
     assert (image["width"], image["height"]) == ("96", "48")
     monkeypatch.setattr(pictures, "VECTOR_BYTES", 10)
     assert page_of(report, tmp_path).all("img")[0]["src"].startswith("data:image/webp;base64,")

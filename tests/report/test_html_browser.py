@@ -320,6 +320,128 @@ def test_a_wide_table_fits_a_desktop_and_keeps_its_first_column_on_a_telephone(p
     assert first[1] < 0.4 * own[1]
 
 
+def filtered(page, *choices):
+    """Choose in the filter, as a reader does."""
+    if not page.one("#filter").is_displayed():
+        page.click(".choose")
+    for name, value in choices:
+        page.click(f"#filter [name='{name}'][value='{value}']")
+
+
+def test_the_filter_hides_rows_columns_and_pictures_everywhere_and_says_so(page):
+    page.open()
+    filtered(page, ("surface", "Foot"), ("surface", "Bourbon Bottle"), ("algorithm", "CEM"))
+    assert page.column(1) == ["Foot", "", "Bourbon Bottle", ""]
+    heads = [h.text for h in visible(page.all("#times thead tr:last-child > *"))]
+    assert [words.split()[0] for words in heads] == ["Surface", "Faces", "printedᵖ", "here"]
+    groups = [h.text for h in visible(page.all("#times .groups > *"))]
+    assert groups == ["", "CEM"]  # with the printed columns
+    assert page.column(1, "tfoot") == ["Mean", "n"]
+    assert [h.text for h in visible(page.all("#own .groups th"))] == ["angle", "folds"]
+    told = page.one("#told").text
+    assert "Filter: Bourbon Bottle, Foot · CEM. Hidden on all pages: 6 of 12 rows" in told
+    assert "14 of 16 pictures" in told
+    assert "2 of 4 rows, 2 columns" in page.one("#times .left-out").text
+    assert page.one(".choose").text == "Filter (3)"
+    assert [card.text for card in visible(page.all(".cards a"))] == ["Foot", "Bourbon Bottle"]
+
+    page.click(".cards a[href='#surface-0']")
+    page.wait(lambda: len(visible(page.all("#surface-0 .side-by-side img"))) == 1)
+    assert page.one("#surface-0 .after").text == "Bourbon Bottle"
+    assert page.one("#told").is_displayed()
+    page.click("#told button")
+    page.wait(lambda: len(visible(page.all("#surface-0 .side-by-side img"))) == len(ALGORITHMS))
+    assert page.one("#told").text == ""
+    page.open("#records")
+    filtered(page, ("status", "timeout"))
+    assert [r.text for r in visible(page.all(".record h3"))] == ["Bourbon Bottle · fdm"]
+
+
+def test_a_status_leaves_the_cells_of_that_status(page):
+    page.open("#own")
+    filtered(page, ("status", "timeout"))
+    rows = visible(page.all("#own tbody tr"))
+    assert [row.find_element(By.CSS_SELECTOR, "th").text for row in rows] == ["Bourbon Bottle"]
+    assert [link.text for link in visible(page.all("#own .figure-link"))] == ["4", "8"]
+
+
+def test_the_filter_is_used_with_keys_alone(page, browser):
+    page.open()
+    page.run("document.querySelector('.choose').focus()")
+    browser.switch_to.active_element.send_keys(Keys.ENTER)
+    assert page.one(".choose").get_attribute("aria-expanded") == "true"
+    page.run("document.querySelector('#filter input').focus()")
+    browser.switch_to.active_element.send_keys(Keys.SPACE)
+    page.wait(lambda: page.one("#told").text)
+    assert page.one("#told").get_attribute("role") == "status"
+    browser.switch_to.active_element.send_keys(Keys.ESCAPE)
+    assert not page.one("#filter").is_displayed()
+    assert page.run("return document.activeElement.className").startswith("choose")
+
+
+def test_a_link_keeps_the_filter_the_order_and_the_open_record(page, browser):
+    page.open()
+    filtered(page, ("surface", HOSTILE.replace("'", "\\'")), ("surface", "Foot"))
+    page.click("#times thead tr:last-child th:nth-child(2) button")
+    page.click("#times thead tr:last-child th:nth-child(2) button")
+    page.click(".cards a[href='#surface-0']")  # the view goes along
+    page.wait(lambda: visible(page.all("#surface-0")))
+    page.run("document.querySelector('#surface-0 [href^=\"#record-\"]').click()")
+    page.wait(lambda: visible(page.all("#record-shown[open]")))
+    browser.set_permissions("clipboard-write", "granted")
+    browser.set_permissions("clipboard-read", "granted")
+    page.click("#record-shown .copy")
+    page.wait(lambda: page.one("#record-shown .copy").text == "Copied")
+    link = browser.execute_async_script("navigator.clipboard.readText().then(arguments[0])")
+    assert link == browser.current_url
+
+    browser.get("about:blank")
+    page.open("#" + link.partition("#")[2])
+    page.wait(lambda: "Foot · cem" in page.one("#record-shown").text)
+    page.click("#record-shown .close")
+    page.wait(lambda: visible(page.all("#surface-0 .back")))
+    page.click("#surface-0 .back")
+    page.wait(lambda: visible(page.all("#times")))
+    assert [words for words in page.column(1) if words] == [HOSTILE, "Foot"]
+    head = page.one("#times thead tr:last-child th:nth-child(2)")
+    assert head.get_attribute("aria-sort") == "descending"
+    page.click("#told button")
+    page.click("#times thead tr:last-child th:nth-child(2) button")
+    assert "?" not in browser.current_url
+
+
+def test_the_filter_turns_off_the_lines_of_other_algorithms_in_plots(page):
+    page.open("#?algorithm=QIEM")
+    page.plot()
+    shown = "return document.querySelector('.drawn').data.map((trace) => trace.visible ?? true)"
+    page.wait(lambda: page.run(shown) == ["legendonly", True])
+    page.click("#told button")
+    page.wait(lambda: page.run(shown) == [True, True])
+
+
+def test_a_picture_shown_again_and_data_come_from_what_the_page_holds(page):
+    page.open()
+    loaded = "return [...document.querySelectorAll('img')].every(i => i.src && i.complete)"
+    page.wait(lambda: page.run(loaded))
+    link = page.one("#times a.data")
+    assert link.get_attribute("href").startswith("blob:")
+    assert link.get_attribute("download") == "times.csv"
+
+
+def test_a_browser_that_cannot_unpack_says_so_and_shows_the_rest(page, browser):
+    added = page.tell(
+        "Page.addScriptToEvaluateOnNewDocument", source="delete window.DecompressionStream"
+    )
+    try:
+        page.open()
+        assert "cannot unpack" in page.one("#told p").text
+        assert visible(page.all("#times tbody tr"))
+        page.click(".cards a")
+        page.wait(lambda: visible(page.all("#surface-0 .side-by-side img")))
+    finally:
+        page.tell("Page.removeScriptToEvaluateOnNewDocument", **added)
+
+
 def test_claims_are_filtered_by_their_verdict(page):
     page.open()
     page.click(".tally [data-verdict='holds']")
@@ -395,10 +517,10 @@ def test_it_prints_with_every_page_and_picture_and_no_navigation(page):
 def test_without_javascript_everything_stands_one_under_the_other(page):
     page.open(script=False)
     assert len(visible(page.all("section.page"))) == len(SURFACES) + 2
-    assert visible(page.all("figure.plot img"))
+    assert len(visible(page.all(".side-by-side img"))) == len(ALGORITHMS) * (len(SURFACES) + 1)
     assert visible(page.all("#times .remarks"))
-    assert len(visible(page.all(".record"))) == len(ALGORITHMS) * (len(SURFACES) + 1)
-    assert not visible(page.all("button"))
+    assert "records.csv beside this page" in page.one("#records").text
+    assert not visible(page.all("button, form"))
 
 
 def test_a_surface_named_like_code_stays_a_name(page, browser):

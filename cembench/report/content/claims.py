@@ -76,12 +76,13 @@ def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
 
 
 def by_expression(evidence: Evidence, claim: StatedClaim) -> Found:
-    """Return on how many surfaces an expression holds for the valid maps by its algorithms.
+    """Return on how many of the paper's models an expression holds for the valid maps by its algorithms.
 
     Surfaces where one of them has none are left out; the policy is the run's first.
     """
     frame = evidence.frame
     chosen = frame["ok"] & frame["main"] & (frame["solves"] == evidence.policies[0])
+    chosen &= frame["paper_row"].isin(evidence.paper.models)
     frame = frame[chosen & frame["algorithm"].isin(claim.algorithms)]
     held, failed, surfaces = 0, [], []
     for place, group in frame.groupby("place"):

@@ -165,6 +165,7 @@ class _Drawer:
             caption,
             f"{self.surface.title} and its image by {series.label} under one checkerboard",
             pictures,
+            record.cell.key,
         )
 
     def curvature_and_mesh(
@@ -194,8 +195,10 @@ class _Drawer:
         caption: str,
         alternative: str,
         pictures: list[NDArray[np.uint8]],
+        record: str = "",
     ) -> Figure:
         path = PurePosixPath("figures", f"{self.name}-{what}.jpg")
         content = shading.jpeg(shading.beside(pictures))
         write_bytes(self.folder / path, content)
-        return Figure(f"{self.name}-{what}", title, (path,), caption, alternative=alternative)
+        name = f"{self.name}-{what}"
+        return Figure(name, title, (path,), caption, alternative=alternative, record=record)

@@ -1,9 +1,10 @@
 """Render a report as one self-contained HTML page.
 
 Style, script, pictures, data and Plotly's script are embedded, and the content security policy
-forbids every request. Without JavaScript everything is on one long page. With it, sections marked
-as pages are pages, tables sort, plots and pictures zoom, and a number opens its record. Nothing
-here depends on which sections a report has.
+forbids every request. Each picture is embedded once. Records, plots, their pictures and data are
+one compressed text, which the script unpacks. Without JavaScript text, tables and pictures are on
+one long page. With it, sections marked as pages are pages, tables sort and are filtered, plots and
+pictures zoom, and a number opens its record. Nothing here depends on which sections a report has.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import json
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
@@ -46,17 +47,16 @@ from cembench.report.document import (
     csv_of,
     figures_of,
     galleries_of,
+    tables_of,
 )
 from cembench.report.pictures import (
-    THUMBNAIL,
-    Embedded,
-    data_uri,
     embed_pixels,
     embed_vector,
     pixel_cap,
     size_of,
     unreadable,
 )
+from cembench.report.render.facets import facets_of
 
 FILE = "index.html"
 #: The sign before each verdict, so that it does not rely on colour alone.
@@ -67,8 +67,10 @@ SIGNS: Mapping[Verdict, str] = {
     "too few rounds": "…",
     "not tested here": "○",
 }
-#: Maximum bytes of embedded data of a figure; larger data is only linked.
+#: Maximum bytes of embedded data of a figure or table; larger data is only linked.
 DATA_BYTES = 200_000
+#: Characters of a record's key in the page, more if they would not be unique.
+KEY = 12
 _PIXELS = (".png", ".jpg", ".jpeg", ".webp")
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 
@@ -97,11 +99,24 @@ def render(report: Report, folder: Path) -> str:
     sections = [_section(section, anchors, None) for section in report.sections]
     everything = [s for top in sections for s in _all_sections(top)]
     figures = list(figures_of(report))
-    pictures = _embed_all(figures, folder)
-    script, style = template_text("report.js"), template_text("report.css")
+    pictures = _Pictures(figures, folder)
+    data = _small_files(folder, [f.data for f in figures if f.data], map(csv_of, tables_of(report)))
+    keys = _short_keys(report.records)
+    facets = facets_of(report.records)
+    plots = {anchors.of(f): _plot(f.plot) for f in figures if f.plot is not None}
+    script = template_text("unpack.js") + template_text("report.js")
+    style = template_text("report.css")
     if any(gallery.scene for gallery in galleries_of(report)):
         script, style = script + template_text("view.js"), style + template_text("view.css")
-    library = _plotly_source() if any(f.plot is not None for f in figures) else b""
+    library, packed_library = _plotly() if plots else (b"", "")
+    store = {
+        "texts": pictures.vectors | data,
+        "plots": plots,
+        "records": {keys[key]: _record(key, row) for key, row in report.records.items()},
+        "choices": facets.choices,
+        "names": facets.names,
+        "cells": {keys[key]: places for key, places in facets.cells.items()},
+    }
     return (
         environment()
         .get_template("report.html")
@@ -109,20 +124,18 @@ def render(report: Report, folder: Path) -> str:
             report=report,
             sections=sections,
             pages=_in_order([s for s in everything if s["section"].page]),
-            records={key: _record(key, row) for key, row in report.records.items()},
+            facets={name: found for name, found in facets.choices.items() if len(found) > 1},
+            keys=keys,
             anchor=anchors.of,
-            table=lambda table: _table(table, report.records, anchors.of(table)),
-            picture=lambda figure: pictures[id(figure)],
-            thumbnail=lambda section: _thumbnail(section, folder),
-            plot=_plot,
-            data=lambda figure: _data(folder, figure.data) if figure.data else "",
-            table_data=lambda table: (
-                _data(folder, p) if (folder / (p := csv_of(table))).exists() else ""
-            ),
+            table=lambda table: _table(table, keys, anchors.of(table)),
+            picture=pictures.of,
+            thumbnail=pictures.first_of,
+            table_data=lambda table: path if (folder / (path := csv_of(table))).exists() else "",
             style=Markup(style),
             scene=lambda gallery: base64.b64encode(gallery.scene).decode(),
             script=Markup(script),
-            library=Markup(_squeezed(library)),
+            store=Markup(_packed(_json(store))),
+            library=Markup(packed_library),
             policy=policy([script.encode(), library]),
         )
     )
@@ -193,9 +206,7 @@ class _Cell:
     remark: str
 
 
-def _table(
-    table: Table, records: Mapping[str, Mapping[str, Any]], anchor: str
-) -> Mapping[str, Any]:
+def _table(table: Table, keys: Mapping[str, str], anchor: str) -> Mapping[str, Any]:
     """Return a table for the template: heads, rows, footers, remarks and the legend.
 
     A column with figures of a single origin has its mark in the head, others in each cell.
@@ -213,7 +224,7 @@ def _table(
             number=_sortable(value.number),
             mark="" if told else ORIGINS.get(value.origin, ("", ""))[1],
             origin=value.origin,
-            record=value.record if value.record in records else "",
+            record=keys.get(value.record, ""),
             remark=letters.get(value.why, ""),
         )
 
@@ -271,69 +282,99 @@ def _letters(place: int) -> str:
 # --- figures ---------------------------------------------------------------------------------
 
 
-def _embed_all(figures: Sequence[Figure], folder: Path) -> dict[int, Embedded | None]:
-    """Return the picture of each figure by identity, all within one budget of pixels."""
-    rasters = [folder / file for f in figures if (file := _pixel_file(f)) is not None]
-    cap = pixel_cap([size_of(path) for path in rasters])
-    with ThreadPoolExecutor() as pool:
-        pictures = pool.map(lambda figure: _embed(figure, folder, cap), figures)
-        return {id(f): picture for f, picture in zip(figures, pictures, strict=True)}
+class _Pictures:
+    """The pictures of all figures: each file embedded once, all within one budget of pixels."""
+
+    def __init__(self, figures: Sequence[Figure], folder: Path) -> None:
+        drawn = dict.fromkeys(file for f in figures if (file := _vector_file(f)) is not None)
+        small = {file: embed_vector(folder / file) for file in drawn}
+        self._found = {file: picture for file, picture in small.items() if picture is not None}
+        self._files = {
+            id(f): vector if (vector := _vector_file(f)) in self._found else _pixel_file(f)
+            for f in figures
+        }
+        self._placed: set[PurePosixPath] = set()
+        rasters = {
+            file: f.plot is not None
+            for f in figures
+            if (file := self._files[id(f)]) is not None and file not in self._found
+        }
+        cap = pixel_cap([size_of(folder / file) for file in rasters])
+        with ThreadPoolExecutor() as pool:
+            embedded = pool.map(
+                lambda item: embed_pixels(folder / item[0], cap, exact=item[1]), rasters.items()
+            )
+            self._found |= zip(rasters, embedded, strict=True)
+
+    @property
+    def vectors(self) -> dict[str, str]:
+        """The vector graphics by file; the page's script shows them."""
+        return {str(file): picture.svg for file, picture in self._found.items() if picture.svg}
+
+    def of(self, figure: Figure, *, copy: bool = False) -> Mapping[str, Any] | None:
+        """Return the picture of a figure, with its bytes unless it is a copy or shown before."""
+        file = self._files[id(figure)]
+        if file is None:
+            return None
+        found = self._found[file]
+        uri = "" if copy or file in self._placed else found.uri
+        if uri:
+            self._placed.add(file)
+        return {"file": str(file), "uri": uri, "width": found.width, "height": found.height}
+
+    def first_of(self, section: Section) -> Mapping[str, Any] | None:
+        """Return a copy of the first picture of a page, for the list of pages."""
+        one = Report(title="", command="", facts=(), sections=(section,))
+        pictures = (f for f in figures_of(one) if f.plot is None and self._files[id(f)])
+        first = next(pictures, None)
+        return None if first is None else self.of(first, copy=True)
 
 
-def _embed(figure: Figure, folder: Path, cap: float) -> Embedded | None:
-    """Return a plot as a vector graphic if it is small, and anything else as pixels."""
-    vector = next((file for file in figure.files if file.suffix.lower() == ".svg"), None)
-    raster = _pixel_file(figure)
-    found = None
-    if vector is not None and (figure.plot is not None or raster is None):
-        found = embed_vector(folder / vector)
-    if found is None and raster is not None:
-        found = embed_pixels(folder / raster, cap, exact=figure.plot is not None)
-    return found
+def _vector_file(figure: Figure) -> PurePosixPath | None:
+    """Return the vector graphic of a plot, or of a figure that has no other picture."""
+    found = next((file for file in figure.files if file.suffix.lower() == ".svg"), None)
+    return found if figure.plot is not None or _pixel_file(figure) is None else None
 
 
 def _pixel_file(figure: Figure) -> PurePosixPath | None:
     return next((file for file in figure.files if file.suffix.lower() in _PIXELS), None)
 
 
-def _thumbnail(section: Section, folder: Path) -> Embedded | None:
-    """Return a thumbnail of a page's first picture, for the list of pages."""
-    one = Report(title="", command="", facts=(), sections=(section,))
-    pictures = (_pixel_file(figure) for figure in figures_of(one) if figure.plot is None)
-    file = next((file for file in pictures if file is not None), None)
-    if file is None:
-        return None
-    return embed_pixels(folder / file, math.inf, longest=THUMBNAIL, exact=False)
+def _plot(plot: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a Plotly figure as JSON values, without its template."""
+    plain = json.loads(to_json_plotly(dict(plot)))
+    plain.get("layout", {}).pop("template", None)
+    return {"data": plain.get("data", []), "layout": plain.get("layout", {})}
 
 
-def _plot(figure: Figure) -> Markup:
-    """Return a Plotly figure as JSON that is safe in a script element."""
-    plot = json.loads(to_json_plotly(dict(figure.plot or {})))
-    plot.get("layout", {}).pop("template", None)
-    return _script_json({"data": plot.get("data", []), "layout": plot.get("layout", {})})
-
-
-def _script_json(content: Any) -> Markup:
-    text = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))
-
-
-def _data(folder: Path, file: PurePosixPath) -> str:
-    """Return a link to data: the data itself, or its file if it is large."""
-    try:
-        content = (folder / file).read_bytes()
-    except OSError as error:
-        raise unreadable(folder / file, error) from error
-    if len(content) > DATA_BYTES:
-        return quote(str(file))
-    return data_uri(content, "text/csv;charset=utf-8")
+def _small_files(
+    folder: Path, needed: Iterable[PurePosixPath], others: Iterable[PurePosixPath]
+) -> dict[str, str]:
+    """Return the text of small data files by path; those of `others` need not exist."""
+    found = {}
+    for file in (*needed, *(file for file in others if (folder / file).exists())):
+        try:
+            content = (folder / file).read_bytes()
+        except OSError as error:
+            raise unreadable(folder / file, error) from error
+        if len(content) <= DATA_BYTES:
+            found[str(file)] = content.decode(errors="replace")
+    return found
 
 
 # --- records ---------------------------------------------------------------------------------
 
 
+def _short_keys(records: Mapping[str, Any]) -> dict[str, str]:
+    """Return the first characters of each key, as many as make them unique."""
+    size = KEY
+    while len({key[:size] for key in records}) < len(records):
+        size += 1
+    return {key: key[:size] for key in records}
+
+
 def _record(key: str, row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a record for the template: its cell and all available figures."""
+    """Return a record for the page: its cell and all available figures."""
     title = " · ".join(str(row[name]) for name in ("mesh", "algorithm") if row.get(name))
     shown = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
     return {"title": title or key, "fields": [(n, _entries(v)) for n, v in shown.items()]}
@@ -410,11 +451,16 @@ def template_text(name: str) -> str:
 
 
 @cache
-def _plotly_source() -> bytes:
-    return (Path(plotly.__file__).parent / "package_data" / "plotly.min.js").read_bytes()
+def _plotly() -> tuple[bytes, str]:
+    """Return Plotly's script, plain and as compressed text."""
+    source = (Path(plotly.__file__).parent / "package_data" / "plotly.min.js").read_bytes()
+    return source, _packed(source)
 
 
-@cache
-def _squeezed(source: bytes) -> str:
-    """Return a script as compressed text, which the browser unpacks for the first plot."""
-    return base64.b64encode(gzip.compress(source, 9, mtime=0)).decode() if source else ""
+def _packed(content: bytes) -> str:
+    """Return content as compressed text, which the browser unpacks."""
+    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+
+
+def _json(content: Any) -> bytes:
+    return json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()

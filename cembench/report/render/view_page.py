@@ -36,7 +36,7 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
 
     from cembench.report.render.html import environment, policy, template_text
 
-    script = template_text("view.js")
+    script = template_text("unpack.js") + template_text("view.js")
     page: str = (
         environment()
         .get_template("view.html")

@@ -31,31 +31,109 @@
     label();
   }
 
-  // --- pages and records, by the part of the address after # --------------------------------------
+  // --- what the page holds compressed: records, plots, pictures of plots, data -------------------
+
+  let store = { texts: {}, plots: {}, records: {}, choices: {}, names: {}, cells: {} };
+
+  async function openStore() {
+    try {
+      const content = await unpacked(document.getElementById("store").textContent);
+      store = JSON.parse(new TextDecoder().decode(content));
+    } catch (error) {
+      document.getElementById("told").append(element("p", {
+        textContent: "This browser cannot unpack the records, plots and data of this page. Its text, "
+          + "tables and other pictures are complete, and the files beside it hold the rest.",
+      }));
+      all("#filter, .choose").forEach((part) => part.remove());
+      console.warn("nothing unpacked:", error);
+    }
+  }
+
+  const file = (text, type) => URL.createObjectURL(new Blob([text], { type }));
+
+  // A picture that is shown several times is embedded where it is shown first.
+  function prepareFiles() {
+    const sources = new Map();
+    for (const image of all("img[data-picture][src]")) sources.set(image.dataset.picture, image.src);
+    for (const image of all("img[data-picture]:not([src])")) {
+      const name = image.dataset.picture;
+      if (!sources.has(name) && store.texts[name]) sources.set(name, file(store.texts[name], "image/svg+xml"));
+      if (sources.has(name)) image.src = sources.get(name);
+    }
+    for (const link of all("a.data")) {
+      const text = store.texts[decodeURIComponent(link.getAttribute("href"))];
+      if (text !== undefined) link.href = file(text, "text/csv;charset=utf-8");
+    }
+  }
+
+  // --- pages, records and the view (filter and sort orders), by the address after # ----------------
+  // #ANCHOR?surface=NAME&algorithm=NAME&status=NAME&sort=TABLE:COLUMN&at=ANCHOR under a record
 
   let title = "";
-  let before = "";      // the hash under an opened record
+  let before = "";      // the anchor under an opened record
   let place = 0;        // how far the report was scrolled when a page was opened
 
-  const named = (hash) => {
-    try { return hash.length > 1 ? document.getElementById(decodeURIComponent(hash.slice(1))) : null; }
-    catch { return null; }
-  };
+  const decoded = (text) => { try { return decodeURIComponent(text); } catch { return text; } };
+
+  function address() {
+    const [anchor, view] = location.hash.slice(1).split("?");
+    return { anchor: decoded(anchor), view: new URLSearchParams(view), whole: view !== undefined };
+  }
+
+  const recordOf = (anchor) => (anchor.startsWith("record-") ? anchor.slice(7) : null);
+
+  function hashOf(anchor) {
+    const view = new URLSearchParams();
+    if (recordOf(anchor) && before) view.set("at", before);
+    for (const box of checked()) view.append(box.name, box.value);
+    const sorts = all("figure.table").map(sortOf).filter(Boolean);
+    if (sorts.length) view.set("sort", sorts.join(","));
+    const words = String(view).replaceAll("%3A", ":").replaceAll("%2C", ",");
+    return `#${encodeURIComponent(anchor)}${words && `?${words}`}`;
+  }
+
+  // The view goes along with every step, so that going back restores it.
+  function keepView(anchor = address().anchor) {
+    const hash = hashOf(anchor);
+    history.replaceState({ kept: true }, "", hash === "#" && !location.hash ? null : hash);
+  }
+
+  function restoreView(view) {
+    for (const box of all("#filter input[type=checkbox]")) box.checked = view.getAll(box.name).includes(box.value);
+    const sorts = new Map((view.get("sort") ?? "").split(",").map((words) => words.split(":")));
+    for (const figure of all("figure.table")) {
+      const column = Number(sorts.get(figure.id) ?? 0);
+      if (column || sortOf(figure)) figure.sortBy(column);
+    }
+    applyFilter();
+  }
 
   function navigate(event) {
-    const target = named(location.hash);
-    const record = target?.closest(".record");
+    const { anchor, view, whole } = address();
     const shown = document.getElementById("record-shown");
-    if (record) { openRecord(record); return; }
-    const returning = shown.open && event !== undefined;
-    if (shown.open) shown.close();
-    if (returning && location.hash === before) return;
-    before = location.hash;
+    if (!event || whole || history.state?.kept) restoreView(view);
+    const key = recordOf(anchor);
+    if (Object.hasOwn(store.records, key)) {
+      const under = view.get("at") ?? (event ? before : "");
+      if (!event || under !== before) show(under, event);
+      openRecord(key);
+    } else {
+      const returning = shown.open && event !== undefined && anchor === before;
+      if (shown.open) shown.close();
+      if (!returning) show(anchor, event);
+    }
+    keepView();
+  }
+
+  function show(anchor, event) {
+    before = anchor;
+    const target = anchor ? document.getElementById(anchor) : null;
     const page = target?.closest(".page") ?? null;
     if (page && !root.classList.contains("paged")) place = scrollY;
     const turned = document.querySelector(".page.current") !== page;
     document.querySelector(".page.current")?.classList.remove("current");
     page?.classList.add("current");
+    if (page?.id === "records") listRecords();
     root.classList.toggle("paged", page !== null);
     document.title = page ? `${page.querySelector("h2").textContent} – ${title}` : title;
     if (page && target === page) {
@@ -69,12 +147,32 @@
     markCurrent();
   }
 
-  function openRecord(record) {
+  function recordArticle(key) {
+    const { title: name, fields } = store.records[key];
+    const entry = ([inner, words]) => (inner
+      ? element("span", { className: "entry" }, element("i", { textContent: inner }), ` ${words}`) : words);
+    return element("article", { className: "record" }, element("h3", { textContent: name }),
+      element("dl", {}, ...fields.map(([field, entries]) => element("div", {},
+        element("dt", { textContent: field }), element("dd", {}, ...entries.map(entry))))));
+  }
+
+  function listRecords() {
+    const list = document.getElementById("all-records");
+    if (!list || list.children.length) return;
+    list.append(...Object.keys(store.records).map((key) => {
+      const article = recordArticle(key);
+      article.dataset.record = key;
+      return article;
+    }));
+    applyFilter();
+  }
+
+  function openRecord(key) {
     const shown = document.getElementById("record-shown");
-    const copy = record.cloneNode(true);
-    copy.removeAttribute("id");
-    shown.replaceChildren(closer(shown), copy);
-    shown.setAttribute("aria-label", `Record: ${copy.querySelector("h3").textContent}`);
+    const article = recordArticle(key);
+    const copy = element("button", { type: "button", className: "copy", textContent: "Copy link" });
+    shown.replaceChildren(closer(shown), copies(copy), article);
+    shown.setAttribute("aria-label", `Record: ${article.querySelector("h3").textContent}`);
     if (!shown.open) shown.showModal();
     shown.scrollTop = 0;
   }
@@ -89,11 +187,34 @@
     const shown = element("dialog", { id: "record-shown" });
     document.body.append(shown);
     shown.addEventListener("click", (event) => { if (event.target === shown) shown.close(); });
-    shown.addEventListener("close", () => {
-      if (named(location.hash)?.closest(".record")) {
-        history.replaceState(null, "", before || "#");
+    shown.addEventListener("close", () => { if (recordOf(address().anchor)) keepView(before); });
+    addEventListener("beforeprint", listRecords);
+  }
+
+  /* Make a button copy the link to this view; where that is not allowed, show the link. */
+  function copies(button) {
+    const words = button.textContent;
+    button.addEventListener("click", async () => {
+      const { anchor } = address();
+      const link = location.href.split("#")[0] + hashOf(recordOf(anchor) ? anchor : anchorInView());
+      try {
+        await navigator.clipboard.writeText(link);
+        button.textContent = "Copied";
+      } catch {
+        prompt("The link to this view:", link);
       }
+      setTimeout(() => { button.textContent = words; }, 2000);
     });
+    return button;
+  }
+
+  /* Return the anchor of the table, plot or section at the upper end of the window. */
+  function anchorInView() {
+    if (scrollY < 60) return document.querySelector(".page.current")?.id ?? "";
+    const within = document.querySelector(".page.current") ?? document.querySelector(".report");
+    return all("section[id], figure[id], .gallery[id]", within)
+      .filter((part) => part.checkVisibility() && part.getBoundingClientRect().top < innerHeight * 0.3)
+      .pop()?.id ?? "";
   }
 
   function markCurrent() {
@@ -113,9 +234,10 @@
     const open = (yes) => {
       contents.classList.toggle("open", yes);
       menu.setAttribute("aria-expanded", String(yes));
+      if (yes) openFilter(false);
     };
     menu.addEventListener("click", () => open(!contents.classList.contains("open")));
-    contents.addEventListener("click", (event) => { if (event.target.closest("a")) open(false); });
+    contents.addEventListener("click", (event) => { if (event.target.closest("a, .choose")) open(false); });
     let waiting = false;
     addEventListener("scroll", () => {
       if (waiting) return;
@@ -126,7 +248,8 @@
 
   // --- tables: ascending, descending, and original order; gaps last, footers fixed -----------------
 
-  function prepareTable(table) {
+  function prepareTable(figure) {
+    const table = figure.querySelector("table");
     const body = table.tBodies[0];
     const heads = [...table.tHead.rows[table.tHead.rows.length - 1].cells];
     const original = [...body.rows];
@@ -153,6 +276,15 @@
       body.append(...keyed.map(([, , row]) => row));
     };
 
+    const order = { ascending: 1, descending: -1, none: 0 };
+    figure.sortBy = (column) => {
+      heads.forEach((head, place) => {
+        const signed = Math.abs(column) === place + 1 ? Math.sign(column) : 0;
+        head.setAttribute("aria-sort", Object.keys(order).find((word) => order[word] === signed));
+      });
+      sort(heads[Math.abs(column) - 1] ? Math.abs(column) - 1 : 0, Math.sign(column));
+    };
+
     heads.forEach((head, place) => {
       const label = head.querySelector(".title");
       const button = element("button", { type: "button", className: "sort" });
@@ -160,12 +292,202 @@
       button.append(label);
       head.setAttribute("aria-sort", "none");
       button.addEventListener("click", () => {
-        const next = { none: "ascending", ascending: "descending", descending: "none" };
-        const now = next[head.getAttribute("aria-sort")];
-        heads.forEach((other) => other.setAttribute("aria-sort", "none"));
-        head.setAttribute("aria-sort", now);
-        sort(place, { ascending: 1, descending: -1, none: 0 }[now]);
+        const next = { none: 1, ascending: -1, descending: 0 };
+        figure.sortBy(next[head.getAttribute("aria-sort")] * (place + 1));
+        keepView();
       });
+    });
+  }
+
+  /* Return a table's sort order for the address: TABLE:COLUMN, the column negative if descending. */
+  function sortOf(figure) {
+    const heads = all("thead tr:last-child > th", figure);
+    const place = heads.findIndex((head) => ["ascending", "descending"].includes(head.getAttribute("aria-sort")));
+    if (place < 0) return "";
+    return `${figure.id}:${heads[place].getAttribute("aria-sort") === "descending" ? "-" : ""}${place + 1}`;
+  }
+
+  // --- the filter: rows, columns and pictures by surface, algorithm and status ----------------------
+
+  const FACETS = ["surface", "algorithm", "status"];
+  let wanted = FACETS.map(() => new Set());  // the chosen places of each facet; none means all
+  let tables = null;
+  let filtered = false;
+
+  const checked = () => all("#filter input[type=checkbox]:checked");
+  const passes = (of) => of.every((choice, k) => choice === undefined || !wanted[k].size || wanted[k].has(choice));
+  const only = (facet, choice) => FACETS.map((_, k) => (k === facet ? choice : undefined));
+  const same = (choices) => {
+    const found = new Set(choices.filter((choice) => choice !== undefined));
+    return found.size === 1 ? [...found][0] : undefined;
+  };
+  const common = (cells) => FACETS.map((_, k) => same(cells.map((cell) => cell.of[k])));
+  const several = (number, word) => `${number} ${word}${number === 1 ? "" : "s"}`;
+
+  /* Return the facet and choice that a name in a table or plot means. */
+  function meaning(words = "") {
+    const name = words.trim().replace(/ \*$/, "");
+    return Object.hasOwn(store.names, name) ? store.names[name] : [];
+  }
+
+  /* Return what rows and columns of a table are about: by their records, otherwise by their names. */
+  function describe(figure) {
+    const titles = all("thead tr:last-child .title", figure)
+      .map((label) => [...label.childNodes].filter((part) => !part.classList?.contains("mark"))
+        .map((part) => part.textContent).join(""));
+    const groups = all("thead .groups > *", figure).flatMap((group) => Array(group.colSpan).fill(group));
+    const rows = all("tbody tr", figure).map((row) => {
+      const cells = [...row.cells].flatMap((cell, column) => {
+        const link = cell.querySelector(".figure-link");
+        return link ? [{ cell, column, of: store.cells[recordOf(link.hash.slice(1))] }] : [];
+      });
+      const of = common(cells);
+      [...row.cells].forEach((cell, column) => {
+        if (column && !FACETS.includes(titles[column].toLowerCase())) return;
+        const [facet, choice] = meaning(cell.firstChild?.textContent);
+        if (facet !== undefined) of[facet] ??= choice;
+      });
+      return { row, of, cells };
+    });
+    const own = titles.map((name, column) => {
+      const cells = rows.flatMap((row) => row.cells.filter((cell) => cell.column === column));
+      const named = [name, groups[column]?.textContent].map(meaning).find(([facet]) => facet === 1);
+      return cells.length ? common(cells)[1] : named?.[1];
+    });
+    const algorithms = own.map((choice, column) => (groups[column]?.matches("th")
+      ? choice ?? same(own.filter((_, k) => groups[k] === groups[column])) : choice));
+    return { figure, rows, groups, algorithms };
+  }
+
+  /* Hide what a table has of other choices; return the numbers of rows and columns hidden. */
+  function filterTable({ figure, rows, groups, algorithms }) {
+    for (const { row, of, cells } of rows) {
+      row.hidden = !passes(of) || (cells.length > 0 && !cells.some((cell) => passes(cell.of)));
+      for (const { cell, of: own } of cells) cell.classList.toggle("filtered", !passes(own));
+    }
+    const left = rows.filter(({ row }) => !row.hidden);
+    const off = algorithms.map((choice, column) => column > 0 && left.length > 0 && !passes(only(1, choice)));
+    for (const row of all("tr:not(.groups)", figure)) {
+      [...row.cells].forEach((cell, column) => { cell.hidden = off[column]; });
+    }
+    for (const group of new Set(groups)) {
+      const span = groups.filter((other, column) => other === group && !off[column]).length;
+      group.hidden = !span;
+      group.colSpan = span || 1;
+    }
+    const blank = left.flatMap((row) => row.cells).filter(({ cell }) => !cell.hidden && cell.matches(".filtered"));
+    const hidden = [rows.length - left.length, off.filter(Boolean).length];
+    noteHidden(figure, [[hidden[0], `of ${rows.length} row`], [hidden[1], "column"], [blank.length, "number"]]);
+    return hidden;
+  }
+
+  /* Say below a caption how much the filter hides there. */
+  function noteHidden(part, counts) {
+    const words = counts.filter(([number]) => number)
+      .map(([number, word]) => (word.startsWith("of ") ? `${number} ${word}s` : several(number, word)));
+    let note = part.querySelector(":scope > .left-out");
+    if (!note && words.length) {
+      note = element("p", { className: "left-out" });
+      part.querySelector("figcaption, .caption").after(note);
+    }
+    if (note) note.textContent = words.length ? `Hidden by the filter: ${words.join(", ")}.` : "";
+  }
+
+  function filterPictures() {
+    const pictures = all("figure[data-record]");
+    for (const picture of pictures) picture.hidden = !passes(store.cells[picture.dataset.record] ?? []);
+    for (const gallery of all(".gallery")) {
+      const own = pictures.filter((picture) => gallery.contains(picture));
+      noteHidden(gallery, [[own.filter((picture) => picture.hidden).length, `of ${own.length} picture`]]);
+    }
+    for (const record of all("#all-records > .record")) record.hidden = !passes(store.cells[record.dataset.record]);
+    return [pictures.filter((picture) => picture.hidden).length, pictures.length];
+  }
+
+  /* Leave out the links to pages of other surfaces. */
+  function filterPages() {
+    const pages = all(".page:not(#records)");
+    const left = pages.map((page) => {
+      const cells = [
+        ...all(".figure-link", page).map((link) => recordOf(link.hash.slice(1))),
+        ...all("figure[data-record]", page).map((picture) => picture.dataset.record),
+      ];
+      return passes(only(0, same(cells.map((key) => store.cells[key][0]))));
+    });
+    pages.forEach((page, k) => {
+      for (const link of all(`.cards a[href="#${page.id}"], .of-pages a[href="#${page.id}"]`)) {
+        link.closest("li").hidden = !left[k];
+      }
+      for (const [selector, step] of [[".before", -1], [".after", 1]]) {
+        const link = page.querySelector(`.turn ${selector}`);
+        let next = k + step;
+        while (pages[next] && !left[next]) next += step;
+        if (!link) continue;
+        link.hidden = !pages[next];
+        if (pages[next]) Object.assign(link, { hash: pages[next].id, textContent: pages[next].querySelector("h2").textContent });
+      }
+    });
+  }
+
+  async function filterPlot(board) {
+    const visible = board.drawing.data.map((trace) => (passes(only(...meaning(trace.name))) ? true : "legendonly"));
+    if (visible.some((shown, k) => shown !== (board.data[k].visible ?? true))) {
+      await window.Plotly.restyle(board, { visible });
+    }
+  }
+
+  function applyFilter() {
+    const boxes = checked();
+    if (!boxes.length && !filtered) return;
+    filtered = boxes.length > 0;
+    wanted = FACETS.map((facet) => new Set(boxes.filter((box) => box.name === facet)
+      .map((box) => store.choices[facet].indexOf(box.value))));
+    tables ??= all("figure.table").map(describe);
+    const counts = tables.map(filterTable);
+    const [rows, columns] = [0, 1].map((k) => counts.reduce((sum, hidden) => sum + hidden[k], 0));
+    const [pictures, allPictures] = filterPictures();
+    filterPages();
+    all(".drawn").filter((board) => board.drawing).forEach(filterPlot);
+    const total = tables.reduce((sum, table) => sum + table.rows.length, 0);
+    const shown = FACETS.map((facet) => boxes.filter((box) => box.name === facet).map((box) => box.value))
+      .filter((names) => names.length)
+      .map((names) => (names.length > 6 ? `${names.slice(0, 5).join(", ")} and ${names.length - 5} more` : names.join(", ")));
+    document.querySelector(".choose").textContent = filtered ? `Filter (${boxes.length})` : "Filter";
+    const told = document.getElementById("told");
+    told.replaceChildren();
+    if (!filtered) return;
+    const reset = element("button", { type: "button", textContent: "Show all" });
+    reset.addEventListener("click", () => { document.getElementById("filter").reset(); });
+    told.append(element("p", {}, element("b", { textContent: `Filter: ${shown.join(" · ")}.` }),
+      ` Hidden on all pages: ${rows} of ${total} rows, ${several(columns, "column")}, `
+      + `${pictures} of ${several(allPictures, "picture")}. `
+      + "Means, counts, claims and findings still cover the whole run. ", reset));
+  }
+
+  function openFilter(yes) {
+    const panel = document.getElementById("filter");
+    if (!panel) return;
+    panel.hidden = !yes;
+    document.querySelector(".choose").setAttribute("aria-expanded", String(yes));
+  }
+
+  function prepareFilter() {
+    const panel = document.getElementById("filter");
+    if (!panel) return;
+    const button = document.querySelector(".choose");
+    button.addEventListener("click", () => openFilter(panel.hidden));
+    const change = () => { applyFilter(); keepView(); };
+    panel.addEventListener("change", change);
+    panel.addEventListener("submit", (event) => event.preventDefault());
+    panel.addEventListener("reset", () => setTimeout(() => { panel.dispatchEvent(new Event("input")); change(); }));
+    panel.addEventListener("input", () => {
+      for (const group of all("fieldset", panel)) {
+        const part = group.querySelector("[type=search]")?.value.toLowerCase() ?? "";
+        for (const label of all("label", group)) label.hidden = !label.textContent.toLowerCase().includes(part);
+      }
+    });
+    panel.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") { openFilter(false); button.focus(); }
     });
   }
 
@@ -236,10 +558,8 @@
 
   function plotly() {
     library ??= (async () => {
-      const packed = atob(document.getElementById("plotly").textContent);
-      const bytes = Uint8Array.from(packed, (letter) => letter.charCodeAt(0));
-      const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-      document.head.append(element("script", { textContent: await new Response(stream).text() }));
+      const source = await unpacked(document.getElementById("plotly").textContent);
+      document.head.append(element("script", { textContent: new TextDecoder().decode(source) }));
       return window.Plotly;
     })();
     return library;
@@ -325,7 +645,7 @@
   }
 
   async function draw(figure) {
-    const drawing = JSON.parse(figure.querySelector(".drawing").textContent);
+    const drawing = store.plots[figure.id];
     const board = element("div", { className: "drawn" });
     const image = figure.querySelector(".canvas > img");
     board.style.height = `${heightOf(drawing)}px`;
@@ -340,6 +660,7 @@
       });
       board.drawing = drawing;
       await settle(board);
+      await filterPlot(board);
       board.classList.add("settled");
     } catch (error) {
       board.remove();
@@ -355,13 +676,12 @@
   }
 
   function preparePlots() {
-    if (!document.getElementById("plotly") || !window.DecompressionStream) return;
     const watch = new IntersectionObserver((seen) => {
       for (const { isIntersecting, target } of seen) {
         if (isIntersecting) { watch.unobserve(target); draw(target); }
       }
     }, { rootMargin: "400px" });
-    all("figure.plot").forEach((figure) => watch.observe(figure));
+    all("figure.plot").filter((figure) => figure.id in store.plots).forEach((figure) => watch.observe(figure));
   }
 
   // --- enlarged pictures; the next one keeps the zoom and position --------------------------------
@@ -493,15 +813,20 @@
     }
   }
 
-  document.addEventListener("DOMContentLoaded", () => {
+  document.addEventListener("DOMContentLoaded", async () => {
     title = document.title;
     prepareTheme();
     prepareContents();
     prepareRecords();
-    all("table.sortable").forEach(prepareTable);
+    copies(document.querySelector(".copy"));
+    all("figure.table").forEach(prepareTable);
     all(".claims").forEach(prepareClaims);
     prepareRemarks();
     prepareViewer();
+    show(address().view.get("at") ?? address().anchor);
+    await openStore();
+    prepareFiles();
+    prepareFilter();
     navigate();
     preparePlots();
     addEventListener("hashchange", navigate);

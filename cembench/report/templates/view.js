@@ -55,18 +55,23 @@
     return made;
   };
 
+  /* Arrays are integers, byte by byte: the lowest bytes of all, then the next ones. Each is the
+     difference from the same place of another array, or from the row before. */
   async function unpack(text) {
-    const packed = Uint8Array.from(atob(text.trim()), (letter) => letter.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-    const buffer = await new Response(stream).arrayBuffer();
+    const buffer = await unpacked(text);
     const length = new DataView(buffer).getUint32(0, true);
     const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-    const kinds = { u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, f4: Float32Array };
     const arrays = {};
     let place = 4 + length;
-    for (const [name, kind, size] of head.arrays) {
-      arrays[name] = new kinds[kind](buffer, place, size);
-      place += 4 * Math.ceil(arrays[name].byteLength / 4);
+    for (const [name, size, width, bytes, base] of head.arrays) {
+      const packed = new Uint8Array(buffer, place, size * bytes);
+      const values = arrays[name] = new Uint32Array(size);
+      for (let i = 0; i < size; i++) {
+        let value = base ? arrays[base][i] : i < width ? 0 : values[i - width];
+        for (let k = 0; k < bytes; k++) value += packed[k * size + i] * 256 ** k;
+        values[i] = value % 256 ** bytes;
+      }
+      place += size * bytes;
     }
     return { head, arrays };
   }
@@ -253,7 +258,7 @@
       gl.linkProgram(program);
       gl.useProgram(program);
       gl.enable(gl.DEPTH_TEST);
-      const V = Float32Array.from(arrays.V, (v, i) => 2 * v / 65535 - head.box[i % 3]);
+      const V = Float32Array.from(arrays.V, (v, i) => 2 * v / head.steps.V - head.box[i % 3]);
       let [reach, seen] = [0, 0];   /* of a ball about it, and across as it is seen at first */
       for (let i = 0; i < V.length; i += 3) {
         reach = Math.max(reach, Math.hypot(V[i], V[i + 1], V[i + 2]));
@@ -283,12 +288,11 @@
     load() {
       const { arrays, head, F, chosen } = this;
       const uv = arrays[`uv${chosen}`];
-      const unit = uv instanceof Uint16Array ? Float32Array.from(uv, (v) => v / 65535) : uv;
-      this.give("image", atCorners(unit, F, 2), 2);
+      this.give("image", atCorners(Float32Array.from(uv, (v) => v / head.steps.uv), F, 2), 2);
       const perTriangle = (value) => Float32Array.from({ length: F.length }, (_, i) => value(Math.floor(i / 3)));
       const name = MODES[this.mode][1];
       const shares = name && arrays[`${name}${chosen}`];
-      this.give("value", perTriangle((t) => (shares ? shares[t] / 255 : 0)), 1);
+      this.give("value", perTriangle((t) => (shares ? shares[t] / head.steps.share : 0)), 1);
       const folds = new Set(arrays[`folded${chosen}`]);
       this.give("folded", perTriangle((t) => (folds.has(t) ? 1 : 0)), 1);
       const { degrees, mu, doublings } = head.scales;
