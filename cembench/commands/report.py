@@ -100,8 +100,8 @@ def make_report(
 
         jobs = min(usable_cores(), MOST_DRAWING)
         told = command or told
-        more = {"jobs": jobs, "tables": tables, "paper": asked}
-        return write_report(run, folder, told, progress, **more), folder
+        made = write_report(run, folder, told, progress, jobs=jobs, tables=tables, paper=asked)
+        return made, folder
 
 
 def show_report(report: Report, folder: Path) -> None:

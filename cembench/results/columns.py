@@ -194,7 +194,7 @@ def _memory(record: Record) -> float | None:
     return None if found is None else found / MIB
 
 
-_SECONDS = {"unit": "s", "form": "significant"}
+_SECONDS: Mapping[str, Any] = {"unit": "s", "form": "significant"}
 _C = FrameColumn
 
 #: Exported columns in their order, the metrics among them; then the derived ones.

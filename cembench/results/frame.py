@@ -76,7 +76,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "share_interval": _share_words,
         "mean": _figure(np.mean),
         "median": _figure(np.median),
-        "percentile": _figure(np.percentile),
+        "percentile": _figure(lambda known, q: np.percentile(known, q)),
         "smallest": _figure(np.min),
         "largest": _figure(np.max),
         "geometric": _figure(geometric),

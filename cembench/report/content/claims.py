@@ -76,9 +76,9 @@ def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
 
 
 def by_expression(evidence: Evidence, claim: StatedClaim) -> Found:
-    """Return on how many of the paper's models an expression holds for the valid maps by its algorithms.
+    """Return on how many of the paper's models an expression holds for maps by its algorithms.
 
-    Surfaces where one of them has none are left out; the policy is the run's first.
+    Surfaces where one of them has no valid map are left out; the policy is the run's first.
     """
     frame = evidence.frame
     chosen = frame["ok"] & frame["main"] & (frame["solves"] == evidence.policies[0])
