@@ -322,9 +322,8 @@ def _check(paper: Paper) -> None:
         if column not in paper.tables.get(number, {}).get(model, {}):
             what = f"table {number} has no cell {column!r} of {model!r}"
             raise _wrong(paper.folder / "tables.toml", "errata", what)
-    of_models = [*paper.pictures, *paper.plots.values(), *paper.runs]
-    named = [m for one in of_models for m in ([one.model] if hasattr(one, "model") else one.models)]
-    for model in named:
+    named = [model for one in (*paper.plots.values(), *paper.runs) for model in one.models]
+    for model in (*named, *(picture.model for picture in paper.pictures)):
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"
             raise _wrong(paper.folder, f"model {model!r}", what)

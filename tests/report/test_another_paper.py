@@ -44,9 +44,11 @@ def test_its_claims_have_verdicts(report):
     items = [item for _, section in sections_of(report) for item in section.items]
     claims = {item.name: item for item in items if isinstance(item, Claim)}
     assert list(claims) == ["lower-energy", "longest-title"]
-    assert claims["lower-energy"].verdict == "holds"
+    assert claims["lower-energy"].verdict == "holds in part"
     assert claims["longest-title"].remark == "Not much of a claim."
-    assert plain(report.findings.sentences[0]) == "Of 2 claims of the paper, 2 hold."
+    assert plain(report.findings.sentences[0]) == (
+        "Of 2 claims of the paper, 1 holds in part: lower energy; 1 holds."
+    )
 
 
 def test_its_pictures_are_there_and_no_other_paper_s(report):
