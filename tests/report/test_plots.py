@@ -13,6 +13,7 @@ from cembench.report.content.figures.performance_profile import performance_prof
 from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.palette import PARTS, series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, plotly_of, write_plot
+from cembench.results.papers import find_paper
 from tests.report.small_run import meshes, ok, record, write_run
 
 
@@ -93,9 +94,11 @@ def test_a_fitted_exponent_is_that_of_a_power_law():
 
 
 def test_the_printed_seconds_have_their_exponents():
-    x, y = np.log([p[:2] for p in printed_points("cem")]).T
-    assert fit(printed_points("cem")).exponent == pytest.approx(np.polyfit(x, y, 1)[0])
-    assert len(printed_points("fdm")) == 18
+    paper = find_paper("cem")
+    x, y = np.log([p[:2] for p in printed_points(paper, "cem")]).T
+    fitted = fit(printed_points(paper, "cem"))
+    assert fitted.exponent == pytest.approx(np.polyfit(x, y, 1)[0])
+    assert len(printed_points(paper, "fdm")) == 18
 
 
 def test_a_failure_counts_as_infinitely_slow_in_a_profile(evidence):
