@@ -94,11 +94,11 @@ def test_a_fitted_exponent_is_that_of_a_power_law():
 
 
 def test_the_printed_seconds_have_their_exponents():
-    x, y = np.log([p[:2] for p in printed_points(find_paper("cem"), "cem")]).T
-    assert fit(printed_points(find_paper("cem"), "cem")).exponent == pytest.approx(
-        np.polyfit(x, y, 1)[0]
-    )
-    assert len(printed_points(find_paper("cem"), "fdm")) == 18
+    paper = find_paper("cem")
+    x, y = np.log([p[:2] for p in printed_points(paper, "cem")]).T
+    fitted = fit(printed_points(paper, "cem"))
+    assert fitted.exponent == pytest.approx(np.polyfit(x, y, 1)[0])
+    assert len(printed_points(paper, "fdm")) == 18
 
 
 def test_a_failure_counts_as_infinitely_slow_in_a_profile(evidence):
