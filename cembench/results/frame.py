@@ -61,7 +61,11 @@ def commonest(of: pd.Series) -> str:
     return named or "none"
 
 
-def _figure(of: Callable[[Any], Any]) -> Callable[..., float | None]:
+def _percentile(known: Any, q: float) -> float:
+    return float(np.percentile(known, q))
+
+
+def _figure(of: Callable[..., Any]) -> Callable[..., float | None]:
     def computed(column: pd.Series, *more: Any) -> float | None:
         known = column.dropna().astype(float).to_numpy()
         return float(of(known, *more)) if len(known) else None
@@ -76,7 +80,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "share_interval": _share_words,
         "mean": _figure(np.mean),
         "median": _figure(np.median),
-        "percentile": _figure(lambda known, q: np.percentile(known, q)),
+        "percentile": _figure(_percentile),
         "smallest": _figure(np.min),
         "largest": _figure(np.max),
         "geometric": _figure(geometric),
