@@ -33,11 +33,11 @@ Complex = NDArray[np.complex128]
 #: Most triangles of a surface; larger ones are simplified.
 MOST = 50_000
 #: Triangles of all surfaces on one page together, to keep it small; each gets some.
-TOGETHER, LEAST = 120_000, 5_000
+TOGETHER, LEAST = 105_000, 5_000
 #: Ends of the colour scales: degrees, abs(mu), and powers of two of the area scaling.
 DEGREES, MU, DOUBLINGS = 10.0, 0.3, 6.0
 #: Steps of coordinates of the surface, of its images, and of distortions.
-STEPS = {"V": 2**14 - 1, "uv": 2**16 - 1, "share": 2**6 - 1}
+STEPS = {"V": 2**14 - 1, "uv": 2**16 - 1, "share": 2**5 - 1}
 #: Up to this many maps, image coordinates have finer steps, for detail inside fingers.
 FEW, FINER = 2, 2**24 - 1
 
@@ -66,9 +66,15 @@ def rotated_to_match(z: Complex, other: Complex) -> Complex:
     return z if overlap == 0 else z * (overlap / abs(overlap))
 
 
-def triangles_per_surface(surfaces: int) -> int:
-    """Return the number of triangles that each of several surfaces on one page may have."""
-    return min(MOST, max(LEAST, TOGETHER // max(surfaces, 1)))
+def triangles_per_surface(faces: Sequence[int]) -> int:
+    """Return the triangles that each surface on one page may have; small ones leave theirs."""
+    left = TOGETHER
+    for done, own in enumerate(sorted(faces)):
+        share = left // (len(faces) - done)
+        if own > share:
+            return min(MOST, max(LEAST, share))
+        left -= own
+    return MOST
 
 
 def view_scene(
@@ -109,7 +115,7 @@ def view_scene(
     added: dict[str, NDArray[np.int64]] = {}
 
     def add(name: str, values: NDArray[Any], base: str = "") -> None:
-        added[name] = rows = values.astype(np.int64).reshape(len(values), -1)
+        added[name] = rows = values.reshape(len(values), *(values.shape[1:] or (1,)))
         size = -(-int(rows.max(initial=1)).bit_length() // 8)
         head["arrays"].append([name, rows.size, rows.shape[1], size, base])
         before = added[base] if base else np.vstack([np.zeros_like(rows[:1]), rows[:-1]])

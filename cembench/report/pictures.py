@@ -17,12 +17,12 @@ from scipy import ndimage
 from cembench.core.errors import RenderError
 
 #: Maximum pixels of all pictures of a page together: at 0.11 bytes each (for small pictures of
-#: meshes and checkerboards; large, smooth ones take half) about 0.9 MB, and a third more as text.
-PIXELS = 8_000_000
+#: meshes and checkerboards; large, smooth ones take half) about 0.7 MB, and a third more as text.
+PIXELS = 6_000_000
 #: Pixels along the longer side of a picture.
 LONGEST = 1600
 #: WebP quality at which the edges of a checkerboard are still clean, and of the transparency.
-QUALITY, ALPHA_QUALITY = 70, 30
+QUALITY, ALPHA_QUALITY = 66, 30
 #: A pixel with all channels at least this bright is white background.
 WHITE = 234
 #: Isolated spots below this share of a picture are JPEG artefacts.
@@ -105,7 +105,7 @@ def embed_pixels(path: Path, cap: float, *, exact: bool) -> Embedded:
         picture = picture.resize(tuple(smaller), Image.Resampling.LANCZOS)
     file = io.BytesIO()
     quality = {"quality": QUALITY, "alpha_quality": ALPHA_QUALITY}
-    picture.save(file, "WEBP", lossless=exact, method=4, **quality)
+    picture.save(file, "WEBP", lossless=exact, method=6, **quality)
     content = base64.b64encode(file.getvalue()).decode()
     return Embedded(*picture.size, uri=f"data:image/webp;base64,{content}")
 

@@ -10,6 +10,7 @@ from cembench.conformal.metrics import angle_errors
 from cembench.drawing.view_scene import (
     DEGREES,
     MOST,
+    TOGETHER,
     ViewedMap,
     rotated_to_match,
     triangles_per_surface,
@@ -99,6 +100,7 @@ def test_maps_are_turned_alike(bowl):
 
 
 def test_many_surfaces_share_what_a_page_may_hold():
-    assert triangles_per_surface(1) == MOST
-    assert triangles_per_surface(12) == 10_000
-    assert triangles_per_surface(1000) == 5_000
+    assert triangles_per_surface([90_000]) == MOST
+    assert triangles_per_surface([90_000] * 10) == TOGETHER // 10
+    assert triangles_per_surface([5_000, *[90_000] * 5]) == (TOGETHER - 5_000) // 5
+    assert triangles_per_surface([90_000] * 1000) == 5_000

@@ -58,7 +58,7 @@ class Page(HTMLParser):
 def store_of(page):
     """What the page holds compressed."""
     packed = page.all("script", id="store")[0]["words"]
-    return json.loads(gzip.decompress(base64.b64decode(packed)))
+    return json.loads(gzip.decompress(base64.b85decode(packed)))
 
 
 def page_of(report, folder):
@@ -96,7 +96,7 @@ def test_its_policy_lets_only_its_own_scripts_run_and_no_request_leave(sample):
     assert rules["img-src"] == "data: blob:"
     packed = sample.all("script", id="plotly")[0]["words"]
     own = [s["words"].encode() for s in sample.all("script") if "type" not in s]
-    scripts = [*own, gzip.decompress(base64.b64decode(packed))]
+    scripts = [*own, gzip.decompress(base64.b85decode(packed))]
     hashes = [base64.b64encode(hashlib.sha256(s).digest()).decode() for s in scripts]
     assert len(own) == 1
     assert rules["script-src"] == " ".join(f"'sha256-{value}'" for value in hashes)
@@ -301,7 +301,7 @@ def test_pictures_keep_within_the_budget_and_small_ones_keep_all_they_have(tmp_p
     sizes = [(100, 100), (2000, 1000), (2000, 2000)]
     cap = pictures.pixel_cap(sizes, budget=1_000_000)
     assert cap == pytest.approx((1_000_000 - 100 * 100) / 2)
-    assert pictures.pixel_cap(sizes) == math.inf
+    assert pictures.pixel_cap(sizes[:2]) == math.inf
     Image.new("RGB", (2000, 1000)).save(tmp_path / "p.png")
     seen = pictures.embed_pixels(tmp_path / "p.png", cap, exact=False)
     assert seen.width * seen.height == pytest.approx(cap, rel=0.01)

@@ -421,7 +421,7 @@ def test_the_filter_turns_off_the_lines_of_other_algorithms_in_plots(page):
 
 def test_a_picture_shown_again_and_data_come_from_what_the_page_holds(page):
     page.open()
-    loaded = "return [...document.querySelectorAll('img')].every(i => i.src && i.complete)"
+    loaded = "return [...document.querySelectorAll('main img')].every(i => i.src && i.complete)"
     page.wait(lambda: page.run(loaded))
     link = page.one("#times a.data")
     assert link.get_attribute("href").startswith("blob:")

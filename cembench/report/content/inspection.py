@@ -112,7 +112,7 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
         if shown is None or (series.algorithm == REFERENCE and series.main):
             shown = (series, panel)
     curved, meshed = drawer.curvature_and_mesh(*shown) if shown else (None, None)
-    most = triangles_per_surface(len(evidence.surfaces))
+    most = triangles_per_surface([s.faces for s in evidence.surfaces])
     scene = view_scene(mesh, viewed, surface.title, most) if viewed else b""
     return Inspection(surface, True, checkerboards, curved, meshed, angles, scene)
 

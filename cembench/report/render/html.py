@@ -132,10 +132,10 @@ def render(report: Report, folder: Path) -> str:
             thumbnail=pictures.first_of,
             table_data=lambda table: path if (folder / (path := csv_of(table))).exists() else "",
             style=Markup(style),
-            scene=lambda gallery: base64.b64encode(gallery.scene).decode(),
+            scene=lambda gallery: as_text(gallery.scene),
             script=Markup(script),
-            store=Markup(_packed(_json(store))),
-            library=Markup(packed_library),
+            store=_packed(_json(store)),
+            library=packed_library,
             policy=policy([script.encode(), library]),
         )
     )
@@ -451,15 +451,20 @@ def template_text(name: str) -> str:
 
 
 @cache
-def _plotly() -> tuple[bytes, str]:
+def _plotly() -> tuple[bytes, Markup]:
     """Return Plotly's script, plain and as compressed text."""
     source = (Path(plotly.__file__).parent / "package_data" / "plotly.min.js").read_bytes()
     return source, _packed(source)
 
 
-def _packed(content: bytes) -> str:
+def _packed(content: bytes) -> Markup:
     """Return content as compressed text, which the browser unpacks."""
-    return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
+    return as_text(gzip.compress(content, 9, mtime=0))
+
+
+def as_text(content: bytes) -> Markup:
+    """Return bytes as text for a script element (base 85, a sixteenth shorter than base 64)."""
+    return Markup(base64.b85encode(content).decode())
 
 
 def _json(content: Any) -> bytes:

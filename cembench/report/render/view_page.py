@@ -34,7 +34,7 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
     check_pages_can_be_made()
     from markupsafe import Markup
 
-    from cembench.report.render.html import environment, policy, template_text
+    from cembench.report.render.html import as_text, environment, policy, template_text
 
     script = template_text("unpack.js") + template_text("view.js")
     page: str = (
@@ -42,7 +42,7 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
         .get_template("view.html")
         .render(
             title=title,
-            scene=base64.b64encode(scene).decode(),
+            scene=as_text(scene),
             picture=base64.b64encode(picture).decode(),
             facts=facts,
             style=Markup(template_text("view.css")),
