@@ -63,6 +63,37 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
     assert list(violations(layers())) == []
 
 
+#: Most lines of Python in each room, lowered after every cut.
+BUDGETS = {
+    "core": 1_750,
+    "mesh": 6_000,
+    "linear_algebra": 1_450,
+    "conformal": 5_000,
+    "registry": 870,
+    "results": 4_000,
+    "running": 7_150,
+    "drawing": 1_750,
+    "report": 7_950,
+    "validation": 2_400,
+    "workflows": 6_100,
+    "commands": 4_100,
+}
+
+
+def lines_of(room):
+    files = [PACKAGE / f"{room}.py", *(PACKAGE / room).rglob("*.py")]
+    return sum(len(file.read_text().splitlines()) for file in files if file.is_file())
+
+
+@pytest.mark.parametrize("room", BUDGETS)
+def test_a_room_keeps_to_its_lines_and_its_budget_follows_a_cut(room):
+    assert BUDGETS[room] - 150 < lines_of(room) <= BUDGETS[room]
+
+
+def test_every_room_has_a_budget():
+    assert set(BUDGETS) == set(layers())
+
+
 def test_an_upward_import_would_be_found(tmp_path):
     (tmp_path / "mesh").mkdir()
     (tmp_path / "mesh/files.py").write_text("def f():\n    from cembench.report import html\n")
