@@ -452,6 +452,10 @@
     const shown = FACETS.map((facet) => boxes.filter((box) => box.name === facet).map((box) => box.value))
       .filter((names) => names.length)
       .map((names) => (names.length > 6 ? `${names.slice(0, 5).join(", ")} and ${names.length - 5} more` : names.join(", ")));
+    const hidden = [
+      [rows, `${rows} of ${several(total, "row")}`], [columns, several(columns, "column")],
+      [pictures, `${pictures} of ${several(allPictures, "picture")}`],
+    ].filter(([number]) => number).map(([, words]) => words);
     document.querySelector(".choose").textContent = filtered ? `Filter (${boxes.length})` : "Filter";
     const told = document.getElementById("told");
     told.replaceChildren();
@@ -459,8 +463,7 @@
     const reset = element("button", { type: "button", textContent: "Show all" });
     reset.addEventListener("click", () => { document.getElementById("filter").reset(); });
     told.append(element("p", {}, element("b", { textContent: `Filter: ${shown.join(" · ")}.` }),
-      ` Hidden on all pages: ${rows} of ${total} rows, ${several(columns, "column")}, `
-      + `${pictures} of ${several(allPictures, "picture")}. `
+      ` Hidden on all pages: ${hidden.join(", ") || "nothing"}. `
       + "Means, counts, claims and findings still cover the whole run. ", reset));
   }
 
