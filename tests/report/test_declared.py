@@ -1,5 +1,8 @@
 """Tables that are declared in a file, and what is said of wrong declarations."""
 
+import pickle
+from dataclasses import fields
+
 import pytest
 
 from cembench.core.errors import ParameterError
@@ -117,6 +120,14 @@ def test_every_column_of_a_row_is_declared_and_the_frame_has_them_all(evidence):
         assert set(row(record)) <= set(COLUMNS)
     assert set(COLUMNS) <= set(evidence.frame)
     assert len(evidence.frame) == len(evidence.records)
+
+
+def test_a_run_is_sent_to_other_processes_without_what_was_computed(evidence):
+    assert len(evidence.frame)
+    sent = pickle.loads(pickle.dumps(evidence))
+    assert sent == evidence
+    assert "frame" in vars(evidence)
+    assert set(vars(sent)) == {one.name for one in fields(evidence)}
 
 
 @pytest.mark.parametrize("name", sorted(own_tables()))

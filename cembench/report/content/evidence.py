@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -120,6 +120,10 @@ class Evidence:
                 f"are {', '.join(paper.models)}. Leave --paper out, or name another."
             )
         return found
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what was computed: another thread may be filling that in while this is sent."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @cached_property
     def paper(self) -> Paper:
