@@ -43,9 +43,10 @@ if TYPE_CHECKING:
 
 #: Columns of a table of records that say which it is, and how it ended.
 _NAMES = (
-    "surface", "algorithm", "starred", "marked", "target", "solves", "status", "ending", "cause",
-)  # fmt: skip
-_HEADINGS = {"starred": "algorithm", "marked": "algorithm", "ending": ""}
+    *("surface", "algorithm", "starred", "marked", "called", "target", "solves"),
+    *("status", "ending", "cause"),
+)
+_HEADINGS = dict.fromkeys(("starred", "marked", "called"), "algorithm") | {"ending": ""}
 
 
 class DeclaredColumn(BaseModel):
@@ -254,6 +255,8 @@ def _entry(evidence: Evidence, row: Mapping[Any, Any], one: DeclaredColumn) -> V
         return words(row["label"] + ("" if record.target == DISK else " *"))
     if name == "marked":
         return words(f"{row['label']} {mark_of(record)}".rstrip())
+    if name == "called":
+        return words(f"{record.cell.algorithm} {mark_of(record)}".rstrip())
     if name in _NAMES:
         return words(str(row["label" if name == "algorithm" else name] or ""))
     if one.words:
