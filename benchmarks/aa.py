@@ -8,6 +8,7 @@ speedups in two runs overlap. Stopped, it goes on where it was when called again
     python -m benchmarks.aa                      # a machine with nothing else to do
     python -m benchmarks.aa --busy 1             # beside so many processes that never rest
     python -m benchmarks.aa --pairing process    # rounds with a shared process too
+    python -m benchmarks.aa --pairing shared --faces 500    # the shared processes alone: quicker
     python -m benchmarks.aa --profile quick --runs 2 --budget 4m -o results/aa-quick
     python -m benchmarks.aa --write-docs         # both, as far as they are there, in the page
 
@@ -20,8 +21,9 @@ import argparse
 import json
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from itertools import combinations
 from math import exp, log
 from pathlib import Path
@@ -32,12 +34,22 @@ from typing import Any
 from benchmarks import pages
 from benchmarks.repeatability import TWINS, pairs
 from cembench.core.atomic import write_text
-from cembench.results.comparison import both_ratios, compare, ratio_interval
+from cembench.registry import load_registry
+from cembench.results.comparison import (
+    Comparison,
+    both_ratios,
+    compare,
+    compare_ratios,
+    ratio_interval,
+)
 from cembench.results.intervals import ERROR
-from cembench.results.looks import share_of
+from cembench.results.looks import LOOKS, share, share_of
 from cembench.results.many import corrected
-from cembench.results.records import Record
+from cembench.results.records import Outcome, Record
 from cembench.results.store import Store
+from cembench.running.judging import Checked
+from cembench.running.local import Launcher, Options
+from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells
 
 PAGE = pages.ROOT / "docs/measuring.md"
 ALGORITHMS = ("cem", "ldm", "direct-cem", "lscm")
@@ -47,6 +59,7 @@ HALVES = {
     "busy": "beside a busy neighbour",
     "process": "within one process",
     "process-busy": "within one process, beside a busy neighbour",
+    "shared": "within one process, without its control",
 }
 
 
@@ -61,15 +74,19 @@ def main() -> None:
     parser.add_argument("--precision", default="10%")
     parser.add_argument("--budget", default="4m", help="of each run, see `cembench run`")
     parser.add_argument("--busy", type=int, default=0, metavar="N", help="start N busy loops")
-    parser.add_argument("--pairing", choices=("separate", "process"), default="separate")
+    pairings = ("separate", "process", "shared")
+    parser.add_argument("--pairing", choices=pairings, default="separate")
     parser.add_argument("-o", "--output", type=Path, default=Path("results/aa"))
     parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md; no runs")
     chosen = parser.parse_args()
     if not chosen.write_docs:
-        half = "process" if chosen.pairing == "process" else "quiet"
-        half = half if not chosen.busy else "process-busy" if half == "process" else "busy"
-        with neighbours(chosen.busy):
-            measure(chosen, half)
+        if chosen.pairing == "shared":
+            measure_shared(chosen)
+        else:
+            half = "process" if chosen.pairing == "process" else "quiet"
+            half = half if not chosen.busy else "process-busy" if half == "process" else "busy"
+            with neighbours(chosen.busy):
+                measure(chosen, half)
     text = tell(chosen.output)
     print(text)
     if chosen.write_docs:
@@ -91,6 +108,47 @@ def measure(chosen: argparse.Namespace, half: str) -> None:
         write_text(chosen.output / f"{half}.json", json.dumps(summary, indent=1))
         minutes = (monotonic() - started) / 60
         print(f"run {seed + 1} of {chosen.runs} after {minutes:.1f} min", file=sys.stderr)
+
+
+def measure_shared(chosen: argparse.Namespace) -> None:
+    """Compare twins by their shared processes alone; each run has the rounds of the first look.
+
+    The separate processes, which can only take a verdict back, are left out.
+    """
+    tables: list[list[Comparison]] = []
+    for seed in range(chosen.runs):
+        tables.append(_shared_run(chosen, seed))
+        write_text(chosen.output / "shared.json", json.dumps(_counted(tables), indent=1))
+        print(f"run {seed + 1} of {chosen.runs}", file=sys.stderr)
+
+
+def _shared_run(chosen: argparse.Namespace, seed: int) -> list[Comparison]:
+    """Return the comparisons of one run, of each algorithm with its twin on each surface."""
+    registry = load_registry([str(TWINS)])
+    names = chosen.algorithms.split(",")
+    both = [registry.algorithm(one) for name in names for one in (name, f"{name}-twin")]
+    how = MeasurementSettings.until_precise(0.1)
+    groups = []
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        closing(Launcher(Path(folder), Options(seed=seed))) as launcher,
+    ):
+        for surface in chosen.surfaces.split(","):
+            mesh = generate_surface(registry, surface, chosen.faces)
+            tasks = plan_cells(both, [mesh], {}, how, [str(TWINS)])
+            checked = [Checked.of(launcher.check(task)[0]) for task in tasks]
+            groups.append((tasks, checked, list[list[float]]()))
+        for _ in range(LOOKS[0]):
+            launcher.close()
+            for tasks, checked, seconds in groups:
+                found = launcher.together(tasks, checked)
+                if not isinstance(found, Outcome):
+                    seconds.append([one.seconds for one in found])
+    return [
+        compare_ratios([row[k + 1] / row[k] for row in seconds], share(len(seconds)))
+        for _, _, seconds in groups
+        for k in range(0, 2 * len(names), 2)
+    ]
 
 
 @contextmanager
@@ -129,9 +187,6 @@ def summarise(runs: Sequence[Sequence[Record]], names: Sequence[str]) -> dict[st
         [c for name in names for p in pairs(r, f"{name}-twin", name) if (c := compare(*p))]
         for r in runs
     ]
-    found = [one for table in tables for one in table if one.interval is not None]
-    different = [one.verdict in ("faster", "slower") for one in found]
-    together = [one.verdict in ("faster", "slower") for table in tables for one in corrected(table)]
     rounds = [len(record.outcome.rounds) for records in runs for record in records]
     busy = [
         bool(r.neighbours and r.neighbours.busy)
@@ -141,21 +196,32 @@ def summarise(runs: Sequence[Sequence[Record]], names: Sequence[str]) -> dict[st
     ]
     overlapping, compared, apart = _repeated(runs, names)
     narrower = [n for records in runs for name in names for n in _narrower(records, name)]
-    return {
-        "shared": sum(one.together for one in found),
+    return _counted(tables) | {
+        "shared": sum(one.together for table in tables for one in table),
         "median_narrower": median(narrower) if narrower else None,
-        "runs": len(runs),
-        "comparisons": len(found),
-        "called_different": sum(different),
-        "interval": clopper_pearson(sum(different), len(found)),
-        "called_different_corrected": sum(together),
-        "median_ratio": exp(median(log(one.ratio) for one in found)) if found else None,
         "median_rounds": median(rounds) if rounds else None,
         "busy_share": sum(busy) / len(busy) if busy else None,
         "speedups_compared": compared,
         "speedups_overlapping": overlapping,
         "median_difference": median(apart) if apart else None,
         "largest_difference": max(apart, default=None),
+    }
+
+
+def _counted(tables: Sequence[Sequence[Comparison]]) -> dict[str, Any]:
+    """Return how many comparisons of equal algorithms, by run, were called different."""
+    found = [one for table in tables for one in table if one.interval is not None]
+    different = [one.verdict in ("faster", "slower") for one in found]
+    together = [one.verdict in ("faster", "slower") for table in tables for one in corrected(table)]
+    return {
+        "runs": len(tables),
+        "comparisons": len(found),
+        "called_different": sum(different),
+        "interval": clopper_pearson(sum(different), len(found)),
+        "called_different_corrected": sum(together),
+        "median_ratio": exp(median(log(one.ratio) for one in found)) if found else None,
+        "median_rounds": LOOKS[0],
+        "busy_share": None,
     }
 
 
@@ -218,7 +284,7 @@ def tell(output: Path) -> str:
             f"| {HALVES[half]} | {f['runs']} | {n} | {f['called_different']} "
             f"({f['called_different'] / max(n, 1):.1%}) | {low:.1%} to {high:.1%} "
             f"| {f['called_different_corrected']} | {f['median_rounds']:g} "
-            f"| {f['busy_share']:.0%} |"
+            f"| {'-' if f['busy_share'] is None else format(f['busy_share'], '.0%')} |"
         )
     shared = [(half, f) for half, f in rows.items() if f.get("median_narrower")]
     lines += ["", f"Stated is at most {ERROR:.0%}. *rounds*: the median of a cell; *busy*: the "]
@@ -231,7 +297,7 @@ def tell(output: Path) -> str:
             f"{f['median_narrower']:.1f} times narrower in the median.",
         ]
     for half, f in rows.items():
-        if f["speedups_compared"]:
+        if f.get("speedups_compared"):
             share = f["speedups_overlapping"] / f["speedups_compared"]
             lines += [
                 "",
