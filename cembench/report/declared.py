@@ -20,7 +20,7 @@ why it has no number.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -41,11 +41,30 @@ from cembench.results.records import Record
 if TYPE_CHECKING:
     import pandas as pd
 
-#: Columns of a table of records that say which it is, and how it ended.
-_NAMES = (
-    *("surface", "algorithm", "starred", "marked", "called", "target", "solves"),
-    *("status", "ending", "cause"),
-)
+
+def _with_mark(name: str, record: Record) -> str:
+    return f"{name} {mark_of(record)}".rstrip()
+
+
+def _ending(record: Record) -> str:
+    folds = record.outcome.metrics.get("flipped_triangles")
+    return f"{folds:,} folds" if folds else record.outcome.status
+
+
+#: Columns of a table of records that say which it is, and how it ended: the text of each, from its
+#: row of the frame and the record.
+_NAMES: Mapping[str, Callable[[Mapping[Any, Any], Record], str]] = {
+    "surface": lambda row, _: row["surface"],
+    "algorithm": lambda row, _: row["label"],
+    "starred": lambda row, record: row["label"] + ("" if record.target == DISK else " *"),
+    "marked": lambda row, record: _with_mark(row["label"], record),
+    "called": lambda _, record: _with_mark(record.cell.algorithm, record),
+    "target": lambda _, record: record.target,
+    "solves": lambda _, record: record.cell.solves,
+    "status": lambda _, record: record.outcome.status,
+    "ending": lambda _, record: _ending(record),
+    "cause": lambda _, record: record.outcome.cause or "",
+}
 _HEADINGS = dict.fromkeys(("starred", "marked", "called"), "algorithm") | {"ending": ""}
 
 
@@ -248,17 +267,8 @@ def _entry(evidence: Evidence, row: Mapping[Any, Any], one: DeclaredColumn) -> V
     record, name = evidence.by_key[row["key"]], one.column
     if name == "status":
         return Value(record.outcome.status, None, "", row["key"], record.outcome.cause or "")
-    if name == "ending":
-        folds = record.outcome.metrics.get("flipped_triangles")
-        return words(f"{folds:,} folds" if folds else record.outcome.status)
-    if name == "starred":
-        return words(row["label"] + ("" if record.target == DISK else " *"))
-    if name == "marked":
-        return words(f"{row['label']} {mark_of(record)}".rstrip())
-    if name == "called":
-        return words(f"{record.cell.algorithm} {mark_of(record)}".rstrip())
     if name in _NAMES:
-        return words(str(row["label" if name == "algorithm" else name] or ""))
+        return words(_NAMES[name](row, record))
     if one.words:
         return words(str(COLUMNS[name].of(record) or "-"))
     return figure_entry(evidence, record, COLUMNS[name])

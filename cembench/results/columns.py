@@ -53,8 +53,6 @@ class FrameColumn:
         Why a record that ended ok has no value.
     timed : bool
         Whether it is a time: marked if unstable, and with the letter of its machine.
-    exported : bool
-        Whether rows and exports have it; the others are derived, for tables.
 
     """
 
@@ -65,7 +63,6 @@ class FrameColumn:
     form: str = "g"
     lacking: str | Callable[[Record], str] = "not measured"
     timed: bool = False
-    exported: bool = True
 
     def why_lacking(self, record: Record) -> str:
         """Return why a record that ended ok has no value."""
@@ -87,29 +84,15 @@ def worded(number: float, form: str) -> str:
     return format(int(number) if form.endswith("d") else number, form)
 
 
-def _of_work(name: str) -> Callable[[Record], Any]:
+def _at(path: str) -> Callable[[Record], Any]:
+    """Return a function that reads a dotted path of a record; None where a part of it is None."""
+    names = path.split(".")
+
     def of(record: Record) -> Any:
-        work = record.outcome.work
-        return getattr(work, name) if work else None
-
-    return of
-
-
-def _of_outcome(name: str) -> Callable[[Record], Any]:
-    return lambda record: getattr(record.outcome, name)
-
-
-def _of_mesh(name: str) -> Callable[[Record], Any]:
-    return lambda record: getattr(record.mesh, name)
-
-
-def _of_cell(name: str) -> Callable[[Record], Any]:
-    return lambda record: getattr(record.cell, name)
-
-
-def _of_program(name: str) -> Callable[[Record], Any]:
-    def of(record: Record) -> Any:
-        return getattr(record.outcome.program, name) if record.outcome.program else None
+        found: Any = record
+        for name in names:
+            found = None if found is None else getattr(found, name)
+        return found
 
     return of
 
@@ -197,104 +180,94 @@ def _memory(record: Record) -> float | None:
 _SECONDS: Mapping[str, Any] = {"unit": "s", "form": "significant"}
 _C = FrameColumn
 
-#: Exported columns in their order, the metrics among them; then the derived ones.
-COLUMNS: Mapping[str, FrameColumn] = MappingProxyType(
-    {
-        column.name: column
-        for column in (
-            _C("mesh", _of_cell("mesh"), "surface"),
-            _C("algorithm", _of_cell("algorithm"), "algorithm"),
-            _C("title", lambda r: r.title, "algorithm"),
-            _C("target", lambda r: r.target, "target"),
-            _C("external", lambda r: r.external.kind if r.external else None),
-            _C("external_name", lambda r: r.external.name if r.external else None),
-            _C("external_version", _of_program("version")),
-            _C("parameters", _of_cell("parameters")),
-            _C("status", _of_outcome("status"), "status"),
-            _C("cause", _of_outcome("cause"), "cause"),
-            *map(_metric, FIGURES),
-            _C(
-                "folded_before_repair", _of_outcome("folded_before_repair"), "folds before",
-                form=",d", lacking="not counted by the algorithm",
-            ),
-            _C("boundaries", lambda r: [b.model_dump() for b in r.outcome.boundaries]),
-            _C("iterations", _of_outcome("iterations"), "iterations", form="d"),
-            _C("seconds", _of_outcome("median_seconds"), "seconds", timed=True, **_SECONDS),
-            _C("seconds_raw", lambda r: list(r.outcome.seconds)),
-            _C("seconds_together", _together),
-            _C("seconds_low", lambda r: _end(r, "low")),
-            _C("seconds_high", lambda r: _end(r, "high")),
-            _C("seconds_min", _fastest),
-            _C("seconds_calls", lambda r: [list(x.calls) for x in r.outcome.rounds]),
-            _C("unstable", is_unstable),
-            _C("ended", _of_outcome("ended")),
-            _C("cpu_seconds", _of_outcome("cpu_seconds"), "CPU", **_SECONDS),
-            _C("busy_rounds", lambda r: _busy(r.outcome)),
-            _C("start_seconds", _of_outcome("start_seconds"), "start", lacking="none", **_SECONDS),
-            _C("own_seconds", _of_outcome("own_seconds")),
-            _C(
-                "solve_seconds",
-                lambda r: r.outcome.solve_seconds if r.is_program else None,
-                "solve", lacking="none", **_SECONDS,
-            ),
-            _C("input_bytes", _of_program("input_bytes")),
-            _C("output_bytes", _of_program("output_bytes")),
-            _C("phases", _of_outcome("phases")),
-            _C("factorisations", _of_work("numeric")),
-            _C("analyses", _of_work("symbolic")),
-            _C("right_hand_sides", _of_work("right_hand_sides")),
-            _C("matrix_order", _of_work("order")),
-            _C("factor_entries", _of_work("entries")),
-            _C("peak_memory_bytes", _of_outcome("peak_memory_bytes")),
-            _C("memory_increase_bytes", _of_outcome("memory_increase_bytes")),
-            _C("notes", lambda r: [str(note) for note in r.outcome.notes]),
-            _C("energy_history", lambda r: list(r.outcome.energy_history)),
-            _C("extras", _of_outcome("extras")),
-            _C("vertices", _of_mesh("vertices"), "vertices", form=",d"),
-            _C("faces", _of_mesh("faces"), "faces", form=",d"),
-            _C("boundary_vertices", _of_mesh("boundary_vertices"), "boundary vertices", form=",d"),
-            _C("non_delaunay_share", _of_mesh("non_delaunay_share"), "not Delaunay", form=".1%"),
-            _C("notices", lambda r: [str(notice) for notice in r.mesh.notices]),
-            _C("origin", _of_mesh("origin")),
-            _C("paper_row", lambda r: r.mesh.paper_row or None),
-            _C("solves", _of_cell("solves"), "solves"),
-            _C("backend", _of_cell("backend")),
-            _C("threads", _of_cell("threads")),
-            _C("mesh_hash", _of_cell("mesh_hash")),
-            _C("repeats", lambda r: r.cell.repeats or None),
-            _C("precision", _of_cell("precision")),
-            _C("rounds", lambda r: len(r.outcome.rounds), "rounds", form="d"),
-            _C("environment", lambda r: r.environment),
-            _C("started_at", lambda r: r.started_at),
-            _C("key", _of_cell("key")),
-            _C(
-                "relative_energy", _of_outcome("relative_energy"), "E_C / A",
-                form=".4f", exported=False,
-            ),
-            _C(
-                "half_width", half_width, "±%",
-                form=".0f", lacking="fewer than six rounds", exported=False,
-            ),
-            _C("memory_mib", _memory, "memory", "MiB", ",.0f", exported=False),
-            _C("call_seconds", _call, "call", lacking="none", exported=False, **_SECONDS),
-            _C("wall_seconds", _wall, "wall", lacking="none", exported=False, **_SECONDS),
-            _C(
-                "counted_factorisations", _in(1, "numeric"), "factored",
-                form=".0f", lacking="not counted", exported=False,
-            ),
-            _C(
-                "counted_columns", _in(1, "right_hand_sides"), "solved",
-                form="tenths", lacking="not counted", exported=False,
-            ),
-            _C(
-                "factor_millions", _in(MILLION, "entries"), "factor, M",
-                form=".3g", lacking=_uncounted, exported=False,
-            ),
-            _C("solve_from", _solve_from, "solve from", exported=False),
-            _C(
-                "faults", lambda r: sorted({fault.kind.value for fault in r.outcome.faults}),
-                exported=False,
-            ),
-        )
-    }
+#: What rows and exports have, in this order, the metrics among it.
+EXPORTED = (
+    _C("mesh", _at("cell.mesh"), "surface"),
+    _C("algorithm", _at("cell.algorithm"), "algorithm"),
+    _C("title", _at("title"), "algorithm"),
+    _C("target", _at("target"), "target"),
+    _C("external", _at("external.kind")),
+    _C("external_name", _at("external.name")),
+    _C("external_version", _at("outcome.program.version")),
+    _C("parameters", _at("cell.parameters")),
+    _C("status", _at("outcome.status"), "status"),
+    _C("cause", _at("outcome.cause"), "cause"),
+    *map(_metric, FIGURES),
+    _C(
+        "folded_before_repair", _at("outcome.folded_before_repair"), "folds before",
+        form=",d", lacking="not counted by the algorithm",
+    ),
+    _C("boundaries", lambda r: [b.model_dump() for b in r.outcome.boundaries]),
+    _C("iterations", _at("outcome.iterations"), "iterations", form="d"),
+    _C("seconds", _at("outcome.median_seconds"), "seconds", timed=True, **_SECONDS),
+    _C("seconds_raw", lambda r: list(r.outcome.seconds)),
+    _C("seconds_together", _together),
+    _C("seconds_low", lambda r: _end(r, "low")),
+    _C("seconds_high", lambda r: _end(r, "high")),
+    _C("seconds_min", _fastest),
+    _C("seconds_calls", lambda r: [list(x.calls) for x in r.outcome.rounds]),
+    _C("unstable", is_unstable),
+    _C("ended", _at("outcome.ended")),
+    _C("cpu_seconds", _at("outcome.cpu_seconds"), "CPU", **_SECONDS),
+    _C("busy_rounds", lambda r: _busy(r.outcome)),
+    _C("start_seconds", _at("outcome.start_seconds"), "start", lacking="none", **_SECONDS),
+    _C("own_seconds", _at("outcome.own_seconds")),
+    _C(
+        "solve_seconds",
+        lambda r: r.outcome.solve_seconds if r.is_program else None,
+        "solve", lacking="none", **_SECONDS,
+    ),
+    _C("input_bytes", _at("outcome.program.input_bytes")),
+    _C("output_bytes", _at("outcome.program.output_bytes")),
+    _C("phases", _at("outcome.phases")),
+    _C("factorisations", _at("outcome.work.numeric")),
+    _C("analyses", _at("outcome.work.symbolic")),
+    _C("right_hand_sides", _at("outcome.work.right_hand_sides")),
+    _C("matrix_order", _at("outcome.work.order")),
+    _C("factor_entries", _at("outcome.work.entries")),
+    _C("peak_memory_bytes", _at("outcome.peak_memory_bytes")),
+    _C("memory_increase_bytes", _at("outcome.memory_increase_bytes")),
+    _C("notes", lambda r: [str(note) for note in r.outcome.notes]),
+    _C("energy_history", lambda r: list(r.outcome.energy_history)),
+    _C("extras", _at("outcome.extras")),
+    _C("vertices", _at("mesh.vertices"), "vertices", form=",d"),
+    _C("faces", _at("mesh.faces"), "faces", form=",d"),
+    _C("boundary_vertices", _at("mesh.boundary_vertices"), "boundary vertices", form=",d"),
+    _C("non_delaunay_share", _at("mesh.non_delaunay_share"), "not Delaunay", form=".1%"),
+    _C("notices", lambda r: [str(notice) for notice in r.mesh.notices]),
+    _C("origin", _at("mesh.origin")),
+    _C("paper_row", lambda r: r.mesh.paper_row or None),
+    _C("solves", _at("cell.solves"), "solves"),
+    _C("backend", _at("cell.backend")),
+    _C("threads", _at("cell.threads")),
+    _C("mesh_hash", _at("cell.mesh_hash")),
+    _C("repeats", lambda r: r.cell.repeats or None),
+    _C("precision", _at("cell.precision")),
+    _C("rounds", lambda r: len(r.outcome.rounds), "rounds", form="d"),
+    _C("environment", _at("environment")),
+    _C("started_at", _at("started_at")),
+    _C("key", _at("cell.key")),
 )  # fmt: skip
+#: What is derived of it for tables.
+DERIVED = (
+    _C("relative_energy", _at("outcome.relative_energy"), "E_C / A", form=".4f"),
+    _C("half_width", half_width, "±%", form=".0f", lacking="fewer than six rounds"),
+    _C("memory_mib", _memory, "memory", "MiB", ",.0f"),
+    _C("call_seconds", _call, "call", lacking="none", **_SECONDS),
+    _C("wall_seconds", _wall, "wall", lacking="none", **_SECONDS),
+    _C(
+        "counted_factorisations", _in(1, "numeric"), "factored",
+        form=".0f", lacking="not counted",
+    ),
+    _C(
+        "counted_columns", _in(1, "right_hand_sides"), "solved",
+        form="tenths", lacking="not counted",
+    ),
+    _C("factor_millions", _in(MILLION, "entries"), "factor, M", form=".3g", lacking=_uncounted),
+    _C("solve_from", _solve_from, "solve from"),
+    _C("faults", lambda r: sorted({fault.kind.value for fault in r.outcome.faults})),
+)  # fmt: skip
+#: All columns by name.
+COLUMNS: Mapping[str, FrameColumn] = MappingProxyType(
+    {column.name: column for column in (*EXPORTED, *DERIVED)}
+)

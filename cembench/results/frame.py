@@ -91,8 +91,8 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
 )
 
 
-def evaluate(expression: str, frame: pd.DataFrame, **more: Any) -> Any:
-    """Return the value of an expression over a frame; `more` are further names.
+def evaluate(expression: str, frame: pd.DataFrame) -> Any:
+    """Return the value of an expression over a frame.
 
     Raises
     ------
@@ -100,7 +100,7 @@ def evaluate(expression: str, frame: pd.DataFrame, **more: Any) -> Any:
         The expression cannot be read, names something unknown, or fails on this frame.
 
     """
-    known = {**FUNCTIONS, **{str(name): frame[name] for name in frame}, **more}
+    known = {**FUNCTIONS, **{str(name): frame[name] for name in frame}}
     try:
         tree = ast.parse(expression, mode="eval")
     except SyntaxError as error:

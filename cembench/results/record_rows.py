@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from cembench.results.columns import COLUMNS, FIGURES
+from cembench.results.columns import EXPORTED, FIGURES
 from cembench.results.comparison import (
     Comparison,
     circumstances,
@@ -84,7 +84,7 @@ def row(record: Record) -> dict[str, Any]:
     metrics = record.outcome.metrics
     found = {
         column.name: column.of(record)
-        for column in COLUMNS.values()
-        if column.exported and (column.name in metrics or column.name not in _METRICS)
+        for column in EXPORTED
+        if column.name in metrics or column.name not in _METRICS
     }
     return found | metrics

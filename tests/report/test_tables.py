@@ -5,8 +5,8 @@ from cembench.report.content import averages
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.policies import policies_table
 from cembench.report.content.printed_tables import printed_tables
+from cembench.report.content.rates import averages_table, measured_rates, rates_tables
 from cembench.report.content.surface_page import figures_table
-from cembench.report.content.table_2 import averages_table, measured_rates, rates_tables
 from cembench.report.declared import declared_table
 from cembench.report.document import marked
 from cembench.results.columns import significant
@@ -140,7 +140,7 @@ def test_aggregates_run_over_what_was_measured_and_say_their_n(evidence):
     rates, models = measured_rates(evidence, "qiem", "reuse")
     assert (rates, models) == ([pytest.approx(7.0)], ["Liu's Neutral Face"])
     assert measured_rates(evidence, "ldm", "reuse")[0] == pytest.approx([-0.5, 0.0])
-    table = averages_table(evidence, "reuse")
+    table = averages_table(evidence, 2, "reuse")
     counts = table.rows[-1]
     assert [v.number for v in counts[1:]] == [None, 20, 1, 1, None, 18, 2, 2, None, 20, 2, 2]
     footer = by_name(rates_tables(evidence, 2))["table-2"].rows[-1]
@@ -160,10 +160,10 @@ def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
         outcome = record.outcome.model_copy(update={"work": work})
         return record.model_copy(update={"outcome": outcome})
 
-    plain = averages_table(evidence, "reuse")
+    plain = averages_table(evidence, 2, "reuse")
     assert not any("factorisations" in row[0].text for row in plain.rows)
     known = Evidence(evidence.store, tuple(map(counted, evidence.records)), evidence.exhibits)
-    table = averages_table(known, "reuse")
+    table = averages_table(known, 2, "reuse")
     (row,) = (row for row in table.rows if "factorisations" in row[0].text)
     told = dict(zip([(c.group, c.title) for c in table.columns], row, strict=True))
     assert told["QIEM", "here"].number == pytest.approx(8)

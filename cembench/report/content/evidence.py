@@ -19,7 +19,7 @@ from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import record_rows as frame
-from cembench.results.columns import COLUMNS
+from cembench.results.columns import COLUMNS, DERIVED
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
@@ -144,8 +144,9 @@ class Evidence:
     def frame(self) -> pd.DataFrame:
         """The records as a frame, a row each, by surface, series and policy.
 
-        Its columns are those of :mod:`cembench.results.columns`, and `surface` (its title), `place`
-        (its number in the report), `label` and `series` (its number), `main`, and `ok`.
+        Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
+        and `surface` (its title), `place` (its number in the report), `label` and `series` (its
+        number), `main`, and `ok`.
         """
         import pandas as pd
 
@@ -155,7 +156,8 @@ class Evidence:
         for record in self.records:
             k, own = series[record.cell.algorithm, self._variants[record.cell.key]]
             place, surface = surfaces[record.cell.mesh_hash]
-            figures = {name: column.of(record) for name, column in COLUMNS.items()}
+            figures = dict.fromkeys(COLUMNS) | self.row(record)
+            figures |= {column.name: column.of(record) for column in DERIVED}
             about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
             more = {"main": own.main, "ok": record.outcome.status == "ok"}
             order = (place, k, self.policies.index(record.cell.solves))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, own_tables
-from cembench.report.document import Column, Table, Text, words
-
-_HEADINGS = ("surface", "algorithm", "solves", "status", "cause")
+from cembench.report.document import Table, Text, words
 
 
 def not_ok(evidence: Evidence) -> Table | Text:
     """Return a table of cells without a valid map, or a sentence if there is none."""
+    declared = own_tables()["not-ok"]
     table = declared_table(evidence, "not-ok")
     held = {record.cell.key for record in evidence.store.records()}
     again = "requested but not finished: run the same `cembench run` again to resume"
@@ -25,6 +24,5 @@ def not_ok(evidence: Evidence) -> Table | Text:
     title = (
         f"{len(rows)} of {len(evidence.records)} cells did not end ok; {len(missing)} are missing"
     )
-    columns = tuple(Column(heading, numeric=False) for heading in _HEADINGS)
-    caption = own_tables()["not-ok"].caption
-    return Table("not-ok", title, columns, (*rows, *missing), caption)
+    columns = tuple(column.heading for column in declared.columns)
+    return Table("not-ok", title, columns, (*rows, *missing), declared.caption)

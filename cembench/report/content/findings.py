@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from cembench.report.content.as_good import AS_GOOD, DEGREES
+from cembench.report.content.by_surface import own_table
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
-from cembench.report.content.printed_tables import own_table
 from cembench.report.content.standings import (
     NEAR,
     AngleRatio,

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from cembench.report.content.averages import mean_rate
 from cembench.report.content.claims import under
 from cembench.report.content.evidence import Evidence
+from cembench.report.content.rates import measured_rates
 from cembench.report.content.sure_speedups import paired_rounds
-from cembench.report.content.table_2 import measured_rates
 from cembench.report.document import VERDICTS, Claim, Sentence
 from cembench.results.intervals import DEFAULT_ROUNDS
 from cembench.results.many import FEWEST_SURFACES, arithmetic, rate_interval

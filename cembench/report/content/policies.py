@@ -18,7 +18,7 @@ from cembench.report.content.printed_beside_measured import (
     geometric_mean,
     table_beside,
 )
-from cembench.report.content.table_2 import measured_rates
+from cembench.report.content.rates import measured_rates
 from cembench.report.document import Column, Gap, Table, Value, count, missing, words
 from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.report.plots import PlotSeries as Bars

@@ -30,9 +30,9 @@ from cembench.report.content.many.found import many_findings
 from cembench.report.content.many.section import is_many, many_section
 from cembench.report.content.many.worst import hardest
 from cembench.report.content.printed_tables import printed_tables
+from cembench.report.content.rates import rates_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
-from cembench.report.content.table_2 import rates_tables
 from cembench.report.declared import declared_table
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from cembench.report.content.by_surface import hardest_table
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.figures.performance_profile import performance_profile
 from cembench.report.content.inspection import Inspection
@@ -13,7 +14,6 @@ from cembench.report.content.many.accuracy_profiles import accuracy_profiles
 from cembench.report.content.many.difficulty import difficulties, errors_by_difficulty
 from cembench.report.content.many.pairwise_wins import pairwise_wins
 from cembench.report.content.many.worst import hardest_gallery
-from cembench.report.content.printed_tables import hardest_table
 from cembench.report.declared import declared_table
 from cembench.report.document import Item, Section, Text
 from cembench.report.plots import write_plot

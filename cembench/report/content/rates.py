@@ -1,23 +1,20 @@
-"""Table 2: the rates of speedup of CEM over the others (Eq. 33), and their averages."""
+"""The rates of speedup of CEM over the others (Eq. 33) in a paper's table, and their averages."""
 
 from __future__ import annotations
 
-from cembench.report.content.averages import (
-    READINGS,
-    geometric_rate,
-    percent,
-    printed_rates,
-)
+from cembench.report.content.averages import READINGS, corrected_rate, percent, printed_rates
 from cembench.report.content.evidence import REFERENCE, Evidence
 from cembench.report.content.linear_algebra_work import work_of
 from cembench.report.content.printed_beside_measured import (
     absent_models,
+    geometric_mean,
     in_policy,
     policy_suffix,
 )
 from cembench.report.content.printed_tables import printed_table
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.document import Column, Table, Value, count, missing, words
+from cembench.results.papers import Paper
 
 
 def rates_tables(evidence: Evidence, number: int) -> list[Table]:
@@ -25,12 +22,12 @@ def rates_tables(evidence: Evidence, number: int) -> list[Table]:
     found: list[Table] = []
     for policy in evidence.policies:
         found += printed_table(evidence, number, policy)
-        found += [averages_table(evidence, policy)] if evidence.models else []
+        found += [averages_table(evidence, number, policy)] if evidence.models else []
         found += sure_speedups(evidence, policy)
     return found
 
 
-def averages_table(evidence: Evidence, policy: str) -> Table:
+def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
     """Return both readings of the averages: stated, printed for all or these models, measured."""
     columns = [Column("reading", numeric=False)]
     for algorithm in evidence.paper.compared:
@@ -68,7 +65,7 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
     origins = sorted({s.origin for s in evidence.models})
     return Table(
         name=f"averages{policy_suffix(policy, evidence)}",
-        title=f"Averages of Table 2, in both readings{in_policy(evidence, policy)}",
+        title=f"Averages of Table {number}, in both readings{in_policy(evidence, policy)}",
         columns=tuple(columns),
         rows=(*rows, tuple(counts)),
         caption=(
@@ -78,7 +75,7 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
             "itself, its stand-in is left out."
         ),
         notes=(
-            "the misprint (Knit Cap Man, FDM) is replaced by the 28.07 that Table 1 gives",
+            *_replaced(evidence.paper, number),
             f"measured on: {', '.join(origins)}; {len(absent_models(evidence))} of the paper's "
             "models are not in this run",
         ),
@@ -86,12 +83,22 @@ def averages_table(evidence: Evidence, policy: str) -> Table:
     )
 
 
+def _replaced(paper: Paper, number: int) -> list[str]:
+    """Return a sentence for each misprint of the table, with what is taken instead."""
+    return [
+        f"the misprint ({model}, {algorithm.upper()}) is replaced by the {rate:.2f} that Table "
+        f"{paper.table_of('seconds')} gives"
+        for table, model, algorithm in paper.misprints
+        if table == number and (rate := corrected_rate(paper, model, algorithm)) is not None
+    ]
+
+
 def _work_row(evidence: Evidence, policy: str) -> tuple[Value, ...]:
     """Return the row that no machine's speed is in: factorisations over CEM's."""
     cells = [words("factorisations over CEM's, geometric mean")]
     for algorithm in evidence.paper.compared:
         ratios = work_ratios(evidence, algorithm, policy)
-        mean = geometric_rate([ratio - 1 for ratio in ratios]) + 1 if ratios else None
+        mean = geometric_mean(ratios) if ratios else None
         cells += [missing("the paper does not count them")] * 3
         cells.append(
             missing("not counted") if mean is None else Value(f"{mean:.1f}", mean, "derived")
