@@ -6,18 +6,22 @@ column for the substitution back. With the rows next to a surface's boundary tha
 factor.
 
 The part is a factor of its own to CHOLMOD, with the same numbers: of cvxopt's factor only its
-supernodes' indices are copied.
+supernodes' indices are copied. No version of CHOLMOD promises to take such a factor, so a process
+first solves a known system by it. If that goes wrong there are no parts, and the whole is passed.
 """
 
 from __future__ import annotations
 
 import ctypes
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
-from cvxopt import cholmod, matrix
+from cvxopt import cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 
+from cembench.linear_algebra.cholmod_options import set_options
+from cembench.linear_algebra.orderings import as_permutation, minimum_degree
 from cembench.linear_algebra.supernodes import CAPSULE, FactorStructure, Supernodes, held_factor
 
 Real = NDArray[np.float64]
@@ -48,9 +52,9 @@ class FactorTree:
 
     @classmethod
     def of(cls, factor: Any, n: int) -> Self | None:
-        """Return the tree of a factor of order n; None if its structure is not as expected."""
+        """Return the tree of a factor of order n; None if parts of it cannot be trusted."""
         whole = held_factor(factor, n)
-        return None if whole is None else cls(factor, whole)
+        return cls(factor, whole) if whole is not None and parts_are_right() else None
 
     def with_ancestors(self, rows: Indices) -> Indices:
         """Return the supernodes of these rows and all their ancestors, in order."""
@@ -129,6 +133,33 @@ class FactorPart:
         x = matrix(B)
         cholmod.solve(self._part, x, sys=step)
         return np.array(x)
+
+
+@cache
+def parts_are_right() -> bool:
+    """Whether a part solves a known system as it should, tried once in a process.
+
+    The system is the Laplacian of a grid, with a boundary at which it is zero.
+    """
+    side = 8
+    line = 2 * np.eye(side) - np.eye(side, k=1) - np.eye(side, k=-1)
+    A = np.kron(line, np.eye(side)) + np.kron(np.eye(side), line)
+    rows, columns = np.nonzero(np.tril(A))
+    lower = spmatrix(A[rows, columns], rows, columns, A.shape, "d")
+    set_options(postorder=True)
+    factor = cholmod.symbolic(lower, as_permutation(minimum_degree(lower)))
+    cholmod.numeric(lower, factor)
+    whole = held_factor(factor, len(A))
+    if whole is None:
+        return False
+    some = np.arange(side)
+    part = FactorPart(FactorTree(factor, whole), some)
+    B = np.zeros((len(A), 2))
+    B[some] = np.stack([np.ones(side), np.sin(some)], axis=1)
+    X = np.linalg.solve(A, B)
+    return np.allclose(part.solve(B[some]), X[some]) and np.allclose(
+        part.solve_everywhere(B[some]), X
+    )
 
 
 def _ranges(starts: Indices, lengths: Indices) -> Indices:

@@ -10,6 +10,7 @@ from scipy import sparse
 from cembench.conformal.laplacian import by_rows, laplacian
 from cembench.linear_algebra import factor_part
 from cembench.linear_algebra.cholesky import Cholesky, available_backends, linear_algebra
+from cembench.linear_algebra.factor_part import FactorPart
 from cembench.linear_algebra.work import counting
 
 
@@ -108,6 +109,21 @@ def test_where_the_factor_cannot_be_seen_they_are_whole_solves(monkeypatch):
         there = Cholesky(A).among(rows).solve(b)
     assert work.right_hand_sides == 1
     np.testing.assert_allclose(there, expected(A, rows, b)[rows], atol=1e-11)
+
+
+def test_parts_that_solve_a_known_system_wrongly_are_not_used(monkeypatch):
+    A, rows = interior_system()
+    b = np.ones(len(rows))
+    step = FactorPart._substituted
+    monkeypatch.setattr(FactorPart, "_substituted", lambda *about: 1.001 * step(*about))
+    factor_part.parts_are_right.cache_clear()
+    with counting() as work:
+        there = Cholesky(A).among(rows).solve(b)
+    assert work.right_hand_sides == 1
+    np.testing.assert_allclose(there, expected(A, rows, b)[rows], atol=1e-11)
+    monkeypatch.undo()
+    factor_part.parts_are_right.cache_clear()
+    assert factor_part.parts_are_right()
 
 
 def test_a_leading_block_is_refused():
