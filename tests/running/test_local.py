@@ -189,7 +189,9 @@ def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(tmp_path):
     assert outcome.extras == {"said": 1}
     assert outcome.peak_memory_bytes > 2**24
     assert 0 <= outcome.memory_increase_bytes < outcome.peak_memory_bytes
-    np.testing.assert_array_equal(store.uv(task.cell), task.algorithm.function(task.mesh).uv)
+    # To rounding: where arrays lie in memory decides the last bit with some builds of BLAS.
+    bare = task.algorithm.function(task.mesh).uv
+    np.testing.assert_allclose(store.uv(task.cell), bare, rtol=0, atol=1e-14)
 
 
 @pytest.mark.skipif(not can_fork(1), reason="processes cannot be forked here")
