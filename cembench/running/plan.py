@@ -12,8 +12,14 @@ from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.datasets import is_fetched, surface_file
-from cembench.mesh.files import checked, read_mesh, read_repaired
-from cembench.mesh.reading import READERS, is_named_like_a_mesh, read_soup
+from cembench.mesh.files import (
+    READERS,
+    checked,
+    is_named_like_a_mesh,
+    read_mesh,
+    read_repaired,
+    read_soup,
+)
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry

@@ -9,8 +9,7 @@ from pathlib import Path
 from cembench.core.errors import MeshError
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.defects import located
-from cembench.mesh.files import checked, read_repaired
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import checked, read_repaired, read_soup
 from cembench.mesh.repair import Repaired
 from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh

@@ -24,8 +24,7 @@ from typing import Any, BinaryIO, cast
 
 from cembench.core.errors import CembenchError, MeshError, ParameterError
 from cembench.mesh.cut import cut_open
-from cembench.mesh.files import read_mesh
-from cembench.mesh.reading import is_named_like_a_mesh
+from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 #: Maximum size of an archive member, in bytes.

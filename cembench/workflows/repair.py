@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
 from cembench.mesh.defects import as_arrays, located
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_soup
 from cembench.mesh.repair import Components
 from cembench.mesh.repair import repair as repair_arrays
 from cembench.mesh.soup import Soup

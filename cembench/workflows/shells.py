@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cembench.conformal.laplacian import corner_products
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
 from cembench.mesh.triangle_mesh import TriangleMesh

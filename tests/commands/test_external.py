@@ -10,7 +10,7 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import write_mesh
-from cembench.mesh.uv_reader import read_uv
+from cembench.mesh.uvs import read_uv
 from cembench.running.local import Launcher
 
 SCRIPT = Path(__file__).parents[1] / "running/external/misbehaves.py"
