@@ -21,6 +21,7 @@ from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra
 from cembench.core.loading import TooLargeError
+from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import located
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
@@ -74,6 +75,14 @@ _SPECIAL_FILES = (
 def is_named_like_a_mesh(path: Path) -> bool:
     """Whether the suffix of a file is a readable mesh format."""
     return path.suffix.lower() in READERS
+
+
+def mesh_names(folder: Path) -> list[str]:
+    """Return the names in a folder that are those of mesh files; none if it cannot be listed."""
+    try:
+        return sorted(path.name for path in folder.iterdir() if is_named_like_a_mesh(path))
+    except OSError:
+        return []
 
 
 def read_soup(
@@ -134,7 +143,10 @@ def _check_file(path: Path) -> None:
         what = "there is no such file"
         if path.is_symlink():
             what = f"this is a symbolic link to {path.readlink()}, which does not exist"
-        raise MeshError(f"{what}. Check the path; paths are relative to {Path.cwd()}.") from None
+        raise MeshError(
+            f"{what}. Check the path; paths are relative to {Path.cwd()}."
+            + did_you_mean(path.name, mesh_names(path.parent))
+        ) from None
     except ValueError:
         raise MeshError("this cannot be a file name. Check the path.") from None
     for is_special, what in _SPECIAL_FILES:
@@ -159,7 +171,9 @@ def read_mesh(
     arrays: tuple[str, str] | None = None,
     polygons: tuple[int, int] | None = None,
 ) -> M:
-    """Read a file as a checked surface, named after the file's stem.
+    """Read a file as a checked surface of one class, named after the file's stem.
+
+    :func:`cembench.load_surface` takes disks and surfaces with holes alike.
 
     Parameters
     ----------
@@ -196,16 +210,15 @@ def read_mesh(
     return checked(read_soup(path, arrays=arrays, polygons=polygons), mesh_type, Path(path))
 
 
-def read_repaired(path: Path) -> tuple[Soup, Repaired]:
-    """Read a file and repair it; return the largest surface in it and a summary of the repair.
+def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]:
+    """Repair the content of a file; return its largest surface and a summary of the repair.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or nothing is left of its mesh.
+        Nothing is left of its mesh.
 
     """
-    soup = read_soup(path)
     try:
         repaired = repair(soup.V, soup.polygons)
     except MeshError as error:
@@ -214,7 +227,7 @@ def read_repaired(path: Path) -> tuple[Soup, Repaired]:
     return Soup.of_triangles(*repaired.surfaces[0], name=soup.name, notices=notices), repaired
 
 
-def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
+def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
     """Cut the polygons of a file into triangles and check them as a surface of this class.
 
     Raises
@@ -234,7 +247,7 @@ def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
         raise located(error, path) from None
     except MemoryError as error:
         raise MeshError(
-            f"{path}: memory does not suffice to check {len(soup.V):,} vertices and "
+            f"{path or soup.name}: memory does not suffice to check {len(soup.V):,} vertices and "
             f"{len(soup.sizes):,} polygons. Use a machine with more, or a smaller surface."
         ) from error
 

@@ -21,7 +21,7 @@ from cembench.mesh.soup import Soup, Texture, columns
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed, to_unit_square
 from cembench.mesh.uvs import uv_of_faces
-from cembench.running.surface_file import SurfaceFile
+from cembench.running.surfaces import SurfaceFile
 from cembench.workflows.places import Place
 from cembench.workflows.shells import Shells
 

@@ -68,7 +68,7 @@ def test_the_map_of_an_atlas_is_written_with_a_uv_for_each_corner(cli, face):
     assert re.search(r"islands +2 *\n", out)
     assert "maximum |mu|" in out
     written = read_uv(cli.folder / "uv.obj")
-    assert len(np.unique(written.index)) == len(written.uv) > flat_disk(200).n
+    assert len(np.unique(written.uv_index)) == len(written.uv) > flat_disk(200).n
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".vtp", ".npz"])

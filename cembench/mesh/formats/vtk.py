@@ -37,15 +37,20 @@ def read(path: Path) -> Soup:
         raise damaged(
             f"it cannot be read as {path.suffix[1:].upper()}: {type(error).__name__}: {error}"
         ) from None
-    blocks = [b for b in mesh.cells if b.type.rstrip("0123456789") in _POLYGONS and len(b.data)]
+    return soup_of_cells(mesh.points, mesh.cells)
+
+
+def soup_of_cells(points: Any, cells: Sequence[Any]) -> Soup:
+    """Return the planar cells of a meshio mesh; others give a notice."""
+    blocks = [b for b in cells if b.type.rstrip("0123456789") in _POLYGONS and len(b.data)]
     curved = [b.type for b in blocks if b.type not in _POLYGONS]
     if curved:
         raise MeshError(
             f"it has cells of type {curved[0]}, whose edges are curved; export it with straight "
             "triangles."
         )
-    others = {f"of type {b.type}": len(b.data) for b in mesh.cells if b not in blocks}
-    V = np.asarray(mesh.points, dtype=np.float64)
+    others = {f"of type {b.type}": len(b.data) for b in cells if b not in blocks}
+    V = np.asarray(points, dtype=np.float64)
     if V.ndim != 2 or V.shape[1] not in (2, 3):
         raise damaged(f"its points have shape {V.shape}")
     if V.shape[1] == 2:
