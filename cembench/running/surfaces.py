@@ -91,29 +91,29 @@ def load_surface(
     Examples
     --------
     >>> import cembench
-    >>> cembench.load_surface("flat-disk", faces=200).m
-    200
+    >>> cembench.load_surface("flat-disk", faces=600).m
+    600
     >>> V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> type(cembench.load_surface((V, [[0, 1, 2], [0, 2, 3]]))).__name__
     'DiskMesh'
 
     """
     allowed = tuple(kind for kind in kinds if holes or not issubclass(kind, HoledMesh))
-    if isinstance(surface, TriangleMesh):
-        found: TriangleMesh | Soup = surface
-        path = None
-    elif isinstance(surface, str | os.PathLike):
+    path, name = None, ""
+    if isinstance(surface, str | os.PathLike):
         registry = registry or load_registry()
         name = os.fspath(surface)
         path = None if is_generated(name, registry) else _file_named(name, registry)
-        found = read_soup(path) if path else generate_surface(registry, name, faces)
-    else:
-        found, path = soup_of(surface), None
-    if isinstance(found, TriangleMesh):
-        if isinstance(found, allowed) and not repair and not cut:
-            return found
-        found = Soup.of_triangles(found.V, found.F, name=found.name)
-    return cast(M, prepared(found, allowed, path, repair=repair, cut=cut).mesh)
+        surface = read_soup(path) if path else generate_surface(registry, name, faces)
+    if isinstance(surface, allowed) and not repair and not cut:
+        return surface
+    soup = surface if isinstance(surface, Soup) else soup_of(surface)
+    try:
+        return cast(M, prepared(soup, allowed, path, repair=repair, cut=cut).mesh)
+    except MeshError as error:
+        if path or not name:
+            raise
+        raise MeshError(f"{name}: {error}") from None
 
 
 def load_file(

@@ -3,11 +3,16 @@
 Own code, because meshio, trimesh and libigl each lose faces of valid files silently (after a tab,
 in an indented line, in a truncated last line) or refuse them (comments after a face, texture seams,
 Latin-1 text). Numbers are written as the shortest decimals that read back as the same double.
+
+A file of nothing but plain lines is read and changed in blocks; any other one statement by
+statement, with the same result.
 """
 
 from __future__ import annotations
 
 import io
+import re
+import warnings
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
@@ -36,6 +41,13 @@ _SKIPPED = frozenset(
 )
 #: Statements that end with a name, which may end with a backslash.
 _NAMED = frozenset(("o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib"))
+#: Blocks of plain lines: vertices of three numbers, faces with positive indices, and statements of
+#: other kinds; none has a comment after a statement or a continuation line.
+_PLAIN = re.compile(
+    rb"(?P<v>(?:v(?:[ \t]++[-+0-9.eE]++){3}[ \t]*+\n)++)"
+    rb"|(?P<f>(?:f(?:[ \t]++[1-9][0-9]{0,17}+(?:/[0-9]*+(?:/[0-9]++)?+)?+){3,}+[ \t]*+\n)++)"
+    rb"|(?:(?:(?:#|(?:v[nt]|[gos]|usemtl|mtllib)[ \t])[^\\\r\n]*+)?+\n)++"
+)
 #: Name of the material in OBJ and MTL.
 MATERIAL = "map"
 
@@ -45,6 +57,52 @@ def read(path: Path, *, uv: bool = False) -> Soup:
 
     Texture seams do not cut the surface.
     """
+    plain = None if uv else _read_plain(path.read_bytes())
+    return plain or _read_statements(path, uv=uv)
+
+
+def _plain_blocks(content: bytes) -> list[tuple[str | None, bytes]] | None:
+    """Return the blocks of a file with their kinds: "v", "f" or None; None for any other file."""
+    content = content.replace(b"\r\n", b"\n")
+    if not content.endswith(b"\n"):
+        content += b"\n"
+    blocks, at = [], 0
+    while at < len(content):
+        block = _PLAIN.match(content, at)
+        if block is None:
+            return None
+        blocks.append((block.lastgroup, block[0]))
+        at = block.end()
+    return blocks
+
+
+def _read_plain(content: bytes) -> Soup | None:
+    """Return the surface of a file of plain lines; None for any other file."""
+    blocks = _plain_blocks(content)
+    if blocks is None or all(kind != "f" for kind, _ in blocks):
+        return None
+    points, faces = (b"".join(text for kind, text in blocks if kind == which) for which in "vf")
+    if b"/" in faces:
+        faces = re.sub(rb"/[0-9/]*+", b"", faces)
+    faces = faces.replace(b"f", b" ")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # older versions of numpy warn instead of raising
+            V = np.fromstring(points.replace(b"v", b" "), sep=" ")
+            corners = np.fromstring(faces, dtype=np.int64, sep=" ")
+    except (ValueError, DeprecationWarning):
+        return None
+    if len(V) != 3 * points.count(b"\n"):
+        return None
+    letters = np.frombuffer(faces, np.uint8)
+    starts = np.flatnonzero((letters[:-1] <= ord(" ")) & (letters[1:] > ord(" ")))
+    ends = np.flatnonzero(letters == ord("\n"))
+    sizes = np.diff(np.searchsorted(starts, ends), prepend=0)
+    return Soup.from_arrays(V, corners, sizes, counted_from=1)
+
+
+def _read_statements(path: Path, *, uv: bool) -> Soup:
+    """Read any file statement by statement."""
     coordinates, corners, sizes = array("d"), array("q"), array("q")
     texture, uv_index = array("d"), array("q")
     unknown: list[str] = []
@@ -191,6 +249,9 @@ def with_uv(
         across it is replaced by its triangles.
 
     """
+    blocks = None if uv_index is not None else _plain_blocks(text.encode("latin-1"))
+    if blocks is not None:
+        return _with_uv_in_blocks(blocks, uv)
     corners: list[dict[int, int]] = []
     if F is not None and uv_index is not None:
         pairs = zip(F.tolist(), uv_index.tolist(), strict=True)
@@ -216,6 +277,23 @@ def with_uv(
                 line = "\n".join(_face_lines(face, of_face))
         lines.append(line)
     return "\n".join(lines) + "\n"
+
+
+def _with_uv_in_blocks(blocks: list[tuple[str | None, bytes]], uv: Complex) -> str:
+    """Return blocks of plain lines with a texture coordinate for each vertex."""
+    parts: list[str] = []
+    written = False
+    for kind, block in blocks:
+        if kind is None:
+            block = re.sub(rb"(?m)^vt[^\n]*+\n", b"", block)
+        elif kind == "f":
+            if not written:
+                parts.append("\n".join([*_uv_lines(uv), ""]))
+                written = True
+            block = re.sub(rb"[ \t]++([0-9]++)(?:/[0-9]*+(/[0-9]++)?+)?+", rb" \1/\1\2", block)
+            block = re.sub(rb"[ \t]++\n", b"\n", block)
+        parts.append(block.decode("latin-1"))
+    return "".join(parts)
 
 
 def _statements(text: str) -> Iterator[tuple[str, list[str]]]:
