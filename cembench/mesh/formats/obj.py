@@ -290,10 +290,19 @@ def _with_uv_in_blocks(blocks: list[tuple[str | None, bytes]], uv: Complex) -> s
             if not written:
                 parts.append("\n".join([*_uv_lines(uv), ""]))
                 written = True
-            block = re.sub(rb"[ \t]++([0-9]++)(?:/[0-9]*+(/[0-9]++)?+)?+", rb" \1/\1\2", block)
-            block = re.sub(rb"[ \t]++\n", b"\n", block)
+            block = _with_vertex_uv(block)
         parts.append(block.decode("latin-1"))
     return "".join(parts)
+
+
+def _with_vertex_uv(faces: bytes) -> bytes:
+    """Return plain faces whose corners have the texture coordinates of their vertices."""
+    words = faces.decode().split()
+    if b"/" not in faces and len(words) == 4 * faces.count(b"\n"):  # triangles, by a faster way
+        corners = zip(words[1::4], words[2::4], words[3::4], strict=True)
+        return "".join([f"f {i}/{i} {j}/{j} {k}/{k}\n" for i, j, k in corners]).encode()
+    faces = re.sub(rb"[ \t]++([0-9]++)(?:/[0-9]*+(/[0-9]++)?+)?+", rb" \1/\1\2", faces)
+    return re.sub(rb"[ \t]++\n", b"\n", faces)
 
 
 def _statements(text: str) -> Iterator[tuple[str, list[str]]]:
