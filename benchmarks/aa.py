@@ -49,7 +49,8 @@ from cembench.results.records import Outcome, Record
 from cembench.results.store import Store
 from cembench.running.judging import Checked
 from cembench.running.local import Launcher, Options
-from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.surfaces import generate_surface
 
 PAGE = pages.ROOT / "docs/measuring.md"
 ALGORITHMS = ("cem", "ldm", "direct-cem", "lscm")

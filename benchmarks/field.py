@@ -25,8 +25,7 @@ from typing import Any
 from cembench.conformal.metrics import all_metrics
 from cembench.core.atomic import write_text
 from cembench.core.errors import CembenchError
-from cembench.mesh.files import read_mesh
-from cembench.mesh.reading import is_named_like_a_mesh
+from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.running.environment import for_measuring

@@ -56,7 +56,7 @@ def measure(names: list[str], faces: int | None) -> dict[str, object]:
 
     from cembench.registry import load_registry
     from cembench.running.memory import peak_memory_bytes
-    from cembench.running.plan import generate_surface
+    from cembench.running.surfaces import generate_surface
     from cembench.workflows.morphing.landmarks import common_landmarks
     from cembench.workflows.morphing.morph import morph
 

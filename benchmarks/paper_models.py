@@ -25,8 +25,7 @@ from benchmarks.pages import ROOT, fill
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import AlgorithmFailed, MeshError
 from cembench.core.parameterization import Parameterization
-from cembench.mesh.files import read_mesh
-from cembench.mesh.reading import is_named_like_a_mesh
+from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.results.papers import find_paper

@@ -17,7 +17,8 @@ from pathlib import Path
 from cembench.registry import load_registry
 from cembench.results.store import Store
 from cembench.running.local import Options, run_tasks
-from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells, read_mesh_for
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.surfaces import generate_surface, kinds_of, load_file
 
 #: Phases that take less than this share of the total in every line go under "rest".
 SHOWN = 0.05
@@ -37,7 +38,7 @@ def main() -> None:
     names = arguments.algorithms.split(",") if arguments.algorithms else registry.usual_algorithms
     chosen = [registry.algorithm(name) for name in names]
     if arguments.mesh:
-        surface = read_mesh_for(arguments.mesh, chosen)
+        surface = load_file(arguments.mesh, kinds_of(chosen)).mesh
     else:
         surface = generate_surface(registry, "spherical-cap", arguments.faces)
     tasks = [

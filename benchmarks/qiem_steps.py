@@ -27,7 +27,7 @@ from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.work import Work, counting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
-from cembench.running.plan import generate_surface
+from cembench.running.surfaces import generate_surface
 
 PAGE = Path(__file__).parents[1] / "docs/algorithms.md"
 SURFACES = tuple(

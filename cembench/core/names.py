@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 
 #: Common file systems allow 255 bytes per file name; two names and a key share them.
 LONGEST = 100
@@ -27,6 +28,17 @@ def printable(name: str) -> str:
     ('caf\\udce9', 'one\\ntwo', 'ß')
     """
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return a question with the known names that are nearest to a name; "" if none is near.
+
+    >>> did_you_mean("fat-disk", ["flat-disk", "cone"]), did_you_mean("x", ["cone"])
+    (' Did you mean flat-disk?', '')
+    """
+    names = list(dict.fromkeys(known))
+    near = get_close_matches(name, names) or [one for one in names if one.startswith(name)]
+    return f" Did you mean {' or '.join(near)}?" if name and near else ""
 
 
 def file_name(name: str, longest: int = LONGEST) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -153,16 +153,37 @@ def located(error: MeshError, path: Path | None) -> MeshError:
     return MeshError(f"{path}: {error}")
 
 
+def _array(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
+    """Return rows of numbers as an array; an error names the first row of another length."""
+    try:
+        return np.asarray(rows)
+    except ValueError:
+        pass
+    lengths = [np.size(row) for row in cast("Sequence[ArrayLike]", rows)]
+    row = next(k for k, length in enumerate(lengths) if length != columns)
+    polygons = " Cut polygons into triangles first." if what == "faces" else ""
+    raise MeshError(
+        f"the {what} are a list of rows of different lengths: row {row} (counted from 0) has "
+        f"{lengths[row]} numbers; allowed is {columns} in each.{polygons}"
+    )
+
+
 def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
     """Return vertices (n, 3) and triangles (m, 3) as float64 and int64.
 
     Raises
     ------
     MeshError
-        The arrays have other shapes, the indices are not integers, or there are no faces.
+        The arrays have other shapes, the indices are not integers or count from 1, or there are no
+        faces.
 
     """
-    points, faces = np.asarray(V), np.asarray(F)
+    points, faces = _array("vertices", V, 3), _array("faces", F, 3)
+    if points.dtype.kind in "iu" and faces.dtype.kind == "f" and faces.ndim == 2:
+        raise MeshError(
+            "the vertices are integers and the faces are not: the arrays are swapped, or the faces "
+            "are not of an integer type. Write (V, F), the vertices first, or F.astype(int)."
+        )
     if points.ndim != 2 or points.shape[1] != 3:
         raise MeshError(f"vertices have shape {points.shape}; allowed is (n, 3), a row per vertex.")
     if points.dtype.kind not in "fiub":
@@ -180,6 +201,11 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
         )
     if not np.issubdtype(faces.dtype, np.integer):
         raise MeshError(f"face indices are of type {faces.dtype}; allowed are integers.")
+    if faces.min() == 1 and faces.max() == len(points):
+        raise MeshError(
+            f"the faces count from 1: their indices are 1 to {len(points)}, as in MATLAB; allowed "
+            f"are 0 to {len(points) - 1}. Write F - 1."
+        )
     return np.array(points, dtype=np.float64), np.array(faces, dtype=np.int64)
 
 

@@ -1,37 +1,167 @@
-"""Read mesh files as checked surfaces, and write surfaces and maps to files.
+"""Read mesh files as polygon soups or checked surfaces, and write surfaces and maps to files.
 
-Polygons are cut into triangles, with a notice.
+Every vertex is kept, in the file's order and in float64. No face is lost silently: the content must
+match what the file declares, and invalid statements give an error or a notice. Every reader of ours
+goes through the file once, so none can hang, and compares what a file unpacks to with memory first;
+libraries read in a process whose memory is bounded. Polygons are cut into triangles, with a notice.
 """
 
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError
+from cembench.core.extras import Extra
+from cembench.core.loading import TooLargeError
+from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import located
-from cembench.mesh.reading import READERS as _READERS
-from cembench.mesh.reading import read_soup
+from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
+from cembench.mesh.formats.apart import apart
 from cembench.mesh.repair import Repaired, repair
-from cembench.mesh.soup import Soup
+from cembench.mesh.soup import Soup, Texture
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-from cembench.mesh.writers.glb import glb_bytes
-from cembench.mesh.writers.npz import npz_bytes
-from cembench.mesh.writers.obj import obj_bytes
-from cembench.mesh.writers.off import off_bytes
-from cembench.mesh.writers.ply import ply_bytes
-from cembench.mesh.writers.stl import stl_bytes
-from cembench.mesh.writers.textured import Textured
-from cembench.mesh.writers.vtp import vtp_bytes
 
 M = TypeVar("M", bound=TriangleMesh)
+
+READERS: dict[str, Callable[..., Soup]] = {
+    ".obj": obj.read,
+    ".off": off.read,
+    ".ply": ply.read,
+    ".stl": stl.read,
+    ".mat": mat.read,
+    ".npz": npz.read,
+    ".vtk": apart(vtk.read, Extra.FORMATS, "meshio"),
+    ".vtu": apart(vtk.read, Extra.FORMATS, "meshio"),
+    ".vtp": apart(vtk.read_vtp, Extra.VTP, "vtk"),
+    ".glb": apart(gltf.read, Extra.FORMATS, "trimesh"),
+    ".gltf": apart(gltf.read, Extra.FORMATS, "trimesh"),
+    ".gii": apart(gii.read, Extra.FORMATS, "nibabel"),
+}
+#: Formats of named arrays.
+_OF_ARRAYS = {".mat": mat.read, ".npz": npz.read}
+_WRITERS: dict[str, Callable[[Soup], bytes]] = {
+    ".obj": obj.write,
+    ".ply": ply.write,
+    ".glb": gltf.write,
+    ".vtp": vtk.write_vtp,
+    ".npz": npz.write,
+    ".off": off.write,
+    ".stl": stl.write,
+}
+#: Those that can hold a texture, or name its file.
+_OF_TEXTURES: dict[str, Callable[..., bytes]] = {".ply": ply.write, ".glb": gltf.write}
+#: Formats that hold texture coordinates.
+WITH_UV = (".obj", ".ply", ".glb", ".vtp", ".npz")
+#: Those that hold texture coordinates in single precision.
+SINGLE = (".ply", ".glb")
+_SPECIAL_FILES = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+
+
+def is_named_like_a_mesh(path: Path) -> bool:
+    """Whether the suffix of a file is a readable mesh format."""
+    return path.suffix.lower() in READERS
+
+
+def mesh_names(folder: Path) -> list[str]:
+    """Return the names in a folder that are those of mesh files; none if it cannot be listed."""
+    try:
+        return sorted(path.name for path in folder.iterdir() if is_named_like_a_mesh(path))
+    except OSError:
+        return []
+
+
+def read_soup(
+    path: str | os.PathLike[str],
+    *,
+    arrays: tuple[str, str] | None = None,
+    polygons: tuple[int, int] | None = None,
+    uv: bool = False,
+) -> Soup:
+    """Read the vertices and polygons of a file without checking the surface.
+
+    `arrays` names the vertices and the triangles of a MAT or NPZ file; `polygons` is the first and
+    last polygon to read, counted from 0; with `uv` texture coordinates of an OBJ, OFF or PLY file
+    are read, too.
+
+    Raises
+    ------
+    MeshError
+        The file is missing, empty, damaged, of unknown format or not a regular file, or it has no
+        faces.
+
+    """
+    path = Path(path)
+    try:
+        _check_file(path)
+        suffix = path.suffix.lower()
+        if arrays and suffix not in _OF_ARRAYS:
+            raise MeshError(
+                f"arrays can be named only for {', '.join(_OF_ARRAYS)} files, not for {suffix}."
+            )
+        more: dict[str, Any] = {"uv": True} if uv else {}
+        soup = _OF_ARRAYS[suffix](path, arrays) if arrays else READERS[suffix](path, **more)
+        return (soup.subset(*polygons) if polygons else soup).named(path.stem)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from error.__cause__
+    except TooLargeError as error:
+        raise MeshError(
+            f"{path}: {error}. Use a machine with more memory, or a smaller surface."
+        ) from error
+    except MemoryError as error:
+        raise MeshError(f"{path}: the file is too large for this machine's memory.") from error
+    except OSError as error:
+        raise MeshError(
+            f"{path}: the file cannot be read ({error.strerror or error}). Check its permissions "
+            "and the disk."
+        ) from error
+
+
+def _check_file(path: Path) -> None:
+    """Raise for a path that is not a non-empty regular file, before anything blocks on a pipe."""
+    if str(path) == "-":
+        raise MeshError(
+            "standard input cannot be read as a mesh. Save it to a file and name the file."
+        )
+    try:
+        found = path.stat()
+    except (FileNotFoundError, NotADirectoryError):
+        what = "there is no such file"
+        if path.is_symlink():
+            what = f"this is a symbolic link to {path.readlink()}, which does not exist"
+        raise MeshError(
+            f"{what}. Check the path; paths are relative to {Path.cwd()}."
+            + did_you_mean(path.name, mesh_names(path.parent))
+        ) from None
+    except ValueError:
+        raise MeshError("this cannot be a file name. Check the path.") from None
+    for is_special, what in _SPECIAL_FILES:
+        if is_special(found.st_mode):
+            raise MeshError(
+                f"this is {what}, not a file. Name a mesh file; save the output of a pipe or a "
+                "device to a file first."
+            )
+    if not is_named_like_a_mesh(path):
+        raise MeshError(
+            f"unknown mesh format {path.suffix!r}; allowed: {', '.join(READERS)}. "
+            "Convert the file to one of these."
+        )
+    if found.st_size == 0:
+        raise MeshError("the file is empty (0 bytes). Export or download it again.")
 
 
 def read_mesh(
@@ -41,7 +171,9 @@ def read_mesh(
     arrays: tuple[str, str] | None = None,
     polygons: tuple[int, int] | None = None,
 ) -> M:
-    """Read a file as a checked surface, named after the file's stem.
+    """Read a file as a checked surface of one class, named after the file's stem.
+
+    :func:`cembench.load_surface` takes disks and surfaces with holes alike.
 
     Parameters
     ----------
@@ -78,26 +210,24 @@ def read_mesh(
     return checked(read_soup(path, arrays=arrays, polygons=polygons), mesh_type, Path(path))
 
 
-def read_repaired(path: Path) -> tuple[Soup, Repaired]:
-    """Read a file and repair it; return the largest surface in it and a summary of the repair.
+def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]:
+    """Repair the content of a file; return its largest surface and a summary of the repair.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or nothing is left of its mesh.
+        Nothing is left of its mesh.
 
     """
-    soup = read_soup(path)
     try:
         repaired = repair(soup.V, soup.polygons)
     except MeshError as error:
         raise located(error, path) from None
-    V, F = repaired.surfaces[0]
     notices = soup.notices + repaired.notices
-    return Soup(V, F.ravel(), np.full(len(F), 3), soup.name, notices), repaired
+    return Soup.of_triangles(*repaired.surfaces[0], name=soup.name, notices=notices), repaired
 
 
-def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
+def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
     """Cut the polygons of a file into triangles and check them as a surface of this class.
 
     Raises
@@ -109,15 +239,15 @@ def checked(soup: Soup, mesh_type: type[M], path: Path) -> M:
     polygons = int((soup.sizes > 3).sum())
     notices = soup.notices
     if polygons:
-        told = f"{polygons} polygons were cut into triangles"
-        notices += (Notice(NoticeKind.POLYGONS_CUT, told),)
+        text = f"{polygons} polygons were cut into triangles"
+        notices += (Notice(NoticeKind.POLYGONS_CUT, text),)
     try:
         return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
     except MeshError as error:
         raise located(error, path) from None
     except MemoryError as error:
         raise MeshError(
-            f"{path}: memory does not suffice to check {len(soup.V):,} vertices and "
+            f"{path or soup.name}: memory does not suffice to check {len(soup.V):,} vertices and "
             f"{len(soup.sizes):,} polygons. Use a machine with more, or a smaller surface."
         ) from error
 
@@ -153,14 +283,17 @@ def write_mesh(
     >>> cembench.write_mesh("disk_uv.obj", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
 
     """
-    UV = None if uv is None else np.stack([uv.real, uv.imag], axis=1)
-    write_textured(Path(path), Textured(mesh.V, mesh.F, UV, name=mesh.name))
+    write_soup(Path(path), Soup.of_triangles(mesh.V, mesh.F, uv, name=mesh.name))
 
 
-def write_textured(path: Path, surface: Textured) -> None:
-    """Write a surface with its texture coordinates; as :func:`write_mesh`."""
+def write_soup(path: Path, surface: Soup, texture: Texture | None = None) -> None:
+    """Write a surface with its texture coordinates and a texture; as :func:`write_mesh`."""
     check_writable_format(path, with_uv=surface.uv is not None)
-    content = _WRITERS[path.suffix.lower()](surface)
+    suffix = path.suffix.lower()
+    if suffix in _OF_TEXTURES:
+        content = _OF_TEXTURES[suffix](surface, texture=texture)
+    else:
+        content = _WRITERS[suffix](surface)
     write_bytes(path, content, error=MeshError, parents=False)
 
 
@@ -169,25 +302,10 @@ def check_writable_format(path: Path, *, with_uv: bool) -> None:
     suffix = path.suffix.lower()
     allowed = WITH_UV if with_uv else tuple(_WRITERS)
     if suffix not in allowed:
-        readable = "can be read but not written" if suffix in _READERS else "is unknown"
+        readable = "can be read but not written" if suffix in READERS else "is unknown"
         why = "cannot hold texture coordinates" if suffix in _WRITERS else readable
         raise MeshError(
             f"{path}: mesh format {suffix!r} {why}; allowed here: {', '.join(allowed)}."
         )
     if not path.parent.is_dir():
         raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
-
-
-_WRITERS: dict[str, Callable[[Textured], bytes]] = {
-    ".obj": obj_bytes,
-    ".ply": ply_bytes,
-    ".glb": glb_bytes,
-    ".vtp": vtp_bytes,
-    ".npz": npz_bytes,
-    ".off": off_bytes,
-    ".stl": stl_bytes,
-}
-#: Formats that hold texture coordinates.
-WITH_UV = (".obj", ".ply", ".glb", ".vtp", ".npz")
-#: Those that hold texture coordinates in single precision.
-SINGLE = (".ply", ".glb")

@@ -1,14 +1,15 @@
 """Polygons as in a file, before any check of the surface.
 
 A :class:`Soup` may have isolated vertices, NaN coordinates, and edges with any number of polygons.
-:func:`~cembench.mesh.files.read_mesh` checks it; repairs start from it. A file whose content does
-not match its declarations never becomes a soup: its reader raises :func:`damaged`.
+:func:`~cembench.mesh.files.read_mesh` checks it; repairs start from it; writers take it. A file
+whose content does not match its declarations never becomes a soup: its reader raises
+:func:`damaged`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
 
+Points = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Complex = NDArray[np.complex128]
+
+#: Marks a corner without texture coordinates.
+NO_UV = -1
 #: Characters that `str.split` treats as space but no mesh format does.
 _NOT_SPACES = dict.fromkeys(map(ord, "\x1c\x1d\x1e\x1f\x85\xa0"), "\0")
 
@@ -25,7 +32,9 @@ BYTE_ORDER_MARK = b"\xef\xbb\xbf".decode("latin-1")
 
 @dataclass(frozen=True, eq=False)
 class Soup:
-    """Vertices and polygons; only the indices are checked.
+    """Vertices, polygons and texture coordinates; only the polygons' indices are checked.
+
+    A file of texture coordinates alone has no vertices, and its polygons have sizes but no corners.
 
     Parameters
     ----------
@@ -39,14 +48,33 @@ class Soup:
         Name in reports: the file's stem.
     notices : tuple of Notice
         What was changed or ignored while reading the file.
+    uv : complex128 (l,), optional
+        Texture coordinates; v points up.
+    uv_index : int64 (sum of sizes,), optional
+        The texture coordinate of each corner, :data:`NO_UV` for none (default: that of its vertex).
 
     """
 
-    V: NDArray[np.float64]
-    corners: NDArray[np.int64]
-    sizes: NDArray[np.int64]
+    V: Points
+    corners: Indices
+    sizes: Indices
     name: str = "mesh"
     notices: tuple[Notice, ...] = ()
+    uv: Complex | None = None
+    uv_index: Indices | None = None
+
+    @classmethod
+    def of_triangles(
+        cls,
+        V: Points,
+        F: Indices,
+        uv: Complex | None = None,
+        uv_index: Indices | None = None,
+        **more: Any,
+    ) -> Self:
+        """Return a soup of triangles F (m, 3); `uv_index` is (m, 3), too. Nothing is checked."""
+        index = None if uv_index is None else uv_index.ravel()
+        return cls(V, F.ravel(), np.full(len(F), 3), uv=uv, uv_index=index, **more)
 
     @classmethod
     def from_arrays(
@@ -56,23 +84,23 @@ class Soup:
         sizes: ArrayLike,
         *,
         counted_from: int = 0,
-        notices: tuple[Notice, ...] = (),
+        **more: Any,
     ) -> Self:
-        """Return a soup after checking that it has polygons and that their vertices exist.
+        """Return a soup after checking that the vertices of its polygons exist.
 
         The file counts vertices from `counted_from`, and so do the messages.
 
         Raises
         ------
         MeshError
-            There is no polygon, a polygon has fewer than three corners, or an index is out of
-            range.
+            A polygon has fewer than three corners, an index is out of range, or there is neither a
+            polygon nor a texture coordinate.
 
         """
         V = np.asarray(V, dtype=np.float64).reshape(-1, 3)
         corners = np.asarray(corners, dtype=np.int64).ravel() - counted_from
         sizes = np.asarray(sizes, dtype=np.int64)
-        if not len(sizes):
+        if not len(sizes) and more.get("uv") is None:
             raise MeshError(
                 f"no faces: {len(V)} vertices were found, but not one triangle or polygon. The "
                 "file holds a point cloud, was cut short, or is of another format than its name "
@@ -92,7 +120,7 @@ class Soup:
                 f"{corners[bad[0]] + counted_from}; allowed is {counted_from} to "
                 f"{len(V) - 1 + counted_from}"
             )
-        return cls(V, corners, sizes, notices=notices)
+        return cls(V, corners, sizes, **more)
 
     def named(self, name: str) -> Self:
         """Return the same soup under another name."""
@@ -118,7 +146,7 @@ class Soup:
         return replace(self, V=self.V[used], corners=corners, sizes=self.sizes[first : last + 1])
 
     @property
-    def polygons(self) -> list[NDArray[np.int64]]:
+    def polygons(self) -> list[Indices]:
         """Yield the polygons in order, as blocks (k, c) of k consecutive ones with c corners."""
         ends = np.cumsum(self.sizes)
         last = np.flatnonzero(np.diff(self.sizes, append=0))
@@ -128,14 +156,94 @@ class Soup:
         ]
 
     @property
-    def triangles(self) -> NDArray[np.int64]:
+    def triangles(self) -> Indices:
         """Return the polygons cut into triangles, (m, 3), in order."""
+        return self._cut(self.corners)
+
+    @property
+    def uv_triangles(self) -> Indices:
+        """Return the texture coordinate of each corner of the triangles, (m, 3)."""
+        return self._cut(self.corners if self.uv_index is None else self.uv_index)
+
+    def _cut(self, at_corners: Indices) -> Indices:
+        """Return what belongs to the corners of the polygons for those of their triangles."""
         if (self.sizes == 3).all():
-            return self.corners.reshape(-1, 3)
+            return at_corners.reshape(-1, 3)
         counts = self.sizes - 2
         first = np.repeat(np.cumsum(self.sizes) - self.sizes, counts)
         step = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return self.corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+        return at_corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+
+    @property
+    def has_seams(self) -> bool:
+        """Whether the corners at some vertex have different texture coordinates."""
+        return self.uv_index is not None and not np.array_equal(self.uv_index, self.corners)
+
+    def cut_at_seams(self) -> Self:
+        """Return the same triangles with one vertex for each texture coordinate of a vertex.
+
+        The original vertex keeps the texture coordinate of its first triangle; copies come last.
+        """
+        if self.uv is None or self.uv_index is None:
+            return self
+        pairs = np.stack([self.triangles.ravel(), self.uv_triangles.ravel()], axis=1)
+        found, inverse = np.unique(pairs, axis=0, return_inverse=True)
+        order = np.lexsort((found[:, 0], found[:, 1]))
+        place = np.empty(len(order), dtype=np.int64)
+        place[order] = np.arange(len(order))
+        vertex, texture = found[order].T
+        F = place[inverse.ravel()].reshape(-1, 3)
+        return self.of_triangles(self.V[vertex], F, self.uv[texture], name=self.name)
+
+    def normals(self) -> Points:
+        """Return unit normals at the vertices of the triangles, averaged by area, (n, 3)."""
+        F = self.triangles
+        a, b, c = (self.V[F[:, k]] for k in range(3))
+        size = float(np.abs(self.V).max()) or 1.0  # to avoid overflow of squares
+        faces = np.cross((b - a) / size, (c - a) / size)
+        total = np.zeros_like(self.V)
+        for k in range(3):
+            for axis in range(3):
+                total[:, axis] += np.bincount(F[:, k], faces[:, axis], len(self.V))
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        up = np.array([0.0, 0.0, 1.0])
+        return np.where(length > 0, total / np.where(length > 0, length, 1.0), up)
+
+
+@dataclass(frozen=True)
+class Texture:
+    """The texture image of a surface, as a PNG file, and the name of that file beside it."""
+
+    png: bytes
+    file: str = ""
+
+
+def columns(uv: Complex) -> Points:
+    """Return complex numbers as two columns, (k, 2)."""
+    return np.stack([uv.real, uv.imag], axis=1)
+
+
+def complex_of(uv: ArrayLike) -> Complex:
+    """Return two columns of real numbers as complex numbers."""
+    return np.ascontiguousarray(uv, dtype=np.float64).reshape(-1, 2).view(np.complex128).ravel()
+
+
+def in_single_precision(points: Points, format_name: str) -> NDArray[np.float32]:
+    """Return points as float32, little-endian.
+
+    Raises
+    ------
+    MeshError
+        The coordinates are too large for single precision.
+
+    """
+    largest = float(np.finfo(np.float32).max)
+    if np.abs(points).max(initial=0.0) > largest:
+        raise MeshError(
+            f"coordinates up to {np.abs(points).max():.3g} are too large for {format_name}, which "
+            f"holds numbers up to {largest:.3g}; scale the surface, or write OBJ."
+        )
+    return points.astype("<f4")
 
 
 def words_of(line: str) -> list[str]:

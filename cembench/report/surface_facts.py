@@ -24,8 +24,9 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
 from cembench.results.papers import paper_of
 from cembench.results.records import MeshFacts
-from cembench.running.plan import generate_surface, mesh_facts, paper_roles
+from cembench.running.plan import mesh_facts, paper_roles
 from cembench.running.sources import code_hash
+from cembench.running.surfaces import generate_surface
 
 #: The algorithm whose map measures how unevenly a surface is scaled.
 MAPPED_BY = "cem"

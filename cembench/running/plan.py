@@ -6,22 +6,21 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeVar
+from typing import Any
 
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
 from cembench.linear_algebra.backends import default_backend
-from cembench.mesh.datasets import is_fetched, surface_file
-from cembench.mesh.files import checked, read_mesh, read_repaired
-from cembench.mesh.reading import READERS, is_named_like_a_mesh, read_soup
-from cembench.mesh.soup import Soup
+from cembench.mesh.files import (
+    READERS,
+    is_named_like_a_mesh,
+)
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.papers import paper_of
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.running.sources import hash_of, sources_of
-
-M = TypeVar("M", bound=TriangleMesh)
+from cembench.running.surfaces import generate_surface, kinds_of, load_file
 
 
 @dataclass(frozen=True)
@@ -162,31 +161,6 @@ def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFac
     )
 
 
-def read_mesh_for(
-    path: Path, algorithms: Sequence[Algorithm], soup: Soup | None = None
-) -> TriangleMesh:
-    """Read a file as the most special kind of surface that the algorithms take.
-
-    With `soup`, these triangles are used instead of the file's content.
-
-    Raises
-    ------
-    MeshError
-        The file cannot be read, or no algorithm takes its kind of surface; the message says why it
-        does not fit the first algorithm.
-
-    """
-    soup = read_soup(path) if soup is None else soup
-    kinds = dict.fromkeys(a.mesh_type for a in algorithms)
-    refused: dict[type[TriangleMesh], MeshError] = {}
-    for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
-        try:
-            return checked(soup, kind, path)
-        except MeshError as error:
-            refused[kind] = error
-    raise refused[next(iter(kinds))]
-
-
 def gather_surfaces(
     registry: Registry,
     algorithms: Sequence[Algorithm],
@@ -200,12 +174,11 @@ def gather_surfaces(
 
     With `mend`, the files are repaired first.
     """
-    found = [
-        read_mesh_for(path, algorithms, read_repaired(path)[0] if mend else None) for path in files
-    ]
-    standing = {mesh.name: paper_role_of(registry, mesh) for mesh in found}
-    found += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
-    return found, standing | paper_roles(registry, names)
+    kinds = kinds_of(algorithms)
+    meshes = [load_file(path, kinds, repair=mend).mesh for path in files]
+    standing = {mesh.name: paper_role_of(registry, mesh) for mesh in meshes}
+    meshes += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
+    return meshes, standing | paper_roles(registry, names)
 
 
 #: Files of this format in a folder are meshes only if named: most hold other arrays.
@@ -236,52 +209,6 @@ def mesh_files(folder: Path) -> list[Path]:
         if found:
             return found
     raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
-
-
-def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:
-    """Generate a registered surface with about `faces` triangles, or at its own size."""
-    family = registry.surface(name)
-    given = {} if faces is None else {"faces": faces}
-    mesh: TriangleMesh = family.function(**family.arguments(given))
-    return mesh
-
-
-def surface_named(registry: Registry, name: str, kind: type[M], faces: int | None = None) -> M:
-    """Return the surface of this kind that a name refers to: generated, public, or in a file.
-
-    Raises
-    ------
-    MeshError
-        There is neither, or the surface is of a different kind.
-
-    """
-    if name in registry.surfaces and not Path(name).is_file():
-        made = generate_surface(registry, name, faces)
-        return made if isinstance(made, kind) else kind.from_arrays(made.V, made.F, name=made.name)
-    return read_mesh(file_named(registry, name), kind)
-
-
-def file_named(registry: Registry, name: str) -> Path:
-    """Return the file that a name refers to: a path, or a public surface that was fetched.
-
-    Raises
-    ------
-    MeshError
-        It is neither, or the public surface is not here yet.
-
-    """
-    path = Path(name)
-    if path.suffix or path.exists():
-        return path
-    dataset = registry.datasets.get(name)
-    if dataset is None:
-        raise MeshError(
-            f"{name!r} is neither a file nor a registered surface; known surfaces: "
-            f"{', '.join(sorted(registry.surfaces)) or 'none'}."
-        )
-    if not is_fetched(dataset):
-        raise MeshError(f"the public surface {name!r} is not here yet: cembench fetch {name}.")
-    return surface_file(dataset)
 
 
 def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole]:

@@ -29,8 +29,8 @@ from cembench.running.plan import (
     paper_roles,
     plan_cells,
 )
+from cembench.running.surfaces import SurfaceInput, is_generated, kinds_of, load_surface
 from cembench.workflows.notebook import html_table
-from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -304,11 +304,11 @@ def benchmark(
             f"precision={precision!r} is not allowed; write a share between 0 and 1, e.g. 0.05."
         )
     chosen = [registry.algorithm(name) for name in algorithms or registry.usual_algorithms]
-    kinds = list(dict.fromkeys(a.mesh_type for a in chosen))
+    kinds = kinds_of(chosen)
     meshes: list[TriangleMesh] = []
     roles: dict[str, PaperRole] = {}
     for number, one in enumerate(given, start=1):
-        mesh = checked_surface(one, kinds, registry)
+        mesh = load_surface(one, kinds, registry=registry)
         if isinstance(one, tuple | list):
             mesh = mesh.renamed(f"surface-{number}")
         meshes.append(mesh)
@@ -351,6 +351,6 @@ def _on_cluster(
 
 def _role(registry: Registry, given: SurfaceInput, mesh: TriangleMesh) -> PaperRole:
     """Return the row of the paper's tables that a surface is, or stands in for, if any."""
-    if isinstance(given, str) and given in registry.surfaces and not Path(given).is_file():
+    if is_generated(given, registry):
         return paper_roles(registry, [given]).get(given, PaperRole())
     return paper_role_of(registry, mesh)

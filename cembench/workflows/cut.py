@@ -10,7 +10,7 @@ from cembench.core.errors import MeshError
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.defects import located
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.workflows.surface_input import SurfaceInput, checked_surface
+from cembench.running.surfaces import SurfaceInput, load_surface
 
 
 def cut(surface: SurfaceInput, *, through: Sequence[int] = ()) -> Cut:
@@ -48,7 +48,7 @@ def cut(surface: SurfaceInput, *, through: Sequence[int] = ()) -> Cut:
     (7, 4, 2)
 
     """
-    mesh = checked_surface(surface, (TriangleMesh,))
+    mesh = load_surface(surface, (TriangleMesh,))
     try:
         return cut_open(mesh, through)
     except MeshError as error:

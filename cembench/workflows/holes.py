@@ -7,8 +7,8 @@ from typing import Any
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import load_registry
+from cembench.running.surfaces import SurfaceInput, load_surface
 from cembench.workflows.parameterize import Result, parameterize
-from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 
 def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Result]:
@@ -42,7 +42,7 @@ def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Resul
     ['direct-cem-holes', 'harmonic-filled', 'koebe-cem']
 
     """
-    mesh = checked_surface(surface, (HoledMesh,))
+    mesh = load_surface(surface, (HoledMesh,))
     given: dict[str, Any] = {} if outer is None else {"outer": outer}
     found, causes = {}, []
     for name, algorithm in load_registry().algorithms.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,19 +15,16 @@ from cembench.conformal.planar import orientations
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.files import SINGLE, write_textured
-from cembench.mesh.obj_text import with_uv
-from cembench.mesh.obj_uv import read_obj_uv
+from cembench.mesh.files import SINGLE, write_soup
+from cembench.mesh.formats import gltf, obj
+from cembench.mesh.soup import Soup, Texture, columns
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed, to_unit_square
-from cembench.mesh.writers.glb import glb_bytes
-from cembench.mesh.writers.obj import mtl_bytes, obj_bytes, with_material
-from cembench.mesh.writers.textured import Textured
-from cembench.running.surface_file import SurfaceFile
+from cembench.mesh.uvs import uv_of_faces
+from cembench.running.surfaces import SurfaceFile
 from cembench.workflows.places import Place
 from cembench.workflows.shells import Shells
 
-Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
@@ -140,7 +137,7 @@ def write_map(
     if suffix == ".obj" == surface.path.suffix.lower() and not surface.repaired:
         text = surface.path.read_text(encoding="latin-1")  # any bytes, as they are
         corners = (surface.uncut.F, surface.cut.mesh.F) if surface.uncut and surface.cut else ()
-        original = with_uv(text, moved, *corners)
+        original = obj.with_uv(text, moved, *corners)
     _write(output, textured, texture, file_options, original)
     return _folded_by_rounding(output, z, moved, surface.mesh.F)
 
@@ -155,12 +152,12 @@ def write_shells(
     uv, corners = shells.together(maps)
     mesh = shells.whole
     whole = SurfaceFile(shells.path, mesh)
-    textured = Textured(mesh.V, mesh.F, _columns(uv), corners, name=mesh.name)
+    textured = Soup.of_triangles(mesh.V, mesh.F, uv, corners, name=mesh.name)
     texture = _texture(whole, textured, file_options, output)
     original = None
     if output.suffix.lower() == ".obj" == shells.path.suffix.lower():
         text = shells.path.read_text(encoding="latin-1")  # any bytes, as they are
-        original = with_uv(text, uv, *(() if corners is None else (mesh.F, corners)))
+        original = obj.with_uv(text, uv, *(() if corners is None else (mesh.F, corners)))
     _write(output, textured, texture, file_options, original)
     before = np.zeros(len(uv), dtype=np.complex128)
     F = mesh.F if corners is None else corners
@@ -185,7 +182,7 @@ def write_corner_map(
     mesh = surface.mesh
     found = cut_map(mesh, corners.reshape(-1, 3))
     moved = placed(found.uv, file_options.place)
-    textured = Textured(mesh.V, mesh.F, _columns(moved), found.surface.F, name=mesh.name)
+    textured = Soup.of_triangles(mesh.V, mesh.F, moved, found.surface.F, name=mesh.name)
     _write(output, textured, _checker(file_options, output), file_options, None)
     return _folded_by_rounding(output, found.uv, moved, found.surface.F)
 
@@ -198,7 +195,7 @@ def save_map(
     if file_options.bake is not None:
         raise ParameterError("--bake needs a surface read from an OBJ file.")
     moved = placed(z, file_options.place)
-    surface = Textured(mesh.V, mesh.F, _columns(moved), name=mesh.name)
+    surface = Soup.of_triangles(mesh.V, mesh.F, moved, name=mesh.name)
     _write(output, surface, _checker(file_options, output), file_options, None)
     return _folded_by_rounding(output, z, moved, mesh.F)
 
@@ -218,7 +215,7 @@ def write_atlas(
     parts = [_textured(file, z) for file, z in zip(surfaces, moved, strict=True)]
     texture = _checker(file_options, output)
     if output.suffix.lower() == ".glb":
-        whole = glb_bytes(*(replace(part, texture=texture) for part in parts))
+        whole = gltf.write(*parts, texture=Texture(texture) if texture else None)
         write_bytes(output, whole, error=MeshError, parents=False)
     else:
         _write(output, _joined(parts), texture, file_options, None)
@@ -234,19 +231,15 @@ def placed(z: Complex, place: Place) -> Complex:
     return to_unit_square(z) if place is Place.unit else z
 
 
-def _textured(surface: SurfaceFile, moved: Complex) -> Textured:
+def _textured(surface: SurfaceFile, moved: Complex) -> Soup:
     mesh, corners = surface.mesh, None
     if surface.uncut and surface.cut:
         mesh, corners = surface.uncut, surface.cut.mesh.F
-    return Textured(mesh.V, mesh.F, _columns(moved), corners, name=surface.mesh.name)
-
-
-def _columns(z: Complex) -> Real:
-    return np.stack([z.real, z.imag], axis=1)
+    return Soup.of_triangles(mesh.V, mesh.F, moved, corners, name=surface.mesh.name)
 
 
 def _texture(
-    surface: SurfaceFile, textured: Textured, file_options: FileOptions, output: Path
+    surface: SurfaceFile, textured: Soup, file_options: FileOptions, output: Path
 ) -> bytes | None:
     if file_options.bake is None:
         return _checker(file_options, output)
@@ -257,10 +250,10 @@ def _texture(
             "--bake needs the faces of the original file, but the surface was repaired; run "
             "`cembench repair` to see what it changes, and fix the file so that it keeps its UVs."
         )
-    old = read_obj_uv(surface.path, textured.F)
+    old = uv_of_faces(surface.path, textured.triangles)
     assert textured.uv is not None
-    corners = textured.F if textured.corners is None else textured.corners
-    return baked_png(read_texture(file_options.bake), old, textured.uv[corners])
+    new = columns(textured.uv)[textured.uv_triangles]
+    return baked_png(read_texture(file_options.bake), old, new)
 
 
 def _checker(file_options: FileOptions, output: Path) -> bytes | None:
@@ -273,41 +266,42 @@ def _checker(file_options: FileOptions, output: Path) -> bytes | None:
 
 def _write(
     output: Path,
-    surface: Textured,
+    surface: Soup,
     texture: bytes | None,
     file_options: FileOptions,
     original: str | None,
 ) -> None:
     """Write the files of a surface, the texture first, so that no file names a missing one."""
+    image = Texture(texture) if texture else None
     for path in beside(output, file_options):
         if path.suffix == ".png":
             assert texture is not None
             write_bytes(path, texture, error=RenderError, parents=False)
-            surface = replace(surface, texture_file=path.name)
+            image = Texture(texture, path.name)
         else:
-            assert surface.texture_file is not None
-            write_bytes(path, mtl_bytes(surface.texture_file), error=MeshError, parents=False)
+            assert image is not None
+            write_bytes(path, obj.mtl_bytes(image.file), error=MeshError, parents=False)
     if output.suffix.lower() != ".obj":
-        write_textured(output, replace(surface, texture=texture))
+        write_soup(output, surface, image)
         return
-    text = original or obj_bytes(surface).decode()
+    text = original or obj.write(surface).decode()
     if file_options.textured:
         library = output.with_suffix(".mtl").name.encode("utf-8", "surrogateescape")
-        text = with_material(text, library.decode("latin-1"))
+        text = obj.with_material(text, library.decode("latin-1"))
     write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
 
 
-def _joined(parts: Sequence[Textured]) -> Textured:
+def _joined(parts: Sequence[Soup]) -> Soup:
     """Return several surfaces joined into one mesh."""
     starts = np.cumsum([0, *(len(part.V) for part in parts)])
     coordinates = [part.uv for part in parts if part.uv is not None]
     uv_starts = np.cumsum([0, *(len(uv) for uv in coordinates)])
-    corners = [part.F if part.corners is None else part.corners for part in parts]
-    return Textured(
+    indices = zip(parts, uv_starts, strict=False)
+    return Soup.of_triangles(
         np.concatenate([part.V for part in parts]),
-        np.concatenate([part.F + k for part, k in zip(parts, starts, strict=False)]),
+        np.concatenate([part.triangles + k for part, k in zip(parts, starts, strict=False)]),
         np.concatenate(coordinates),
-        np.concatenate([c + k for c, k in zip(corners, uv_starts, strict=False)]),
+        np.concatenate([part.uv_triangles + k for part, k in indices]),
     )
 
 
@@ -316,8 +310,8 @@ def _folded_by_rounding(
 ) -> tuple[Notice, ...]:
     """Return a notice of how many triangles rounding folds in the file."""
     single = output.suffix.lower() in SINGLE
-    written = _columns(moved).astype(np.float32 if single else np.float64).astype(np.float64)
-    after = orientations(written @ np.array([1, 1j]), F)
+    written = moved.astype(np.complex64).astype(np.complex128) if single else moved
+    after = orientations(written, F)
     count = int(((orientations(z, F) > 0) & (after <= 0)).sum())
     if not count:
         return ()

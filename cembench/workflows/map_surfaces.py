@@ -16,7 +16,7 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.local import Options, map_once
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
-from cembench.running.surface_file import SurfaceFile
+from cembench.running.surfaces import SurfaceFile
 from cembench.workflows.map_extras import Extras, write_extras
 from cembench.workflows.map_files import (
     FileOptions,

@@ -9,11 +9,11 @@ import numpy as np
 
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.running.surfaces import SurfaceInput, load_surface
 from cembench.workflows.morphing.landmarks import Landmarks, check_landmarks
 from cembench.workflows.morphing.morph import Morph
 from cembench.workflows.morphing.morph import morph as register_all
 from cembench.workflows.parameterize import parameterize
-from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 
 def morph(
@@ -62,7 +62,7 @@ def morph(
     """
     if len(surfaces) < 2:
         raise ParameterError("a morph needs two surfaces or more; name at least one more.")
-    meshes = [_disk(surface) for surface in surfaces]
+    meshes = [load_surface(surface, (DiskMesh,)) for surface in surfaces]
     names = tuple(landmarks or {})
     rows = [list((landmarks or {})[name]) for name in names]
     for name, row in zip(names, rows, strict=True):
@@ -75,9 +75,3 @@ def morph(
     check_landmarks(places, meshes)
     maps = [parameterize(mesh, algorithm).z for mesh in meshes]
     return register_all(meshes, maps, places, **options)
-
-
-def _disk(surface: SurfaceInput) -> DiskMesh:
-    mesh = checked_surface(surface, (DiskMesh,))
-    assert isinstance(mesh, DiskMesh)
-    return mesh

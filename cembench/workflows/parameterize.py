@@ -21,8 +21,8 @@ from cembench.registry import Algorithm, Registry, load_registry
 from cembench.results.records import Outcome
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.surfaces import SurfaceInput, load_surface
 from cembench.workflows.notebook import html_table
-from cembench.workflows.surface_input import KINDS, SurfaceInput, checked_surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -381,7 +381,7 @@ def _mesh_and_algorithm(
     surface: SurfaceInput, name: str | None, registry: Registry
 ) -> tuple[TriangleMesh, Algorithm]:
     if name is None:
-        mesh = checked_surface(surface, KINDS, registry)
+        mesh: TriangleMesh = load_surface(surface, registry=registry)
         return mesh, registry.algorithm(default_algorithm(mesh))
     chosen = registry.algorithm(name)
-    return checked_surface(surface, (chosen.mesh_type,), registry), chosen
+    return load_surface(surface, (chosen.mesh_type,), registry=registry), chosen

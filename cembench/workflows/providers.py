@@ -24,9 +24,9 @@ from typing import Any, BinaryIO, cast
 
 from cembench.core.errors import CembenchError, MeshError, ParameterError
 from cembench.mesh.cut import cut_open
-from cembench.mesh.files import read_mesh
-from cembench.mesh.reading import is_named_like_a_mesh
-from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.mesh.files import is_named_like_a_mesh, read_mesh
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.running.surfaces import load_surface
 
 #: Maximum size of an archive member, in bytes.
 LARGEST_MEMBER = 2**31
@@ -198,8 +198,7 @@ def provided(
     try:
         mesh = load()
         if mesh.loops:
-            kind = DiskMesh if len(mesh.loops) == 1 else HoledMesh
-            return Provided(name, source, _as(kind, mesh, name), licence=licence)
+            return Provided(name, source, load_surface(mesh.renamed(name)), licence=licence)
         edges = 3 * mesh.m // 2
         if mesh.n - edges + mesh.m != 2:
             why = "it is closed, but not a single sphere: only closed surfaces of genus 0 are cut"
@@ -207,10 +206,6 @@ def provided(
         return Provided(name, source, cut_open(mesh).mesh.renamed(name), licence=licence, cut=True)
     except CembenchError as error:
         return Provided(name, source, error=str(error), licence=licence)
-
-
-def _as(kind: type[TriangleMesh], mesh: TriangleMesh, name: str) -> TriangleMesh:
-    return kind.from_arrays(mesh.V, mesh.F, name=name)
 
 
 class Names:

@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
-from cembench.mesh.defects import as_arrays, located
-from cembench.mesh.reading import read_soup
+from cembench.mesh.defects import located
+from cembench.mesh.files import read_soup
 from cembench.mesh.repair import Components
 from cembench.mesh.repair import repair as repair_arrays
-from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.workflows.surface_input import SurfaceInput, pair_of_arrays
+from cembench.running.surfaces import SurfaceInput, soup_of
 
 #: Kinds of repaired surfaces, the most special first.
 _KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh, TriangleMesh)
@@ -104,7 +103,7 @@ def repair(
 
     """
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
-    soup = _soup(surface)
+    soup = soup_of(surface) if path is None else read_soup(path)
     try:
         found = repair_arrays(
             soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
@@ -113,16 +112,6 @@ def repair(
     except MeshError as error:
         raise located(error, path) from None
     return Repair(tuple(meshes), found.counts, soup.notices)
-
-
-def _soup(surface: SurfaceInput) -> Soup:
-    if isinstance(surface, str | os.PathLike):
-        return read_soup(surface)
-    if isinstance(surface, TriangleMesh):
-        V, F, name = surface.V, surface.F, surface.name
-    else:
-        (V, F), name = as_arrays(*pair_of_arrays(surface)), "mesh"
-    return Soup(V, F.ravel(), np.full(len(F), 3), name)
 
 
 def _mesh(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> TriangleMesh:

@@ -14,8 +14,8 @@ from cembench.mesh.datasets import Dataset, fetch_all, is_fetched
 from cembench.mesh.download import Progress
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Registry, Surface, load_registry
-from cembench.running.plan import generate_surface
 from cembench.running.process_pool import process_pool
+from cembench.running.surfaces import generate_surface
 
 #: Seconds for fetching the paper's models, in all.
 FETCH_SECONDS = 20.0

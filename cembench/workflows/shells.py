@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 from cembench.conformal.laplacian import corner_products
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
-from cembench.running.surface_file import SurfaceFile, read_surface_file, surface_of_soup
+from cembench.running.surfaces import SurfaceFile, kinds_of, load_file, prepared
 
 Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
@@ -104,30 +104,30 @@ def read_shells(
         The file cannot be read, or one of its surfaces is not of such a kind.
 
     """
+    kinds = kinds_of(algorithms)
     if mend:
-        return _alone(read_surface_file(path, algorithms, mend=True, cut=cut))
+        return _alone(load_file(path, kinds, repair=True, cut=cut))
     soup = read_soup(path)
     try:
-        return _alone(surface_of_soup(path, soup, algorithms, cut=cut))
+        return _alone(prepared(soup, kinds, path, cut=cut))
     except UnusableMeshError as error:
         if {problem.defect for problem in error.problems} - _OF_SHELLS:
             raise
-        found = _split(soup)
-        if not 2 <= len(found) <= MOST:
+        pieces = _split(soup)
+        if not 2 <= len(pieces) <= MOST:
             raise
     F = soup.triangles
     parts, vertices, faces = [], [], []
-    for k, (own, held) in enumerate(found):
+    for k, (own, held) in enumerate(pieces):
         number = np.full(len(soup.V), -1)
         number[own] = np.arange(len(own))
         name = f"{soup.name} {k + 1}"
-        corners = number[F[held]]
-        shell = Soup(soup.V[own], corners.ravel(), np.full(len(held), 3), name, soup.notices)
+        shell = Soup.of_triangles(soup.V[own], number[F[held]], name=name, notices=soup.notices)
         try:
-            parts.append(surface_of_soup(path, shell, algorithms, cut=cut))
+            parts.append(prepared(shell, kinds, path, cut=cut))
         except MeshError as error:
             raise MeshError(
-                f"surface {k + 1} of the {len(found)} in this file, with vertex {own[0]} and "
+                f"surface {k + 1} of the {len(pieces)} in this file, with vertex {own[0]} and "
                 f"{len(held)} triangles (the following numbers count within this surface): {error}"
             ) from None
         vertices.append(own)

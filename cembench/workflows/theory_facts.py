@@ -12,7 +12,7 @@ from cembench.conformal.certificate import certify
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm, load_registry
-from cembench.workflows.surface_input import SurfaceInput, checked_surface
+from cembench.running.surfaces import SurfaceInput, load_surface
 from cembench.workflows.theory import (
     TOLERANCE,
     BoundaryOperator,
@@ -91,7 +91,7 @@ def theory(surface: SurfaceInput, *, iterations: int = 200) -> TheoryFacts:
     True
 
     """
-    mesh = checked_surface(surface, (DiskMesh,))
+    mesh = load_surface(surface, (DiskMesh,))
     assert isinstance(mesh, DiskMesh)
     return theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)
 

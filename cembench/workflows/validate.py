@@ -12,10 +12,10 @@ from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable, write_model
 from cembench.running.local import Options
 from cembench.running.plan import distribute_parameters
+from cembench.running.surfaces import SurfaceInput, load_surface
 from cembench.validation.examine import ValidationOptions, examine
 from cembench.validation.solver import Solver, in_a_process, load_solver
 from cembench.validation.verdict import Validation
-from cembench.workflows.surface_input import SurfaceInput, checked_surface
 
 
 def validate(
@@ -79,7 +79,7 @@ def validate(
     options = Options(timeout=timeout)
     asked = ValidationOptions(
         against=against,
-        meshes=[checked_surface(one, (algorithm.mesh_type,), registry) for one in surfaces],
+        meshes=[load_surface(one, [algorithm.mesh_type], registry=registry) for one in surfaces],
         rounds=rounds,
         up_to=up_to,
         checks_only=checks_only,

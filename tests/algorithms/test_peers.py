@@ -5,7 +5,7 @@ import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import DiskMesh, parameterize
-from cembench.mesh.uv_reader import read_flat
+from cembench.mesh.uvs import read_flat
 from cembench.registry import load_registry
 from cembench.running.external.exchange import read_output
 from cembench.running.external.present import missing

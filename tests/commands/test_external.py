@@ -10,7 +10,7 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import write_mesh
-from cembench.mesh.uv_reader import read_uv
+from cembench.mesh.uvs import read_uv
 from cembench.running.local import Launcher
 
 SCRIPT = Path(__file__).parents[1] / "running/external/misbehaves.py"
@@ -68,7 +68,7 @@ def test_the_map_of_an_atlas_is_written_with_a_uv_for_each_corner(cli, face):
     assert re.search(r"islands +2 *\n", out)
     assert "maximum |mu|" in out
     written = read_uv(cli.folder / "uv.obj")
-    assert len(np.unique(written.index)) == len(written.uv) > flat_disk(200).n
+    assert len(np.unique(written.uv_index)) == len(written.uv) > flat_disk(200).n
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".glb", ".vtp", ".npz"])

@@ -84,7 +84,10 @@ def test_a_map_that_fails_is_exit_code_1(pair):
     ("arguments", "message"),
     [
         (["calm.obj"], "needs two surfaces or more"),
-        (["calm.obj", "nobody"], "'nobody' is neither a mesh file nor a surface; surfaces: "),
+        (
+            ["calm.obj", "nobody"],
+            "'nobody' is neither a file nor a registered surface; known",
+        ),
         (["calm.obj", "nothing.obj"], "nothing.obj: there is no such file"),
         (["calm.obj", "smile.ply", "-o", "a.avi"], "'.avi' is unknown"),
         (["calm.obj", "smile.ply", "--views", "back"], "view 'back' is unknown"),
@@ -95,7 +98,7 @@ def test_a_map_that_fails_is_exit_code_1(pair):
         (["calm.obj", "tube.obj"], "tube.obj: the surface has 2 boundary loops"),
         (["closed.obj", "calm.obj"], "closed.obj: the surface is closed"),
         (["calm.obj", "handle.obj"], "handle.obj: the surface has genus 1"),
-        (["calm.obj", "holed-cap"], "holed-cap has .* boundary loops; a morph needs"),
+        (["calm.obj", "holed-cap"], "holed-cap: the surface has .* boundary loops"),
     ],
 )
 def test_what_cannot_be_morphed_is_refused_with_the_reason(arguments, message, pair):

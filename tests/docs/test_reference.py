@@ -11,7 +11,7 @@ import cembench
 from cembench.core import errors, extras
 from cembench.core.notices import NoticeKind
 from cembench.mesh.defects import Defect, UnusableMeshError
-from cembench.mesh.uv_reader import OtherSurfaceError
+from cembench.mesh.uvs import OtherSurfaceError
 from cembench.results.records import FaultKind
 from cembench.running.external.faults import ProgramFault
 

@@ -10,7 +10,8 @@ from cembench.linear_algebra.dense_cholesky import DenseCholesky
 from cembench.linear_algebra.work import counting
 from cembench.registry import load_registry
 from cembench.running.measure import check_cell
-from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.surfaces import generate_surface
 
 
 def matrix(n=60):

@@ -6,7 +6,7 @@ from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench import DiskMesh, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.defects import Defect, UnusableMeshError
-from cembench.mesh.files import read_mesh, read_repaired
+from cembench.mesh.files import read_mesh, read_soup, repaired_soup
 from tests.mesh.broken import ALONE_AND_IN_PAIRS, DEFECTS, broken, obj_text, turned
 
 
@@ -26,7 +26,7 @@ def test_refused_with_all_causes_then_mended_then_mapped(defects, tmp_path):
         assert f"cembench repair {path} -o broken_repaired.obj" in str(refused.value)
     else:
         assert read_mesh(path).notices
-    repaired = read_repaired(path)[1]
+    repaired = repaired_soup(read_soup(path))[1]
     mesh = DiskMesh.from_arrays(*repaired.surfaces[0])
     assert not mesh.notices
     assert repaired.notices
@@ -39,7 +39,7 @@ def test_refused_with_all_causes_then_mended_then_mapped(defects, tmp_path):
 def test_the_whole_surface_is_left_alone(tmp_path):
     draft = broken()
     (tmp_path / "whole.obj").write_text(obj_text(draft))
-    repaired = read_repaired(tmp_path / "whole.obj")[1]
+    repaired = repaired_soup(read_soup(tmp_path / "whole.obj"))[1]
     assert not any(repaired.steps.values())
     V, F = repaired.surfaces[0]
     assert V.tolist() == draft.points

@@ -10,8 +10,7 @@ from scipy.io import savemat
 from cembench.core.errors import MeshError
 from cembench.core.extras import MissingExtra
 from cembench.core.notices import NoticeKind
-from cembench.mesh.files import read_mesh, write_mesh
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_mesh, read_soup, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 

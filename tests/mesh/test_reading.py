@@ -10,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from cembench import MeshError
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_soup
 from tests.independent_reader import counts
 from tests.real_meshes import FOLDER
 

@@ -7,7 +7,7 @@ from cembench import DiskMesh, HoledMesh, MeshError, ParameterError, TriangleMes
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh import topology
 from cembench.mesh.defects import degenerate
-from cembench.mesh.files import read_repaired
+from cembench.mesh.files import read_soup, repaired_soup
 from cembench.mesh.repair import Step, repair
 from tests import gallery
 from tests.real_meshes import real_mesh
@@ -182,7 +182,7 @@ def test_nothing_left():
 
 
 def test_the_raw_bunny_maps_once_its_ears_are_gone():
-    repaired = read_repaired(real_mesh("holes/bunny_raw.obj"))[1]
+    repaired = repaired_soup(read_soup(real_mesh("holes/bunny_raw.obj")))[1]
     assert steps_taken(repaired) == {Step.ears: 2}
     mesh = HoledMesh.from_arrays(*repaired.surfaces[0])
     metrics = all_metrics(mesh, direct_cem_holes(mesh).uv)

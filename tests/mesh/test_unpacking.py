@@ -13,10 +13,9 @@ from scipy.io import savemat
 
 from cembench.core import loading
 from cembench.core.errors import MeshError
-from cembench.mesh.files import read_mesh, write_mesh
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_mesh, read_soup, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.mesh.uv_reader import read_uv
+from cembench.mesh.uvs import read_uv
 
 #: Bytes that each bomb unpacks to, and that may be free in these tests.
 SIZE, FREE = 48 * 2**20, 2**20
@@ -56,7 +55,7 @@ def test_arrays_that_memory_cannot_hold_are_not_unpacked(tmp_path, monkeypatch, 
     assert path.stat().st_size < SIZE / 50
     unpacked = []
     monkeypatch.setattr(np.lib.format, "read_array", unpacked.append)
-    monkeypatch.setattr("cembench.mesh.mat_reader._inflated_whole", unpacked.append)
+    monkeypatch.setattr("cembench.mesh.formats.mat._inflated_whole", unpacked.append)
     with pytest.raises(MeshError, match=r"bomb.*declares [\d,]+ bytes, more than memory can hold"):
         read_mesh(path)
     make(path, "uv")
@@ -110,11 +109,11 @@ LARGE, ROOM = 2**30, 2**28
 def little_room(monkeypatch):
     """Let the process that reads through a library reserve little more than it has."""
     code = (
-        "import sys; from cembench.core import loading; from cembench.mesh import apart\n"
+        "import sys; from cembench.core import loading; from cembench.mesh.formats import apart\n"
         f"apart.free_memory = lambda: {ROOM}\n"
         "sys.exit(apart._main(*sys.argv[4:]))"
     )
-    from cembench.mesh import apart
+    from cembench.mesh.formats import apart
 
     run = apart.subprocess.run
 

@@ -11,7 +11,8 @@ from cembench.registry import load_registry
 from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
 from cembench.running.local import Options, run_tasks
-from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.surfaces import generate_surface
 from cembench.validation.examine import ValidationOptions, examine
 from cembench.validation.quality import quality_findings
 from cembench.validation.solver import Solver, load_solver

@@ -17,8 +17,8 @@ from cembench.running.motion import (
     moved,
     numbering,
 )
-from cembench.running.plan import generate_surface
 from cembench.running.returned import hash_of
+from cembench.running.surfaces import generate_surface
 
 MORE, AHEAD = FaultKind.MORE_CORES, FaultKind.WORKS_AHEAD
 

@@ -5,7 +5,7 @@ from cembench.core.parameterization import Parameterization
 from cembench.registry import algorithm, load_registry
 from cembench.results.records import Cell
 from cembench.running import measure
-from cembench.running.plan import generate_surface
+from cembench.running.surfaces import generate_surface
 
 
 @pytest.mark.parametrize(("long", "calls"), [(0.0, 1), (60.0, measure.ENOUGH_CALLS + 1)])

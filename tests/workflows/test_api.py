@@ -84,7 +84,7 @@ INNER = next(e for t in F for e in (t[:2], t[1:]) if (np.isin(F, e).sum(axis=1) 
 BAD = {
     "swapped": ((F, V), "must|integer|whole"),
     "two columns": ((V[:, :2], F), r"\(n, 3\)|shape"),
-    "one-based": ((V, F + 1), "out of range"),
+    "one-based": ((V, F + 1), "count from 1.*Write F - 1"),
     "negative": ((V, F - 1), "out of range"),
     "NaN": ((np.where(V.max() == V, np.nan, V), F), "NaN|infinite"),
     "infinite": ((np.where(V.max() == V, np.inf, V), F), "NaN|infinite"),

@@ -11,7 +11,7 @@ from PIL import Image
 
 from cembench.conformal.planar import signed_areas
 from cembench.drawing import preview
-from cembench.mesh.reading import read_soup
+from cembench.mesh.files import read_soup
 from tests import gallery
 
 

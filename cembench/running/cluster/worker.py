@@ -33,7 +33,7 @@ from cembench.running.cluster import host
 from cembench.running.cluster.measure import RUN, UNIT
 from cembench.running.cluster.units import PluginFiles, Unit
 from cembench.running.environment import machine_name
-from cembench.running.plan import generate_surface
+from cembench.running.surfaces import generate_surface
 
 #: Seconds between two looks whether anybody still wants the unit.
 LOOK_EVERY = 1.0

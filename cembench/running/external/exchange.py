@@ -13,7 +13,7 @@ from cembench.core.errors import MeshError
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.mesh.uv_reader import OtherSurfaceError, read_flat, read_uv, uv_of_corners
+from cembench.mesh.uvs import OtherSurfaceError, read_flat, read_uv, uv_of_corners
 from cembench.registry import Algorithm
 from cembench.results.records import FaultKind
 from cembench.running.external.faults import ProgramFault

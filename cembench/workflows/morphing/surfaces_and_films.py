@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.core.errors import AlgorithmFailed, MeshError, ParameterError
-from cembench.mesh.files import read_mesh
+from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Registry
 from cembench.running.local import Options, map_once
-from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
+from cembench.running.plan import MeasurementSettings, paper_roles, plan_cells
+from cembench.running.surfaces import is_generated, load_surface
 from cembench.workflows.morphing import writers
 from cembench.workflows.morphing.drawing import Film, draw_film
 from cembench.workflows.morphing.morph import Morph
@@ -31,25 +31,11 @@ def disk_with_landmarks(
     Raises
     ------
     MeshError
-        The file cannot be read, or the surface is not a disk.
-    ParameterError
-        The name is neither a mesh file nor a registered surface.
+        There is no such surface, or it is not a disk.
 
     """
-    if Path(name).suffix or name not in registry.surfaces:
-        if not Path(name).suffix and not Path(name).exists():
-            raise ParameterError(
-                f"{name!r} is neither a mesh file nor a surface; surfaces: "
-                f"{', '.join(sorted(registry.surfaces))}."
-            )
-        return read_mesh(name), {}
-    mesh = generate_surface(registry, name, faces)
-    if not isinstance(mesh, DiskMesh):
-        raise MeshError(
-            f"{name} has {len(mesh.loops)} boundary loops; a morph needs topological disks, with "
-            "exactly one."
-        )
-    find = registry.surface(name).landmarks
+    mesh = load_surface(name, (DiskMesh,), faces=faces, registry=registry)
+    find = registry.surface(name).landmarks if is_generated(name, registry) else None
     return mesh, find(mesh) if find else {}
 
 

@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pygltflib
@@ -13,9 +14,9 @@ import trimesh
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import MeshError
-from cembench.mesh.files import write_mesh, write_textured
-from cembench.mesh.writers.glb import glb_bytes
-from cembench.mesh.writers.textured import Textured
+from cembench.mesh.files import write_mesh, write_soup
+from cembench.mesh.formats import gltf
+from cembench.mesh.soup import Soup, Texture, columns, complex_of
 
 
 @pytest.fixture(scope="module")
@@ -23,15 +24,17 @@ def surface():
     """A surface whose map is its shadow; far from the origin, so that middles matter."""
     mesh = hemi_ellipsoid(300)
     uv = (mesh.V[:, :2] - mesh.V[:, :2].min(axis=0)) / np.ptp(mesh.V[:, :2])
-    return Textured(mesh.V + np.array([1000, 0, 0]), mesh.F, uv, name="shadow")
+    V = mesh.V + np.array([1000, 0, 0])
+    return Soup.of_triangles(V, mesh.F, complex_of(uv), name="shadow")
 
 
 @pytest.fixture(scope="module")
 def seamed(surface):
     """The same where the first triangle has texture coordinates of its own."""
-    corners = surface.F.copy()
+    corners = surface.triangles.copy()
     corners[0] = len(surface.uv) + np.arange(3)
-    return Textured(surface.V, surface.F, np.vstack([surface.uv, np.eye(3, 2)]), corners)
+    uv = np.append(surface.uv, [1, 1j, 0])
+    return Soup.of_triangles(surface.V, surface.triangles, uv, corners)
 
 
 def by_trimesh(path):
@@ -98,19 +101,18 @@ def test_a_foreign_reader_finds_corners_and_texture_coordinates(
     name, read, which, request, tmp_path
 ):
     given = request.getfixturevalue(which)
-    write_textured(tmp_path / name, given)
+    write_soup(tmp_path / name, given)
     points, uv = read(tmp_path / name)
-    np.testing.assert_allclose(points, given.V[given.F], rtol=1e-6, atol=1e-6)
-    corners = given.F if given.corners is None else given.corners
-    np.testing.assert_allclose(uv, given.uv[corners], atol=1e-6)
+    np.testing.assert_allclose(points, given.V[given.triangles], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(uv, columns(given.uv)[given.uv_triangles], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["a.vtp", "a.npz"])
 def test_full_precision_is_kept_to_the_last_bit(name, surface, tmp_path):
-    write_textured(tmp_path / name, surface)
+    write_soup(tmp_path / name, surface)
     points, uv = {".vtp": by_vtk, ".npz": by_numpy}[name[1:]](tmp_path / name)
-    np.testing.assert_array_equal(points, surface.V[surface.F])
-    np.testing.assert_array_equal(uv, surface.uv[surface.F])
+    np.testing.assert_array_equal(points, surface.V[surface.triangles])
+    np.testing.assert_array_equal(uv, columns(surface.uv)[surface.triangles])
 
 
 def test_glb_shows_the_texture_that_is_inside(surface, tmp_path):
@@ -118,8 +120,7 @@ def test_glb_shows_the_texture_that_is_inside(surface, tmp_path):
 
     from cembench.drawing.texture import checker_png
 
-    textured = Textured(surface.V, surface.F, surface.uv, texture=checker_png())
-    write_textured(tmp_path / "a.glb", textured)
+    write_soup(tmp_path / "a.glb", surface, Texture(checker_png()))
     found = trimesh.load_mesh(tmp_path / "a.glb")
     picture = found.visual.material.baseColorTexture.convert("RGB")
     assert isinstance(picture, Image.Image)
@@ -128,16 +129,9 @@ def test_glb_shows_the_texture_that_is_inside(surface, tmp_path):
 
 def test_glb_holds_several_surfaces_and_one_texture(surface, tmp_path):
     parts = [
-        Textured(
-            surface.V + np.array([k, 0, 0]),
-            surface.F,
-            surface.uv,
-            texture=b"\x89PNG",
-            name=f"part {k}",
-        )
-        for k in range(2)
+        replace(surface, V=surface.V + np.array([k, 0, 0]), name=f"part {k}") for k in range(2)
     ]
-    (tmp_path / "a.glb").write_bytes(glb_bytes(*parts))
+    (tmp_path / "a.glb").write_bytes(gltf.write(*parts, texture=Texture(b"\x89PNG")))
     found = pygltflib.GLTF2.load(tmp_path / "a.glb")
     assert [node.name for node in found.nodes] == ["part 0", "part 1"]
     assert len(found.images) == len(found.textures) == len(found.materials) == 1
@@ -146,7 +140,7 @@ def test_glb_holds_several_surfaces_and_one_texture(surface, tmp_path):
 @pytest.mark.parametrize("name", ["a.glb", "a.stl"])
 def test_what_single_precision_cannot_hold_is_refused(name, surface, tmp_path):
     with pytest.raises(MeshError, match=r"are too large for .* up to 3\.4e\+38"):
-        write_textured(tmp_path / name, Textured(surface.V * 1e40, surface.F))
+        write_soup(tmp_path / name, replace(surface, V=surface.V * 1e40, uv=None))
     assert not list(tmp_path.iterdir())
 
 
@@ -173,8 +167,8 @@ def test_the_validator_of_khronos_finds_nothing(surface, seamed, tmp_path):
     from cembench.drawing.texture import checker_png
 
     for k, given in enumerate((surface, seamed)):
-        textured = Textured(given.V, given.F, given.uv, given.corners, checker_png())
-        (tmp_path / f"{k}.glb").write_bytes(glb_bytes(textured, textured))
+        content = gltf.write(given, given, texture=Texture(checker_png()))
+        (tmp_path / f"{k}.glb").write_bytes(content)
         script = (
             "const v = require('gltf-validator'), fs = require('fs');"
             f"v.validateBytes(new Uint8Array(fs.readFileSync('{k}.glb')))"

@@ -1,8 +1,8 @@
-"""Find the vertices and triangles among a file's arrays."""
+"""Find the vertices and triangles, or the UVs, among a file's arrays."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,15 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.soup import Soup
+from cembench.mesh.soup import Soup, complex_of, damaged
 
 #: So many times the memory of a file's arrays is needed to find and check a surface among them.
 COPIES = 4
 #: Usual names of vertices and triangles, tried before any guess.
 USUAL = (("v", "f"), ("V", "F"))
+#: Names of arrays of UVs, and of their indices at corners.
+_UV_NAMES, _INDEX_NAMES = ("uv", "UV"), ("fuv", "FUV", "ftc", "FTC", "F_uv")
+UV_ARRAYS = (*_UV_NAMES, *_INDEX_NAMES)
 #: Two arrays fit if the indices span one of these ranges exactly: 1 to n, or 0 to n - 1.
 _COUNTED_FROM = (1, 0)
 
@@ -58,8 +61,8 @@ def soup_of_arrays(
                 "cembench.read_mesh."
             )
         pair = pairs[0]
-        told = f"the arrays {pair[0]!r} and {pair[1]!r} were used as vertices and triangles"
-        notices = (Notice(NoticeKind.ARRAYS_GUESSED, told),)
+        text = f"the arrays {pair[0]!r} and {pair[1]!r} were used as vertices and triangles"
+        notices = (Notice(NoticeKind.ARRAYS_GUESSED, text),)
     for name in pair:
         if name not in found:
             raise MeshError(f"there is no variable {name!r}; it has: {_listed(found)}.")
@@ -77,6 +80,36 @@ def soup_of_arrays(
             f"variable {pair[1]!r} must hold whole numbers from {first} on, the triangles' corners."
         )
     return Soup.from_arrays(v, f, np.full(len(f), 3), counted_from=first, notices=notices)
+
+
+def soup_of_uv(arrays: Mapping[str, NDArray[Any]], names: Iterable[str], counted_from: int) -> Soup:
+    """Build UVs without a surface from ``uv``, (k, 2) or complex (k,), and ``fuv`` (m, 3).
+
+    Raises
+    ------
+    MeshError
+        There is no array ``uv``, or it has another shape; the message lists the `names`.
+
+    """
+    uv = next((arrays[name] for name in _UV_NAMES if name in arrays), None)
+    index = next((arrays[name] for name in _INDEX_NAMES if name in arrays), np.empty((0, 3)))
+    if uv is None:
+        present = ", ".join(names) or "none"
+        raise damaged(f"it holds no array uv (k, 2); its arrays are: {present}")
+    whole = np.asarray(index, dtype=np.int64).reshape(-1, 3) - counted_from
+    nothing = np.empty(0, dtype=np.int64)
+    return Soup(
+        np.empty((0, 3)), nothing, np.full(len(whole), 3), uv=_complex(uv), uv_index=whole.ravel()
+    )
+
+
+def _complex(uv: NDArray[Any]) -> NDArray[np.complex128]:
+    """Return UVs (k, 2) or complex (k,) as complex numbers."""
+    if uv.dtype.kind == "c":
+        return np.ascontiguousarray(uv.ravel(), dtype=np.complex128)
+    if uv.ndim != 2 or uv.shape[1] not in (2, 3) or uv.dtype.kind not in "fiu":
+        raise damaged(f"uv is {uv.dtype} {uv.shape}; required is real (k, 2) or complex (k,)")
+    return complex_of(uv[:, :2])
 
 
 def _fits(v: NDArray[Any], f: NDArray[Any]) -> bool:

@@ -12,7 +12,7 @@ from cembench.core.errors import MeshError
 from cembench.mesh.soup import Soup, damaged
 
 
-def read_gii(path: Path) -> Soup:
+def read(path: Path) -> Soup:
     """Read the points and the triangles of a GIFTI file."""
     nibabel: Any = importlib.import_module("nibabel")
 
@@ -20,7 +20,7 @@ def read_gii(path: Path) -> Soup:
         image = nibabel.gifti.GiftiImage.from_bytes(path.read_bytes())
         points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
         triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
-        V, F = ([np.asarray(one.data) for one in found] for found in (points, triangles))
+        V, F = ([np.asarray(one.data) for one in arrays] for arrays in (points, triangles))
     except MemoryError:
         raise
     except Exception as error:  # whatever a library raises on damaged bytes

@@ -1,4 +1,4 @@
-"""STL files, binary and ASCII: triangles whose corners are merged if they coincide exactly.
+"""STL, binary and ASCII: triangles whose corners are merged if they coincide exactly.
 
 Own code, because meshio and trimesh read a truncated file as an empty one, and meshio refuses
 upper-case ASCII.
@@ -13,7 +13,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.mesh.soup import BYTE_ORDER_MARK, Soup, damaged, refuse_underscores, shown, words_of
+from cembench.mesh.soup import (
+    BYTE_ORDER_MARK,
+    Soup,
+    damaged,
+    in_single_precision,
+    refuse_underscores,
+    shown,
+    words_of,
+)
 
 _HEADER_BYTES = 84
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -21,7 +29,7 @@ _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attrib
 _FACET = ("facet", "outer", "vertex", "vertex", "vertex", "endloop", "endfacet")
 
 
-def read_stl(path: Path) -> Soup:
+def read(path: Path) -> Soup:
     """Read the triangles of an STL file; vertices are in the order of their first use."""
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -92,3 +100,15 @@ def _merged(corners: NDArray[Any]) -> Soup:
     F = np.empty(len(points), dtype=np.int64)
     F[order] = rank[np.cumsum(is_new) - 1]
     return Soup.from_arrays(points[np.sort(first)], F, np.full(len(points) // 3, 3))
+
+
+def write(surface: Soup) -> bytes:
+    """Return a binary STL file of separate triangles, with the normal of each."""
+    P = surface.V[surface.triangles]
+    facets = np.zeros(len(P), _TRIANGLE)
+    size = float(np.abs(P).max(initial=0.0)) or 1.0
+    normals = np.cross((P[:, 1] - P[:, 0]) / size, (P[:, 2] - P[:, 0]) / size)
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    facets["normal"] = normals / np.where(length > 0, length, 1.0)
+    facets["corners"] = in_single_precision(P, "STL")
+    return bytes(80) + np.uint32(len(facets)).tobytes() + facets.tobytes()

@@ -1,4 +1,4 @@
-"""PLY files, ASCII and binary: the vertices and polygons among any elements and properties.
+"""PLY, ASCII and binary: vertices, polygons and texture coordinates among other properties.
 
 Own code, because meshio hangs on a truncated header and refuses most valid headers, trimesh refuses
 binary polygons of mixed sizes and silently reads truncated ASCII files, and plyfile takes twice the
@@ -13,7 +13,7 @@ import struct
 import warnings
 from array import array
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.errors import MeshError
-from cembench.mesh.soup import Soup, damaged, shown
+from cembench.mesh.soup import (
+    Soup,
+    Texture,
+    columns,
+    complex_of,
+    damaged,
+    in_single_precision,
+    shown,
+)
 
 #: A header must end within this many bytes.
 _LONGEST_HEADER = 1 << 20
@@ -34,14 +42,7 @@ _TYPES = {
     "float": "f4", "float32": "f4", "double": "f8", "float64": "f8",
 }  # fmt: skip
 _BYTE_ORDERS = {"ascii": "=", "binary_little_endian": "<", "binary_big_endian": ">"}
-#: Type codes of the module struct.
-_STRUCT = {
-    "i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "i8": "q", "u8": "Q",
-    "f4": "f", "f8": "d",
-}  # fmt: skip
 _CORNERS = ("vertex_indices", "vertex_index")
-_AXES = (("x",), ("y",), ("z",))
-_GEOMETRY: dict[str, tuple[tuple[str, ...], ...]] = {"vertex": _AXES, "face": (_CORNERS,)}
 #: Property names of texture coordinates at vertices.
 _TEXTURE = (("u", "v"), ("s", "t"), ("texture_u", "texture_v"))
 
@@ -86,102 +87,110 @@ class _Element:
         )
 
 
-def read_ply(path: Path) -> Soup:
+def read(path: Path, *, uv: bool = False) -> Soup:
     """Read the vertices and polygons of a PLY file; other elements and properties are skipped.
 
-    Coordinates have the precision that the header declares, also in ASCII files.
+    Coordinates have the precision that the header declares, also in ASCII files. With `uv` texture
+    coordinates are read, too: the vertex properties u and v, s and t or texture_u and texture_v, or
+    the list texcoord of the faces.
     """
-    elements, found = _columns(path, _GEOMETRY)
-    coordinates = _element(elements, "vertex")
-    types = [coordinates.properties[k].item for k in _indices(coordinates, _GEOMETRY)]
+    content = np.fromfile(path, dtype=np.uint8)
+    form, elements, begin, lines = _header(content[:_LONGEST_HEADER].tobytes())
+    texture = _texture_properties(elements) if uv else {}
+    axes = [("x",), ("y",), ("z",), *texture.get("vertex", ())]
+    wanted = {"vertex": axes, "face": [_CORNERS, *texture.get("face", ())]}
+    columns = _columns(content[begin:], form, elements, lines, wanted)
+    vertex = _element(elements, "vertex")
     with np.errstate(over="ignore"):  # values beyond float become infinite, and are refused
         V = [
-            column.items.astype(t.newbyteorder("="))
-            for t, column in zip(types, found["vertex"], strict=True)
+            column.items.astype(vertex.properties[k].item.newbyteorder("="))
+            for k, column in zip(_indices(vertex, axes[:3]), columns["vertex"], strict=False)
         ]
-    (faces,) = found["face"]
-    return Soup.from_arrays(np.stack(V, axis=1), _whole(faces.items), faces.sizes)
+    corners, *of_corners = columns["face"]
+    more: dict[str, Any] = {}
+    if of_corners:
+        if (of_corners[0].sizes != 2 * corners.sizes).any():
+            raise damaged("a face's texcoord does not have two numbers for each corner")
+        more = {"uv": complex_of(of_corners[0].items), "uv_index": np.arange(corners.sizes.sum())}
+    elif uv:
+        more = {"uv": complex_of(np.stack([c.items for c in columns["vertex"][3:]], axis=1))}
+    return Soup.from_arrays(np.stack(V, axis=1), _whole(corners.items), corners.sizes, **more)
 
 
-def read_ply_texture(
-    path: Path,
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64], NDArray[np.int64] | None]:
-    """Read the vertices, triangles and texture coordinates of a PLY file.
+def _texture_properties(elements: list[_Element]) -> dict[str, list[tuple[str]]]:
+    """Return the properties of the vertices or of the faces that hold texture coordinates."""
+    if "texcoord" in {p.name for p in _element(elements, "face").properties}:
+        return {"face": [("texcoord",)]}
+    names = {p.name for p in _element(elements, "vertex").properties}
+    for pair in _TEXTURE:
+        if set(pair) <= names:
+            return {"vertex": [(name,) for name in pair]}
+    raise damaged(
+        "it holds no UVs: no properties u and v, s and t or texture_u and texture_v of its "
+        "vertices, and no list texcoord of its faces"
+    )
 
-    Texture coordinates are vertex properties u and v, s and t or texture_u and texture_v, or the
-    list texcoord of the faces.
 
-    Returns
-    -------
-    V, F : float64 (n, 3), int64 (m, 3)
-        The surface.
-    uv : float64 (k, 2)
-        Texture coordinates.
-    index : int64 (m, 3) or None
-        The texture coordinate of each corner; None if they belong to the vertices.
+def write(surface: Soup, texture: Texture | None = None) -> bytes:
+    """Return a little-endian PLY file: coordinates float64, texture coordinates float32.
 
-    Raises
-    ------
-    MeshError
-        The file is damaged, has no such property, or has polygons other than triangles.
-
+    MeshLab accepts these only in single precision: as `s` and `t` of a vertex or, if the surface
+    has seams, as `texcoord` of a face.
     """
-    elements = _header(np.fromfile(path, np.uint8, _LONGEST_HEADER).tobytes())[1]
-    vertex = {p.name for p in _element(elements, "vertex").properties}
-    face = {p.name for p in _element(elements, "face").properties}
-    at_vertices = next((pair for pair in _TEXTURE if set(pair) <= vertex), None)
-    at_corners = "texcoord" if "texcoord" in face else None
-    if not (at_vertices or at_corners):
-        raise damaged(
-            "it holds no UVs: no properties u and v, s and t or texture_u and texture_v of its "
-            "vertices, and no list texcoord of its faces"
-        )
-    more = tuple((name,) for name in at_vertices or ()) if not at_corners else ()
-    lists = (("texcoord",),) if at_corners else ()
-    _, found = _columns(path, {"vertex": (*_AXES, *more), "face": (_CORNERS, *lists)})
-    columns = [column.items.astype(np.float64) for column in found["vertex"]]
-    corners = found["face"][0]
-    if (corners.sizes != 3).any():
-        raise damaged("it has polygons that are not triangles")
-    F = _whole(corners.items).reshape(-1, 3)
-    V = np.stack(columns[:3], axis=1)
-    if len(F) and not 0 <= F.min() <= F.max() < len(V):
-        raise damaged(f"a triangle has vertex {int(F.max())}, but there are {len(V)}")
-    if not at_corners:
-        return V, F, np.stack(columns[3:], axis=1), None
-    texture = found["face"][1]
-    if (texture.sizes != 6).any():
-        raise damaged("a triangle's texcoord does not have six numbers")
-    UV = texture.items.astype(np.float64).reshape(-1, 2)
-    return V, F, UV, np.arange(len(UV), dtype=np.int64).reshape(-1, 3)
+    V, F, uv = surface.V, surface.triangles, surface.uv
+    lines = ["ply", "format binary_little_endian 1.0"]
+    if texture is not None and texture.file:
+        lines.append(f"comment TextureFile {texture.file}")
+    lines += [f"element vertex {len(V)}", *(f"property double {axis}" for axis in "xyz")]
+    by_vertex = uv is not None and not surface.has_seams
+    by_corner = uv is not None and surface.has_seams
+    vertex, face = [("x", "<f8", 3)], [("k", "u1"), ("F", "<i4", 3)]
+    if by_vertex:
+        lines += ["property float s", "property float t"]
+        vertex.append(("st", "<f4", 2))
+    lines += [f"element face {len(F)}", "property list uchar int vertex_indices"]
+    if by_corner:
+        lines.append("property list uchar float texcoord")
+        face += [("c", "u1"), ("st", "<f4", 6)]
+    vertices, faces = np.zeros(len(V), vertex), np.zeros(len(F), face)
+    vertices["x"], faces["k"], faces["F"] = V, 3, F
+    if uv is not None:
+        st = in_single_precision(columns(uv), "PLY's texture coordinates")
+        if by_vertex:
+            vertices["st"] = st
+        else:
+            faces["c"], faces["st"] = 6, st[surface.uv_triangles].reshape(-1, 6)
+    header = "\n".join([*lines, "end_header", ""])
+    return header.encode("utf-8", "surrogateescape") + vertices.tobytes() + faces.tobytes()
 
 
 def _columns(
-    path: Path, wanted: Mapping[str, Sequence[tuple[str, ...]]]
-) -> tuple[list[_Element], dict[str, list[_Column]]]:
-    """Return the elements of a file, and the wanted properties of each, by name."""
-    content = np.fromfile(path, dtype=np.uint8)
-    form, elements, begin, lines = _header(content[:_LONGEST_HEADER].tobytes())
-    body = content[begin:]
+    body: Bytes,
+    form: str,
+    elements: list[_Element],
+    header_lines: int,
+    wanted: Mapping[str, Sequence[tuple[str, ...]]],
+) -> dict[str, list[_Column]]:
+    """Return the wanted properties of elements, by name."""
     _check_elements(elements)
-    chosen = {name: _indices(_element(elements, name), wanted) for name in wanted}
+    chosen = {name: _indices(_element(elements, name), wanted[name]) for name in wanted}
     stored = elements
     if form == "ascii":
-        body = _numbers(body, lines).view(np.uint8)
+        body = _numbers(body, header_lines).view(np.uint8)
         stored = [_as_doubles(element) for element in elements]
     _check_size(stored, body, form)
     at = 0
-    found: dict[str, list[_Column]] = {}
+    rows: dict[str, list[_Column]] = {}
     for element in stored:
-        found[element.name], at = _read_rows(element, body, at, chosen.get(element.name, []))
+        rows[element.name], at = _read_rows(element, body, at, chosen.get(element.name, []))
     _check_rest(elements, body[at:], form)
-    return elements, found
+    return rows
 
 
-def _indices(element: _Element, wanted: Mapping[str, Sequence[tuple[str, ...]]]) -> list[int]:
+def _indices(element: _Element, wanted: Sequence[tuple[str, ...]]) -> list[int]:
     """Return the positions of the wanted properties of an element."""
     of_list = element.name == "face"
-    return [element.index(names, of_list=of_list) for names in wanted[element.name]]
+    return [element.index(names, of_list=of_list) for names in wanted]
 
 
 def _header(text: bytes) -> tuple[str, list[_Element], int, int]:
@@ -354,7 +363,7 @@ def _walk_rows(
     starts = {k: array("q") for k in wanted}
     sizes = {k: array("q") for k in wanted}
     steps = [
-        (k, p.item.itemsize, p.least_bytes, None if p.size is None else _unpacker(p.size))
+        (k, p.item.itemsize, p.least_bytes, None if p.size is None else _struct(p.size).unpack_from)
         for k, p in enumerate(element.properties)
     ]
     end = len(body)
@@ -364,7 +373,7 @@ def _walk_rows(
             if at + least_bytes > end:
                 raise _ends_within(element, row)
             if unpack is not None:
-                (found,) = unpack(body, at)
+                (found,) = unpack(body.data, at)
                 at += least_bytes
                 size = int(found) if 0 <= found <= end else -1
                 if size < 0 or size != found:
@@ -384,10 +393,10 @@ def _walk_rows(
     ], at
 
 
-def _unpacker(size: np.dtype[Any]) -> Callable[[Any, int], tuple[Any, ...]]:
-    """Return the function that reads a list's length from bytes."""
-    order = "=" if size.byteorder == "|" else size.byteorder
-    return struct.Struct(order + _STRUCT[size.str[1:]]).unpack_from
+def _struct(number: np.dtype[Any]) -> struct.Struct:
+    """Return the layout of a number for the module struct."""
+    order = "=" if number.byteorder == "|" else number.byteorder
+    return struct.Struct(order + np.dtype(number.str[1:]).char.replace("l", "q").replace("L", "Q"))
 
 
 def _items(

@@ -1,5 +1,7 @@
 """MATLAB files of versions 5 to 7.2: v (n, 3) and f (m, 3) counted from 1, or two arrays that fit.
 
+UVs are the array `uv`, and `fuv` at corners, counted from 1.
+
 Own code, because scipy's reader crashes the process on some damaged files and never ends on some of
 version 4. Here every length is compared with the available bytes before anything is read.
 """
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import MeshError
 from cembench.core.loading import check_room
-from cembench.mesh.array_pairs import COPIES, soup_of_arrays
+from cembench.mesh.formats.arrays import COPIES, UV_ARRAYS, soup_of_arrays, soup_of_uv
 from cembench.mesh.soup import Soup, damaged
 
 _HEADER_BYTES = 128
@@ -33,35 +35,44 @@ _NUMERIC_CLASSES, _COMPLEX = range(6, 16), 0x0800
 _BEGINNING = 4096
 
 
-def read_mat(path: Path, arrays: tuple[str, str] | None = None) -> Soup:
-    """Read the vertices and triangles of a MATLAB file: v and f, the named two, or two that fit."""
+def read(path: Path, arrays: tuple[str, str] | None = None, *, uv: bool = False) -> Soup:
+    """Read the vertices and triangles of a MATLAB file: v and f, the named two, or two that fit.
+
+    With `uv` only UVs are read.
+    """
     content = path.read_bytes()
+    if uv:
+        names: list[str] = []
+
+        def is_uv(name: str, shape: list[int]) -> bool:
+            names.append(name)
+            return name in UV_ARRAYS
+
+        return soup_of_uv(_arrays(content, is_uv), names, 1)
     if arrays:
         return soup_of_arrays(_columns(content, lambda name, shape: name in arrays), arrays, 1)
-    found = _columns(content, lambda name, shape: name in ("v", "f"))
-    if not {"v", "f"} <= set(found):
-        found |= _columns(content, lambda name, shape: shape[1:] in ([2], [3]))
-    return soup_of_arrays(found, None, 1)
+    columns = _columns(content, lambda name, shape: name in ("v", "f"))
+    if not {"v", "f"} <= set(columns):
+        columns |= _columns(content, lambda name, shape: shape[1:] in ([2], [3]))
+    return soup_of_arrays(columns, None, 1)
 
 
 def _columns(
     content: bytes, is_wanted: Callable[[str, list[int]], bool]
 ) -> dict[str, NDArray[Any]]:
     """Return the wanted arrays by name, which must be real numbers (rows, 3) or (rows, 2)."""
-    found = mat_arrays(content, is_wanted)
-    for name, array in found.items():
+    arrays = _arrays(content, is_wanted)
+    for name, array in arrays.items():
         numeric = array.dtype.kind in "fiu"
         if not numeric or array.ndim != 2 or array.shape[1] not in (2, 3):
             raise MeshError(
                 f"variable {name!r} must be real numbers of shape (rows, 3); it has shape "
                 f"{array.shape} and is {'numeric' if numeric else 'not real numbers'}."
             )
-    return found
+    return arrays
 
 
-def mat_arrays(
-    content: bytes, is_wanted: Callable[[str, list[int]], bool]
-) -> dict[str, NDArray[Any]]:
+def _arrays(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict[str, NDArray[Any]]:
     """Return the wanted arrays by name, and check the lengths of all others.
 
     `is_wanted` receives an array's name, and its shape if it holds real numbers. What is no array
@@ -81,7 +92,7 @@ def mat_arrays(
     for kind, element in _elements(content[_HEADER_BYTES:], order):
         begin, size = element, 0
         if kind == _COMPRESSED:
-            begin = _inflated(element, _BEGINNING)
+            begin, _ = _inflated(element, _BEGINNING)
             kind, size = _two_numbers(begin, 0, order)
             begin = begin[8:]
         if kind != _ARRAY:
@@ -142,12 +153,24 @@ def _two_numbers(content: bytes, at: int, order: str) -> tuple[int, int]:
     return first, second
 
 
-def _inflated(element: bytes, most: int) -> bytes:
-    """Return at most this many first bytes of a compressed element."""
+def _inflated(element: bytes, most: int) -> tuple[bytes, bool]:
+    """Return at most this many bytes of a compressed element, and whether it ends there."""
+    stream = zlib.decompressobj()
     try:
-        return zlib.decompressobj().decompress(element, most)
+        return stream.decompress(element, most), stream.eof
     except zlib.error as error:
         raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+
+
+def _inflated_whole(element: bytes, size: int) -> bytes:
+    """Return all bytes of a compressed element, whose size and checksum are verified."""
+    content, ends = _inflated(element, size + 1)
+    if len(content) != size or not ends:
+        raise damaged(
+            f"it cannot be read as MAT: a compressed element of {size} bytes holds "
+            f"{len(content)}, or was cut short"
+        )
+    return content
 
 
 def _check_compressed(element: bytes, size: int) -> None:
@@ -161,21 +184,6 @@ def _check_compressed(element: bytes, size: int) -> None:
         rest = stream.unconsumed_tail
     if length != size or not stream.eof:
         raise damaged("it cannot be read as MAT: a compressed element was cut short")
-
-
-def _inflated_whole(element: bytes, size: int) -> bytes:
-    """Return all bytes of a compressed element, whose size and checksum are verified."""
-    stream = zlib.decompressobj()
-    try:
-        found = stream.decompress(element, size + 1)
-    except zlib.error as error:
-        raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
-    if len(found) != size or not stream.eof:
-        raise damaged(
-            f"it cannot be read as MAT: a compressed element of {size} bytes holds {len(found)}, "
-            "or was cut short"
-        )
-    return found
 
 
 def _numbers(part: tuple[int, bytes], order: str) -> NDArray[Any]:

@@ -1,7 +1,7 @@
-"""Binary glTF 2.0 (`.glb`): surface, texture coordinates and texture in one file.
+"""glTF 2.0: `.glb` and `.gltf` read through trimesh; `.glb` written with textures inside.
 
 glTF has single precision only. Vertices are therefore written relative to the centre of the
-surface, and a node moves them back.
+surface, and a node moves them back. Own code writes, since trimesh is an extra.
 """
 
 from __future__ import annotations
@@ -9,25 +9,60 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from cembench.mesh.writers.textured import Textured, in_single_precision
+from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.soup import Soup, Texture, columns, damaged, in_single_precision
 
 _FLOAT, _UINT32, _VERTICES, _INDICES, _REPEAT, _LINEAR, _MIPMAPS = (
     5126, 5125, 34962, 34963, 10497, 9729, 9987,
 )  # fmt: skip
 
 
-def glb_bytes(*surfaces: Textured) -> bytes:
-    """Return a file with one mesh per surface; textures are shown on both sides.
+def read(path: Path) -> Soup:
+    """Read all triangles of a scene; vertices at the same position become one vertex.
+
+    glTF has a vertex for each texture coordinate or normal, so seams would cut the surface open.
+    """
+    import trimesh
+
+    try:
+        scene = trimesh.load_scene(path, process=False)
+        pieces = scene.dump()
+    except MemoryError:
+        raise
+    except Exception as error:  # whatever a library raises on damaged bytes
+        raise damaged(f"it cannot be read as glTF: {type(error).__name__}: {error}") from None
+    meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
+    notices: tuple[Notice, ...] = ()
+    if len(meshes) < len(pieces):
+        text = f"{len(pieces) - len(meshes)} pieces that are points or lines were ignored"
+        notices = (Notice(NoticeKind.LINES_IGNORED, text),)
+    if not meshes:
+        return Soup.from_arrays(np.empty((0, 3)), [], [])
+    first = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    V = np.concatenate([np.asarray(mesh.vertices, dtype=np.float64) for mesh in meshes])
+    F = np.concatenate(
+        [np.asarray(m.faces, dtype=np.int64) + at for m, at in zip(meshes, first, strict=False)]
+    )
+    apart, same = np.unique(V, axis=0, return_inverse=True)
+    if len(apart) < len(V):
+        V, F = apart, same.reshape(-1)[F]
+    return Soup.from_arrays(V, F, np.full(len(F), 3), notices=notices)
+
+
+def write(*surfaces: Soup, texture: Texture | None = None) -> bytes:
+    """Return a file with one mesh per surface; the texture is shown on both sides.
 
     Seams are cut open, since a glTF vertex has one texture coordinate. Its v points down.
     """
     file = _File()
     for surface in surfaces:
-        _add(file, surface.cut_at_seams())
+        _add(file, surface.cut_at_seams(), texture)
     return file.packed()
 
 
@@ -82,7 +117,7 @@ class _File:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
-def _add(file: _File, surface: Textured) -> None:
+def _add(file: _File, surface: Soup, texture: Texture | None) -> None:
     """Add a surface as a mesh and a node."""
     middle = (surface.V.min(axis=0) + surface.V.max(axis=0)) / 2
     points = in_single_precision(surface.V - middle, "glTF")
@@ -92,13 +127,13 @@ def _add(file: _File, surface: Textured) -> None:
         "NORMAL": file.array(surface.normals().astype("<f4"), "VEC3", _VERTICES),
     }
     if surface.uv is not None:
-        downwards = surface.uv * [1, -1] + [0, 1]
+        downwards = columns(surface.uv) * [1, -1] + [0, 1]
         st = in_single_precision(downwards, "glTF")
         attributes["TEXCOORD_0"] = file.array(st, "VEC2", _VERTICES)
     primitive = {
         "attributes": attributes,
-        "indices": file.array(surface.F.ravel().astype("<u4"), "SCALAR", _INDICES),
-        "material": _material(file, surface.texture if surface.uv is not None else None),
+        "indices": file.array(surface.triangles.ravel().astype("<u4"), "SCALAR", _INDICES),
+        "material": _material(file, texture if surface.uv is not None else None),
     }
     mesh = file.add("meshes", {"name": _name(surface.name), "primitives": [primitive]})
     node: dict[str, Any] = {"name": _name(surface.name), "mesh": mesh}
@@ -109,33 +144,21 @@ def _moved(middle: Sequence[float]) -> dict[str, Any]:
     return {"translation": list(middle)} if any(middle) else {}
 
 
-def _material(file: _File, texture: bytes | None) -> int:
+def _material(file: _File, texture: Texture | None) -> int:
     """Add a material, with a texture if one is given, and return its index."""
     surface: dict[str, Any] = {"metallicFactor": 0, "roughnessFactor": 1}
     if texture is not None:
-        known = [
-            k
-            for k, image in enumerate(file.parts.get("images", []))
-            if _bytes_of(file, image["bufferView"]) == texture
-        ]
-        if not known:
-            image = {"bufferView": file.view(texture), "mimeType": "image/png"}
-            known = [file.add("images", image)]
+        if "images" not in file.parts:  # all surfaces share it
+            file.add("images", {"bufferView": file.view(texture.png), "mimeType": "image/png"})
         sampler = {
             "magFilter": _LINEAR,
             "minFilter": _MIPMAPS,
             "wrapS": _REPEAT,
             "wrapT": _REPEAT,
         }
-        source = {"sampler": file.add("samplers", sampler), "source": known[0]}
+        source = {"sampler": file.add("samplers", sampler), "source": 0}
         surface["baseColorTexture"] = {"index": file.add("textures", source)}
     return file.add("materials", {"pbrMetallicRoughness": surface, "doubleSided": True})
-
-
-def _bytes_of(file: _File, view: int) -> bytes:
-    """Return the bytes of a view."""
-    place = file.parts["bufferViews"][view]
-    return file.content[place["byteOffset"] : place["byteOffset"] + place["byteLength"]]
 
 
 def _name(name: str) -> str:

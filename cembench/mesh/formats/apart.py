@@ -15,6 +15,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -43,15 +44,9 @@ def apart(reader: Reader, extra: Extra, module: str) -> Reader:
         require(extra, f"reading {path.suffix} files", module)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            words = [reader.__module__, reader.__name__, str(path.absolute()), name]
-            nowhere = subprocess.DEVNULL
-            ended = subprocess.run(
-                [sys.executable, "-m", __name__, *words],
-                stdin=nowhere,
-                stdout=nowhere,
-                stderr=nowhere,
-                check=False,
-            )
+            call = [reader.__module__, reader.__name__, str(path.absolute()), name]
+            nowhere: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
+            ended = subprocess.run([sys.executable, "-m", __name__, *call], check=False, **nowhere)
             if (folder / _ERROR).exists():
                 raise MeshError((folder / _ERROR).read_text())
             if ended.returncode == 0:
@@ -71,12 +66,12 @@ def apart(reader: Reader, extra: Extra, module: str) -> Reader:
 
 def _soup(file: Path) -> Soup:
     try:
-        found = read_arrays(file, ("V", "corners", "sizes", "notices"))
+        arrays = read_arrays(file, ("V", "corners", "sizes", "notices"))
     except RecordError as error:
         raise MeshError(str(error)) from error
-    told = json.loads(str(found["notices"]))
-    notices = tuple(Notice(NoticeKind(kind), text) for kind, text in told)
-    return Soup(found["V"], found["corners"], found["sizes"], notices=notices)
+    pairs = json.loads(str(arrays["notices"]))
+    notices = tuple(Notice(NoticeKind(kind), text) for kind, text in pairs)
+    return Soup(arrays["V"], arrays["corners"], arrays["sizes"], notices=notices)
 
 
 def _main(module: str, reader: str, path: str, folder: str) -> int:
@@ -85,8 +80,8 @@ def _main(module: str, reader: str, path: str, folder: str) -> int:
     _bound_memory()
     try:
         soup = read(Path(path))
-        told = np.array(json.dumps([(notice.kind, notice.text) for notice in soup.notices]))
-        fields = {"V": soup.V, "corners": soup.corners, "sizes": soup.sizes, "notices": told}
+        notices = np.array(json.dumps([(notice.kind, notice.text) for notice in soup.notices]))
+        fields = {"V": soup.V, "corners": soup.corners, "sizes": soup.sizes, "notices": notices}
         write(Path(folder) / _SOUP, lambda file: np.savez(file, allow_pickle=False, **fields))
     except MeshError as error:
         write_text(Path(folder) / _ERROR, str(error))

@@ -7,7 +7,7 @@ import pytest
 from scipy.io import savemat
 
 from cembench import MeshError
-from cembench.mesh.uv_reader import OtherSurfaceError, read_flat, read_uv, uv_of_corners
+from cembench.mesh.uvs import OtherSurfaceError, read_flat, read_uv, uv_of_corners
 
 V = np.array([[0, 0, 0.5], [2, 0, 0], [2, 1, 0], [0, 1, 0.25]])
 F = np.array([[0, 1, 2], [0, 2, 3]])
@@ -96,8 +96,8 @@ def test_a_flattened_surface_has_its_uvs_in_its_vertices(tmp_path):
         ("a.obj", obj()[:-8] + "\n", "line 10"),
         ("a.obj", obj().replace("vt 0.1", "vt x"), "line 6"),
         ("a.off", TEXTS["a.off"].replace("ST", ""), "STOFF"),
-        ("a.off", TEXTS["a.off"].replace("4 2 0", "4 3 0"), "6 lines follow"),
-        ("a.off", TEXTS["a.off"][:-6], "a face needs 3 corners"),
+        ("a.off", TEXTS["a.off"].replace("4 2 0", "4 3 0"), "3 faces are declared, but 2 were"),
+        ("a.off", TEXTS["a.off"][:-6], "3 numbers are needed, but 0 were"),
         ("a.ply", TEXTS["vertices.ply"].replace("double s", "double q"), "no UVs"),
         ("a.ply", TEXTS["vertices.ply"][:-6], "declares"),
         ("a.txt", "1 2\n3\n", "two numbers per line"),

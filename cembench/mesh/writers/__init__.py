@@ -1,1 +1,0 @@
-"""Writers, one mesh format per file: from a surface with texture coordinates to bytes."""

@@ -1,0 +1,240 @@
+"""Load a surface from a file, a registered name, arrays, or a mesh of any library."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeAlias, TypeGuard, TypeVar, cast
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cembench.core.errors import MeshError
+from cembench.core.names import did_you_mean
+from cembench.mesh.cut import Cut, cut_open
+from cembench.mesh.datasets import is_fetched, surface_file
+from cembench.mesh.defects import as_arrays, located
+from cembench.mesh.files import checked, mesh_names, read_soup, repaired_soup
+from cembench.mesh.formats.vtk import soup_of_cells
+from cembench.mesh.repair import Repaired
+from cembench.mesh.soup import Soup, damaged
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from cembench.registry import Algorithm, Registry, load_registry
+
+M = TypeVar("M", bound=TriangleMesh)
+
+#: A checked mesh; the path of a mesh file; the name of a generated surface, or of a public one that
+#: was fetched; arrays (V, F); an object with `vertices` and `faces` (trimesh), with `points` and
+#: `faces` (PyVista), or with `points` and `cells` (meshio).
+SurfaceInput: TypeAlias = TriangleMesh | str | os.PathLike[str] | tuple[ArrayLike, ArrayLike] | Any
+
+#: The kinds of surface that algorithms take, the most special first.
+KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh)
+
+
+@dataclass(frozen=True)
+class SurfaceFile:
+    """A surface read from a file, with its repair and its cut."""
+
+    path: Path
+    #: The surface to map: that of the file, repaired and cut open if requested.
+    mesh: TriangleMesh
+    repaired: Repaired | None = None
+    #: The surface before it was cut, and the cut.
+    uncut: TriangleMesh | None = None
+    cut: Cut | None = None
+
+
+def load_surface(
+    surface: SurfaceInput,
+    kinds: Sequence[type[M]] = KINDS,  # type: ignore[assignment]
+    *,
+    faces: int | None = None,
+    holes: bool = True,
+    repair: bool = False,
+    cut: bool = False,
+    registry: Registry | None = None,
+) -> M:
+    """Load a surface from a file, a name, arrays, or a mesh of another library, and check it.
+
+    Parameters
+    ----------
+    surface : path, name, pair of arrays (V, F), or mesh
+        A mesh file, if there is one of this name; the name of a generated surface, or of a public
+        one that was fetched; arrays V (n, 3) and F (m, 3) that counts from 0; a mesh of cembench,
+        trimesh, PyVista or meshio, or any object with `vertices` and `faces`.
+    kinds : sequence of mesh classes
+        Allowed classes; the surface is of the most special one that fits.
+    faces : int, optional
+        Number of triangles of a generated surface; other surfaces keep theirs.
+    holes : bool
+        Whether surfaces with several boundary loops are allowed.
+    repair : bool
+        Whether to repair the surface first, and to keep its largest component.
+    cut : bool
+        Whether to cut the surface open to a disk.
+    registry : Registry, optional
+        Registry of names (default: everything installed).
+
+    Returns
+    -------
+    DiskMesh, HoledMesh or TriangleMesh
+        The surface.
+
+    Raises
+    ------
+    MeshError
+        There is no such surface, it is damaged, or it is of none of these kinds.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.load_surface("flat-disk", faces=600).m
+    600
+    >>> V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> type(cembench.load_surface((V, [[0, 1, 2], [0, 2, 3]]))).__name__
+    'DiskMesh'
+
+    """
+    allowed = tuple(kind for kind in kinds if holes or not issubclass(kind, HoledMesh))
+    path, name = None, ""
+    if isinstance(surface, str | os.PathLike):
+        registry = registry or load_registry()
+        name = os.fspath(surface)
+        path = None if is_generated(name, registry) else _file_named(name, registry)
+        surface = read_soup(path) if path else generate_surface(registry, name, faces)
+    if isinstance(surface, allowed) and not repair and not cut:
+        return surface
+    soup = surface if isinstance(surface, Soup) else soup_of(surface)
+    try:
+        return cast(M, prepared(soup, allowed, path, repair=repair, cut=cut).mesh)
+    except MeshError as error:
+        if path or not name:
+            raise
+        raise MeshError(f"{name}: {error}") from None
+
+
+def load_file(
+    path: Path, kinds: Sequence[type[TriangleMesh]], *, repair: bool = False, cut: bool = False
+) -> SurfaceFile:
+    """Read a file as :func:`load_surface` does, and return what was done, too."""
+    return prepared(read_soup(path), kinds, path, repair=repair, cut=cut)
+
+
+def prepared(
+    soup: Soup,
+    kinds: Sequence[type[TriangleMesh]],
+    path: Path | None = None,
+    *,
+    repair: bool = False,
+    cut: bool = False,
+) -> SurfaceFile:
+    """Repair and cut polygons if requested, and check them as the most special kind that fits.
+
+    Raises
+    ------
+    MeshError
+        The surface is of none of these kinds; the message says why it is not of the first.
+
+    """
+    repaired = None
+    file = path or Path(soup.name)
+    if repair:
+        soup, repaired = repaired_soup(soup, path)
+    if cut:
+        uncut = checked(soup, TriangleMesh, path)
+        try:
+            opened = cut_open(uncut)
+        except MeshError as error:
+            raise located(error, path) from None
+        return SurfaceFile(file, opened.mesh, repaired, uncut, opened)
+    refused: dict[type[TriangleMesh], MeshError] = {}
+    for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
+        try:
+            return SurfaceFile(file, checked(soup, kind, path), repaired)
+        except MeshError as error:
+            refused[kind] = error
+    raise refused[kinds[0]]
+
+
+def soup_of(surface: Any) -> Soup:
+    """Return the polygons of a mesh, of a pair of arrays, or of another library's mesh, unchecked.
+
+    Raises
+    ------
+    MeshError
+        It is none of these, or its arrays are not those of triangles.
+
+    """
+    if isinstance(surface, TriangleMesh):
+        return Soup.of_triangles(surface.V, surface.F, name=surface.name)
+    points = getattr(surface, "vertices", getattr(surface, "points", None))
+    if hasattr(surface, "faces") and points is not None:
+        faces = np.asarray(surface.faces)
+        if faces.ndim == 1 and faces.size:
+            return Soup.from_arrays(points, *_unpadded(faces))
+        return Soup.of_triangles(*as_arrays(points, faces))
+    if points is not None and isinstance(getattr(surface, "cells", None), list):
+        return soup_of_cells(points, surface.cells)
+    if isinstance(surface, tuple | list) and len(surface) == 2:
+        return Soup.of_triangles(*as_arrays(*surface))
+    size = f" of {len(surface)} items" if isinstance(surface, tuple | list) else ""
+    raise MeshError(
+        "a surface is a mesh, a path, the name of a registered surface, a pair of arrays (V, F), "
+        f"or an object with vertices and faces; got {type(surface).__name__}{size}."
+    )
+
+
+def _unpadded(faces: Any) -> tuple[Any, Any]:
+    """Return corners and sizes of polygons from PyVista's one array: size, corners, size, ..."""
+    starts, at = [], 0
+    while at < len(faces):
+        starts.append(at)
+        if faces[at] < 3 or at + faces[at] >= len(faces):
+            raise damaged(f"faces[{at}] is {faces[at]}, which is not the size of a polygon")
+        at += 1 + int(faces[at])
+    return np.delete(faces, starts), faces[starts]
+
+
+def kinds_of(algorithms: Iterable[Algorithm]) -> list[type[TriangleMesh]]:
+    """Return the kinds of surface that algorithms take, in the order of the algorithms."""
+    return list(dict.fromkeys(a.mesh_type for a in algorithms))
+
+
+def is_generated(surface: Any, registry: Registry) -> TypeGuard[str]:
+    """Whether this is the name of a generated surface, and not of a file."""
+    return isinstance(surface, str) and surface in registry.surfaces and not Path(surface).is_file()
+
+
+def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:
+    """Generate a registered surface with about `faces` triangles, or at its own size."""
+    family = registry.surface(name)
+    given = {} if faces is None else {"faces": faces}
+    mesh: TriangleMesh = family.function(**family.arguments(given))
+    return mesh
+
+
+def _file_named(name: str, registry: Registry) -> Path:
+    """Return the file that a name refers to: a path, or a public surface that was fetched.
+
+    Raises
+    ------
+    MeshError
+        It is neither, or the public surface is not here yet.
+
+    """
+    path = Path(name)
+    if path.suffix or path.exists():
+        return path
+    dataset = registry.datasets.get(name)
+    if dataset is None:
+        raise MeshError(
+            f"{name!r} is neither a file nor a registered surface; known surfaces: "
+            f"{', '.join(sorted(registry.surfaces)) or 'none'}."
+            + did_you_mean(name, [*registry.surfaces, *registry.datasets, *mesh_names(Path())])
+        )
+    if not is_fetched(dataset):
+        raise MeshError(f"the public surface {name!r} is not here yet: cembench fetch {name}.")
+    return surface_file(dataset)
