@@ -16,7 +16,8 @@ from pathlib import Path
 
 from cembench.registry import load_registry
 from cembench.results.store import Store
-from cembench.running.local import Options, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, generate_surface, plan_cells, read_mesh_for
 
 #: Phases that take less than this share of the total in every line go under "rest".

@@ -19,7 +19,8 @@ from cembench.results.looks import USUAL_PRECISION
 from cembench.results.record_rows import REFERENCE
 from cembench.results.records import Record
 from cembench.results.store import Store
-from cembench.running.local import DEFAULT_TIMEOUT, USUAL_BUDGET, Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import DEFAULT_TIMEOUT, USUAL_BUDGET, Options
 from cembench.running.pairing import Pairing
 from cembench.running.plan import (
     MeasurementSettings,
@@ -29,6 +30,7 @@ from cembench.running.plan import (
     paper_roles,
     plan_cells,
 )
+from cembench.running.watcher import Watcher
 from cembench.workflows.notebook import html_table
 from cembench.workflows.surface_input import SurfaceInput, checked_surface
 

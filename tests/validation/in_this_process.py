@@ -18,8 +18,8 @@ def solver_here(name, plugin=None):
     return Solver(load_registry(plugins).algorithm(name), plugins, call=call_here)
 
 
-class LauncherHere:
-    """What a run starts instead of processes; its seconds are invented.
+class TimerHere:
+    """Checks and times cells in this process; its seconds are invented.
 
     A verdict on speed or growth must not come from the clock of a busy machine: a call takes
     faces^exponent microseconds, half of that for the factorisation.

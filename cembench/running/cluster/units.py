@@ -20,7 +20,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import COMMAND
 from cembench.results.comparison import circumstances
 from cembench.results.records import Cell, MeshFacts
-from cembench.running.local import Options
+from cembench.running.options import Options
 from cembench.running.plan import Task
 
 #: Files of plug-ins: by the plug-in as it was named, their content by relative path.

@@ -13,7 +13,8 @@ from cembench.core.errors import AlgorithmFailed, MeshError, ParameterError
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Registry
-from cembench.running.local import Options, map_once
+from cembench.running.local import map_once
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, generate_surface, paper_roles, plan_cells
 from cembench.workflows.morphing import writers
 from cembench.workflows.morphing.drawing import Film, draw_film
