@@ -7,7 +7,6 @@ and no other is suspected of having ended it.
 
 from __future__ import annotations
 
-import json
 import uuid
 import warnings
 from collections import deque
@@ -25,12 +24,12 @@ from pydantic import ValidationError
 from cembench.core.errors import ClusterError
 from cembench.results import run_folder
 from cembench.results.looks import next_look
-from cembench.results.machines import differences, software_of
+from cembench.results.machines import differences
 from cembench.results.records import Fault, FaultKind, Record, not_ok
 from cembench.results.store import Store
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from cembench.running.cluster.units import Parcel, grouped, makespan, parcel
-from cembench.running.cluster.worker import Answer, forget, measure_unit
+from cembench.running.cluster.worker import Answer, describe_worker, forget, measure_unit
 from cembench.running.estimate import estimate
 from cembench.running.options import Options
 from cembench.running.plan import Task
@@ -88,9 +87,8 @@ class _Assignment:
     parcel: Parcel
     future: Future | None = None
     sends_surface: bool = False
-    #: Addresses of the workers that took it, the machine of the last one, and what it does.
+    #: Addresses of the workers that took it, and what the last one does.
     workers: list[str] = field(default_factory=list)
-    machine: str = ""
     activity: str = ""
     #: When it was taken.
     since: float = field(default_factory=monotonic)
@@ -121,15 +119,16 @@ class _ClusterRun:
     #: The connected workers, and those whose software is not allowed, by their addresses.
     workers: list[str] = field(default_factory=list)
     refused: set[str] = field(default_factory=set)
-    #: By the addresses of workers.
+    #: By the addresses of workers, also of those that are lost.
     machines: dict[str, MachineState] = field(default_factory=dict)
-    #: By the names of machines.
     environments: dict[str, dict[str, Any]] = field(default_factory=dict)
     #: When the workers were looked at, when there was one, and when the progress was saved.
     looked: float = 0.0
     alone_since: float = field(default_factory=monotonic)
     saved: float = 0.0
     reported_alone: bool = False
+    #: The software of the last machine that is refused.
+    differing: str = ""
     #: Expected and actual seconds of the units that are done.
     expected: float = 0.0
     taken: float = 0.0
@@ -172,7 +171,6 @@ class _ClusterRun:
         known: dict[str, list[Record]] = {}
         for record in self.recorder.store.finished():
             known.setdefault(record.cell.algorithm, []).append(record)
-        software = software_of(self.recorder.environment) if self.same_environment else {}
         groups = grouped(pending)
         costs = [
             sum(
@@ -187,7 +185,7 @@ class _ClusterRun:
         parcels = []
         for group, seconds in zip(groups, costs, strict=True):
             own = replace(options, budget=None if share is None else share * seconds)
-            parcels.append(parcel(group, token, own, self.faces, software, seconds))
+            parcels.append(parcel(group, token, own, self.faces, seconds))
         return sorted(parcels, key=lambda one: -one.seconds)
 
     def _usable(self) -> list[str]:
@@ -236,12 +234,12 @@ class _ClusterRun:
             self._look()
 
     def _look(self) -> None:
-        """Update the connected workers.
+        """Update the connected workers, and describe the new ones.
 
         Raises
         ------
         ClusterError
-            The scheduler cannot be reached, or no worker of this machine's own is left.
+            The scheduler cannot be reached, or no worker is left that can measure.
 
         """
         self.looked = monotonic()
@@ -249,13 +247,25 @@ class _ClusterRun:
             raise self._scheduler_gone()
         try:
             connected = sorted(self.client.nthreads())
+            new = [worker for worker in connected if worker not in self.environments]
+            described = (
+                self.client.run(describe_worker, workers=new, on_error="ignore") if new else {}
+            )
         except (OSError, TimeoutError) as error:
             raise self._scheduler_gone() from error
+        for worker, environment in described.items():
+            self._add_worker(worker, environment)
+        connected = [worker for worker in connected if worker in self.environments]
         if connected != self.workers:
-            for worker in self.machines.keys() & (set(self.workers) - set(connected)):
+            for worker in set(self.workers) - set(connected):
                 self.machines[worker].lost = True
             self.workers = connected
             self.watcher.machines([self._machine_of(worker) for worker in connected])
+        if connected and not self._usable():
+            raise ClusterError(
+                f"no worker has the software of this machine ({self.differing}). Install the same "
+                "on the workers, or leave out --same-environment."
+            )
         if connected:
             self.alone_since = self.looked
         alone = self.looked - self.alone_since
@@ -270,8 +280,25 @@ class _ClusterRun:
             self.watcher.shows("no worker is connected yet; waiting for one")
         self._save_state()
 
+    def _add_worker(self, worker: str, environment: dict[str, Any]) -> None:
+        """Note a new worker; show once a machine if its software differs from the client's."""
+        machine = environment["machine"]
+        others = differences(self.recorder.environment, environment)
+        is_new = all(state.machine != machine for state in self.machines.values())
+        self.machines[worker] = MachineState(machine=machine)
+        self.environments[worker] = environment
+        if not others:
+            return
+        text = "; ".join(others)
+        if self.same_environment:
+            self.refused.add(worker)
+            self.differing = f"{machine}: {text}"
+            self.watcher.shows(f"{machine} measures nothing: its software differs: {text}")
+        elif is_new:
+            self.watcher.shows(f"{machine} has other software: {text}")
+
     def _machine_of(self, worker: str) -> str:
-        return self.machines[worker].machine if worker in self.machines else worker
+        return self.machines[worker].machine
 
     def _saved_cells(self) -> str:
         return f"{len(self.recorder.records)} finished cells are in {self.recorder.store.folder}"
@@ -287,9 +314,7 @@ class _ClusterRun:
         """Show the progress of a unit."""
         task = assignment.parcel.by_label.get(event.get("cell", ""))
         if event["what"] == "takes":
-            self._handle_taken(assignment, event["worker"], event["machine"])
-        elif event["what"] == "began":
-            self._compare_software(event["machine"], json.loads(event["environment"]))
+            self._handle_taken(assignment, event["worker"])
         elif event["what"] == "queues":
             assignment.activity = "waits for another worker of its machine"
         elif task is not None and event["what"] == "adds_rounds":
@@ -306,25 +331,17 @@ class _ClusterRun:
             activity = f"{mesh}: {assignment.activity}" if assignment.activity else mesh
             self.machines[event["worker"]].at = activity
 
-    def _compare_software(self, machine: str, environment: dict[str, Any]) -> None:
-        """Show once if the software of a machine differs from that of the client."""
-        other = differences(self.recorder.environment, environment)
-        if other and machine not in self.environments:
-            self.watcher.shows(f"{machine} has other software: {'; '.join(other)}")
-        self.environments[machine] = environment
-
-    def _handle_taken(self, assignment: _Assignment, worker: str, machine: str) -> None:
+    def _handle_taken(self, assignment: _Assignment, worker: str) -> None:
         """Note which worker measures a unit; give up a unit that has ended too many workers."""
+        unit = assignment.parcel.unit
+        if assignment.workers:
+            self.watcher.shows(
+                f"{unit.mesh} ({unit.cells[0].solves}) is measured again on "
+                f"{self._machine_of(worker)}: the worker on "
+                f"{self._machine_of(assignment.workers[-1])} was lost{assignment.during}"
+            )
         assignment.workers.append(worker)
         assignment.since = monotonic()
-        self.machines.setdefault(worker, MachineState(machine=machine))
-        unit = assignment.parcel.unit
-        if len(assignment.workers) > 1:
-            self.watcher.shows(
-                f"{unit.mesh} ({unit.cells[0].solves}) is measured again on {machine}: the worker "
-                f"on {assignment.machine} was lost{assignment.during}"
-            )
-        assignment.machine = machine
         if len(assignment.workers) > MOST_LOST and assignment.future is not None:
             future, assignment.future = assignment.future, None
             with suppress(Exception):
@@ -341,62 +358,47 @@ class _ClusterRun:
         elif isinstance(error := future.exception(), KilledWorker):
             self._give_up(assignment)
         else:
-            where = f" on {assignment.machine}" if assignment.machine else ""
-            mesh = assignment.parcel.unit.mesh
+            mesh, workers = assignment.parcel.unit.mesh, assignment.workers
+            where = f" on {self._machine_of(workers[-1])}" if workers else ""
             raise ClusterError(f"{mesh} cannot be measured{where}: {error}") from error
 
     def _handle_answer(self, assignment: _Assignment, answer: Answer) -> None:
-        """Save the records of a unit; send it again with its surface, or to another machine."""
-        state = self.machines.setdefault(answer.address, MachineState(machine=answer.machine))
-        state.machine, state.at = answer.machine, ""
+        """Save the records of a unit, or send it again with its surface."""
         if answer.lacks_surface:
             assignment.sends_surface = True
-            self._submit(assignment, answer.address)
+            self._submit(assignment, answer.worker)
             return
-        if answer.refused:
-            self._refuse(assignment, answer)
-            return
+        state = self.machines[answer.worker]
+        state.at = ""
         tasks = {task.cell.key: task for task in assignment.parcel.tasks}
         for content, uv in answer.records:
             try:
                 record = Record.model_validate_json(content)
             except ValidationError as error:
-                why = f"{answer.machine} sent a record that cannot be read"
+                why = f"{state.machine} sent a record that cannot be read"
                 raise ClusterError(f"{why}: {error.errors()[0]['msg']}.") from error
             task = tasks.pop(record.cell.key, None)
-            environment = (answer.environments or {}).get(record.environment)
+            environment = answer.environments.get(record.environment)
             if task is not None and environment is not None:
                 self.recorder.save(task, record, uv, environment)
         if tasks:
-            raise ClusterError(f"{answer.machine} sent no record of {len(tasks)} cells; run again.")
+            raise ClusterError(f"{state.machine} sent no record of {len(tasks)} cells; run again.")
         state.units += 1
         self._count(assignment)
         key = assignment.parcel.unit.key
         with suppress(Exception):  # it is deleted after some days anyway
-            self.client.run(forget, key, workers=[answer.address], wait=False)
-
-    def _refuse(self, assignment: _Assignment, answer: Answer) -> None:
-        """Leave out a machine with other software, and measure its unit elsewhere."""
-        self.refused.add(answer.address)
-        self.watcher.shows(
-            f"{answer.machine} measures nothing: its software differs: {answer.refused}"
-        )
-        assignment.workers.clear()
-        self._submit_again(assignment)
-        if not self._usable():
-            raise ClusterError(
-                f"no worker has the software of this machine ({answer.machine}: {answer.refused}). "
-                "Install the same on the workers, or leave out --same-environment."
-            )
+            self.client.run(forget, key, workers=[answer.worker], wait=False)
 
     def _give_up(self, assignment: _Assignment) -> None:
         """Record the cells of a unit that ended its workers as failed."""
+        last = assignment.workers[-1] if assignment.workers else None
+        machine = self._machine_of(last) if last else "a machine of the cluster"
+        environment = self.environments[last] if last else self.recorder.environment
         detail = (
             f"its surface ended {MOST_LOST} workers that measured it, the last on "
-            f"{assignment.machine or 'a machine of the cluster'}{assignment.during}"
+            f"{machine}{assignment.during}"
         )
         outcome = not_ok("failed", Fault(kind=FaultKind.WORKERS_LOST, detail=detail))
-        environment = self.environments.get(assignment.machine, self.recorder.environment)
         for task in assignment.parcel.tasks:
             record = record_of(task, outcome, environment["id"], now())
             self.recorder.save(task, record, None, environment)

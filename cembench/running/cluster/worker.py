@@ -8,14 +8,13 @@ waits for the unit, and stops the process that runs if it does not.
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -31,7 +30,7 @@ from cembench.core.errors import CembenchError, ClusterError
 from cembench.core.loading import is_there, read_bytes
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, load_algorithm, load_registry
-from cembench.results.machines import differences
+from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster import host
 from cembench.running.cluster.units import PluginFiles, Unit
@@ -54,17 +53,16 @@ Send = Callable[[Mapping[str, Any]], None]
 
 @dataclass(frozen=True)
 class Answer:
-    """The records of a unit, or the reason why this machine does not measure it."""
+    """The records of a unit, or that the worker needs its surface."""
 
-    machine: str
-    address: str
+    #: The address of the worker.
+    worker: str
     #: The files of the records, each with its map.
-    records: tuple[tuple[bytes, NDArray[np.complex128] | None], ...] = ()
-    environments: Mapping[str, dict[str, Any]] | None = None
+    records: Sequence[tuple[bytes, NDArray[np.complex128] | None]] = ()
+    #: By their ids.
+    environments: Mapping[str, dict[str, Any]] = field(default_factory=dict)
     #: The worker cannot generate the surface; send the unit again, with it.
     lacks_surface: bool = False
-    #: The differences in software, if they are not allowed.
-    refused: str = ""
 
 
 def dask_setup(worker: Any) -> None:
@@ -91,28 +89,30 @@ def measure_unit(
         return state is not None and state.state in ("executing", "long-running")
 
     unit = Unit.model_validate_json(text)
-    origin = {"unit": unit.key, "machine": machine_name(), "worker": worker.address}
+    origin = {"unit": unit.key, "worker": worker.address}
     forwarder = Forwarder(lambda event: worker.log_event(topic, {**origin, **event}))
     _unset_dask_variables()
     with _cancelling(forwarder.cancelled, is_wanted), host.machine_lock(forwarder.waits):
         host.clear_old()
-        answer = Answer(machine_name(), worker.address)
         try:
             if not _has_surface(unit, surface):
-                return replace(answer, lacks_surface=True)
+                return Answer(worker.address, lacks_surface=True)
             forwarder.send({"what": "takes"})
             placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
             store = Store(host.unit_folder(unit.key) / RUN)
-            refused = measure(placed, store, forwarder)
+            measure(placed, store, forwarder)
         except CembenchError:
             raise
         except Exception:  # perhaps of a class that the client cannot unpickle
             raise ClusterError(traceback.format_exc()) from None
-        if refused:
-            return replace(answer, refused=refused)
         files = [(cell, store.record_file(cell)) for cell in unit.cells]
         records = [(read_bytes(file), store.uv(cell)) for cell, file in files if is_there(file)]
-        return replace(answer, records=tuple(records), environments=store.environments())
+        return Answer(worker.address, records, store.environments())
+
+
+def describe_worker() -> dict[str, Any]:
+    """Return the environment of this worker, with the libraries loaded that measure."""
+    return describe_environment()
 
 
 async def forget(key: str) -> None:
@@ -170,10 +170,8 @@ def _cancelling(cancelled: threading.Event, is_wanted: Callable[[], bool]) -> It
         thread.join()
 
 
-def measure(unit: Unit, store: Store, forwarder: Forwarder) -> str:
-    """Measure a unit, or resume it if the store has a part of it.
-
-    Returns the differences in software if they are not allowed, and nothing is measured.
+def measure(unit: Unit, store: Store, forwarder: Forwarder) -> list[Record]:
+    """Measure a unit, or resume it if the store has a part of it; return its records.
 
     Raises
     ------
@@ -181,18 +179,12 @@ def measure(unit: Unit, store: Store, forwarder: Forwarder) -> str:
         The machine has other code than the client, or not the surface; or the unit was cancelled.
 
     """
-    environment = describe_environment()
-    other = differences(unit.software, environment) if unit.software else []
-    if other:
-        return "; ".join(other)
-    tasks = tasks_of(unit, surface_of(unit))
-    forwarder.send({"what": "began", "environment": json.dumps(environment)})
 
     def timer(scratch: Path, options: Options) -> CellTimer:
         return CellTimer(scratch, options, stopped=forwarder.cancelled)
 
-    run_tasks(tasks, store, _options(unit), forwarder, timer, environment=environment)
-    return ""
+    tasks = tasks_of(unit, surface_of(unit))
+    return run_tasks(tasks, store, _options(unit), forwarder, timer)
 
 
 def surface_of(unit: Unit) -> TriangleMesh:
