@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.results.comparison import circumstances
-from cembench.results.looks import is_look
+from cembench.results.looks import is_look, next_look
 from cembench.results.records import Ended, Outcome, Record, Round
 from cembench.results.store import Store
 from cembench.running.comparable import is_cold
@@ -217,11 +217,12 @@ class _Run:
     def _end_cells(self, cells: Sequence[CellState], number: int) -> None:
         """End the cells that are precise, or for which no time is left, before this round."""
         if is_look(number, self.options.most_rounds):
-            decision = look(cells, number, self.options, self._seconds_left())
-            for state, ended in decision.ended:
-                self._save_measured(state, ended)
-            for state in decision.continued:
-                self.watcher.adds_rounds(state.task, decision.rounds)
+            ended, continued = look(cells, number, self.options, self._seconds_left())
+            for state, reason in ended:
+                self._save_measured(state, reason)
+            more = next_look(number, self.options.most_rounds) - number
+            for state in continued:
+                self.watcher.adds_rounds(state.task, more)
         elif number:
             for state in over_budget(cells, number, self.options, self._seconds_left()):
                 self._save_measured(state, "budget")

@@ -134,20 +134,13 @@ def partners_of(cells: Sequence[Cell], reference: str) -> dict[str, str]:
     }
 
 
-@dataclass(frozen=True)
-class Look:
-    """The decision at a look: the cells that end, each with the reason, and those that go on."""
+def look(
+    cells: Sequence[CellState], number: int, options: Options, seconds_left: float
+) -> tuple[list[tuple[CellState, Ended]], list[CellState]]:
+    """Return the cells that end after this many rounds, each with the reason, and those that go on.
 
-    ended: Sequence[tuple[CellState, Ended]]
-    continued: Sequence[CellState]
-    #: Number of rounds until the next look.
-    rounds: int
-
-
-def look(cells: Sequence[CellState], number: int, options: Options, seconds_left: float) -> Look:
-    """Decide which cells are precise, or cannot go on, after this many rounds; references end last.
-
-    A cell that has more rounds, from before a kill, went on when this was asked before.
+    A cell ends if it is precise, or cannot go on; references end last. A cell that has more rounds,
+    from before a kill, went on when this was asked before.
     """
     last = number >= options.most_rounds
     states = _until_precise(cells, None if last else number)
@@ -160,15 +153,13 @@ def look(cells: Sequence[CellState], number: int, options: Options, seconds_left
         lacks[label] = lack(state.task.cell, rounds[label], reference)
     more = next_look(number, options.most_rounds) - number
     costs = {label: more * state.price for label, state in states.items()}
-    chosen = set() if last else affordable(lacks, costs, partners, seconds_left)
+    chosen: set[str] = set() if last else affordable(lacks, costs, partners, seconds_left)
     short: Ended = "rounds" if last else "budget"
+    precise: Ended = "precise"
     ending = [label for label in states if label not in chosen]
     ending.sort(key=lambda label: label in partners.values())
-    return Look(
-        [(states[label], "precise" if lacks[label] <= 1 else short) for label in ending],
-        [state for label, state in states.items() if label in chosen],
-        more,
-    )
+    ended = [(states[label], precise if lacks[label] <= 1 else short) for label in ending]
+    return ended, [states[label] for label in states if label in chosen]
 
 
 def over_budget(

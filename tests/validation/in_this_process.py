@@ -3,7 +3,10 @@
 from typing import ClassVar
 
 from cembench.registry import load_registry
-from cembench.running.measure import check_cell, time_cell
+from cembench.results.records import Fault, Outcome, not_ok
+from cembench.running.judge import Promise
+from cembench.running.judging import judged_calls
+from cembench.running.measure import Timed, check_cell, timed_together
 from cembench.validation.solver import Solver
 
 
@@ -11,6 +14,20 @@ def call_here(task):
     mesh = task.mesh
     own = type(mesh).trusted(mesh.V.copy(), mesh.F.copy(), mesh.name, mesh.notices)
     return check_cell(task.algorithm, own, task.cell)
+
+
+def time_cell(algorithm, mesh, cell, checked):
+    """Time calls on the original surface, and judge their maps here."""
+    timed = timed_together(mesh, [Timed(algorithm, cell)])
+    if isinstance(timed, Outcome):
+        return timed
+    ((measured, calls),) = timed[0]
+    maps = zip(calls.names(), calls.calls, strict=True)
+    named = [(name, c.motion, c.uv) for name, c in maps if not isinstance(c.uv, Fault)]
+    judged = judged_calls(Promise.of(algorithm), mesh, checked, named, {})
+    if judged.faults:
+        return not_ok("invalid", *judged.faults)
+    return measured.model_copy(update={"repeated": judged.repeated})
 
 
 def solver_here(name, plugin=None):

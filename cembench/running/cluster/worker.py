@@ -95,12 +95,13 @@ def measure_unit(
     with _cancelling(forwarder.cancelled, is_wanted), host.machine_lock(forwarder.waits):
         host.clear_old()
         try:
-            if not _has_surface(unit, surface):
+            mesh = surface_of(unit, surface)
+            if mesh is None:
                 return Answer(worker.address, lacks_surface=True)
             forwarder.send({"what": "takes"})
             placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
             store = Store(host.unit_folder(unit.key) / RUN)
-            measure(placed, store, forwarder)
+            measure(placed, mesh, store, forwarder)
         except CembenchError:
             raise
         except Exception:  # perhaps of a class that the client cannot unpickle
@@ -170,51 +171,19 @@ def _cancelling(cancelled: threading.Event, is_wanted: Callable[[], bool]) -> It
         thread.join()
 
 
-def measure(unit: Unit, store: Store, forwarder: Forwarder) -> list[Record]:
+def measure(unit: Unit, mesh: TriangleMesh, store: Store, forwarder: Forwarder) -> list[Record]:
     """Measure a unit, or resume it if the store has a part of it; return its records.
 
     Raises
     ------
     ClusterError
-        The machine has other code than the client, or not the surface; or the unit was cancelled.
+        The machine has other code than the client, or the unit was cancelled.
 
     """
-
-    def timer(scratch: Path, options: Options) -> CellTimer:
-        return CellTimer(scratch, options, stopped=forwarder.cancelled)
-
-    tasks = tasks_of(unit, surface_of(unit))
-    return run_tasks(tasks, store, _options(unit), forwarder, timer)
-
-
-def surface_of(unit: Unit) -> TriangleMesh:
-    """Return the surface of a unit, as stored on this machine."""
-    arrays = host.stored_surface(unit.mesh_hash)
-    kind = MESH_TYPES[unit.mesh_type]
-    mesh = arrays and kind.trusted(*arrays, unit.mesh, unit.notices)
-    if mesh is None or mesh.hash != unit.mesh_hash:
-        raise ClusterError(f"the surface {unit.mesh} is not on this machine any more; run again.")
-    mesh.V.setflags(write=False)
-    mesh.F.setflags(write=False)
-    return mesh
-
-
-def tasks_of(unit: Unit, mesh: TriangleMesh) -> list[Task]:
-    """Return a unit's tasks with the algorithms of this machine, whose code must be the client's.
-
-    The files of a plug-in are read once a unit, however many algorithms it declares.
-    """
-    read: dict[tuple[Path | None, str], Mapping[str, str]] = {}
     tasks = []
     for cell in unit.cells:
         algorithm = _algorithm(cell.algorithm, unit.plugins)
-        declared = (algorithm.file, algorithm.module)
-        if algorithm.program is not None:  # it has files of its own
-            sources: Mapping[str, str] = sources_of(algorithm)
-        elif declared in read:
-            sources = read[declared]
-        else:
-            sources = read[declared] = sources_of(algorithm)
+        sources = sources_of(algorithm)
         if hash_of(sources) != cell.code_hash:
             raise ClusterError(
                 f"{cell.algorithm} has other code on {machine_name()} than on the client: "
@@ -222,7 +191,11 @@ def tasks_of(unit: Unit, mesh: TriangleMesh) -> list[Task]:
                 "plug-ins on all machines."
             )
         tasks.append(Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources))
-    return tasks
+
+    def timer(scratch: Path, options: Options) -> CellTimer:
+        return CellTimer(scratch, options, stopped=forwarder.cancelled)
+
+    return run_tasks(tasks, store, _options(unit), forwarder, timer)
 
 
 @cache
@@ -239,21 +212,37 @@ def _options(unit: Unit) -> Options:
     return replace(options, memory_bytes=options.memory_bytes or free, jobs=jobs)
 
 
-def _has_surface(unit: Unit, sent: host.Arrays | None) -> bool:
-    """Store the surface on this machine, sent or generated, unless it is stored already."""
-    if host.stored_surface(unit.mesh_hash) is not None:
-        return True
-    arrays = sent or _generated(unit)
-    if arrays is not None:
-        host.store_surface(unit.mesh_hash, arrays)
-    return arrays is not None
+def surface_of(unit: Unit, sent: host.Arrays | None) -> TriangleMesh | None:
+    """Return the surface of a unit: stored on this machine, sent, or generated; None if it is not.
+
+    Raises
+    ------
+    ClusterError
+        What was sent is not the surface of the unit.
+
+    """
+    mesh = _checked(unit, host.stored_surface(unit.mesh_hash))
+    if mesh is None:
+        mesh = _checked(unit, sent or _generated(unit))
+        if mesh is not None:
+            host.store_surface(unit.mesh_hash, (mesh.V, mesh.F))
+        elif sent is not None:
+            raise ClusterError(f"the surface {unit.mesh} arrived damaged; run again.")
+    return mesh
+
+
+def _checked(unit: Unit, arrays: host.Arrays | None) -> TriangleMesh | None:
+    """Return the mesh of these arrays if it is the surface of the unit, to the last bit."""
+    if arrays is None:
+        return None
+    mesh = MESH_TYPES[unit.mesh_type].trusted(*arrays, unit.mesh, unit.notices)
+    mesh.V.setflags(write=False)
+    mesh.F.setflags(write=False)
+    return mesh if mesh.hash == unit.mesh_hash else None
 
 
 def _generated(unit: Unit) -> host.Arrays | None:
-    """Generate a registered surface; None if that takes longer than sending it.
-
-    None, too, if the result is another surface, or differs in a bit on this machine.
-    """
+    """Generate a registered surface; None if that takes longer than sending it."""
     registry = load_registry()
     family = registry.surfaces.get(unit.mesh)
     if family is None or family.kept is not None:
@@ -262,7 +251,7 @@ def _generated(unit: Unit) -> host.Arrays | None:
         mesh: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
     except CembenchError:  # its data, or a library, are not on this machine
         return None
-    return (mesh.V, mesh.F) if mesh.hash == unit.mesh_hash else None
+    return mesh.V, mesh.F
 
 
 def _placed(plugins: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from cembench.running.plan import MeasurementSettings, plan_cells
 from tests.running.test_local import FAULTY, tasks_of
 
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
-from cembench.running.cluster.worker import Forwarder, measure
+from cembench.running.cluster.worker import Forwarder, measure, surface_of
 
 NO_TOKEN = "0" * 32
 
@@ -194,10 +194,9 @@ def test_what_nobody_came_back_for_is_deleted():
 def test_a_unit_comes_to_the_same_as_on_one_machine(tmp_path):
     tasks = tasks_of("good", "nan")
     unit = parcel(tasks, NO_TOKEN, Options()).unit
-    host.store_surface(unit.mesh_hash, (tasks[0].mesh.V, tasks[0].mesh.F))
     told = []
     store = Store(tmp_path / "there")
-    there = measure(unit, store, Forwarder(told.append))
+    there = measure(unit, tasks[0].mesh, store, Forwarder(told.append))
     assert [store.find(task.cell) for task in tasks] == there
     here = run_tasks(tasks, Store(tmp_path / "here"))
     for a, b in zip(there, here, strict=True):
@@ -213,15 +212,22 @@ def test_other_code_under_the_same_name_is_refused(tmp_path):
         for task in tasks_of("good")
     ]
     unit = parcel(tasks, NO_TOKEN, Options()).unit
-    host.store_surface(unit.mesh_hash, (tasks[0].mesh.V, tasks[0].mesh.F))
     with pytest.raises(ClusterError, match=r"good has other code on .* faulty.py"):
-        measure(unit, Store(tmp_path), Forwarder(lambda event: None))
+        measure(unit, tasks[0].mesh, Store(tmp_path), Forwarder(lambda event: None))
 
 
-def test_a_surface_that_is_gone_is_told(tmp_path):
-    unit = parcel(tasks_of("good"), NO_TOKEN, Options()).unit
-    with pytest.raises(ClusterError, match="not on this machine any more"):
-        measure(unit, Store(tmp_path), Forwarder(lambda event: None))
+def test_a_surface_is_stored_once_it_was_sent_and_another_one_is_refused():
+    (task,) = tasks_of("good")
+    unit = parcel([task], NO_TOKEN, Options()).unit
+    V, F = task.mesh.V, task.mesh.F
+    assert surface_of(unit, None) is None
+    with pytest.raises(ClusterError, match="arrived damaged"):
+        surface_of(unit, (V + 1, F))
+    assert surface_of(unit, (V, F)).hash == task.mesh.hash
+    assert surface_of(unit, None).hash == task.mesh.hash
+    host.store_surface(unit.mesh_hash, (V + 1, F))
+    assert surface_of(unit, None) is None
+    assert surface_of(unit, (V, F)).hash == task.mesh.hash
 
 
 def test_differences_of_software_name_library_and_versions():

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
 from cembench.core.errors import ClusterError, MeshError
 from cembench.results.store import Store
-from cembench.running.cluster import host, worker
+from cembench.running.cluster import worker
 from cembench.running.cluster.units import parcel
 from cembench.running.cluster.worker import Forwarder, measure
 from cembench.running.options import Options
@@ -25,7 +25,6 @@ def test_a_cancelled_unit_ends_at_once_and_saves_nothing_that_was_stopped(
     monkeypatch.setattr(worker, "LOOK_EVERY", 0.05)
     tasks = tasks_of("sleeps", "spins")
     unit = parcel(tasks, NO_TOKEN, Options(jobs=jobs)).unit
-    host.store_surface(unit.mesh_hash, (tasks[0].mesh.V, tasks[0].mesh.F))
     started = threading.Event()
 
     def send(event):
@@ -37,7 +36,7 @@ def test_a_cancelled_unit_ends_at_once_and_saves_nothing_that_was_stopped(
         pytest.raises(ClusterError, match="cancelled"),
         worker._cancelling(forwarder.cancelled, lambda: not started.is_set()),
     ):
-        measure(unit, Store(tmp_path / "run"), forwarder)
+        measure(unit, tasks[0].mesh, Store(tmp_path / "run"), forwarder)
     assert Store(tmp_path / "run").finished() == []
     assert list((tmp_path / "run").glob("samples/*/*.jsonl")) == []
 
