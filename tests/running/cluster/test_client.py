@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 
 import pytest
 from cembench.surfaces.cone import cone
@@ -94,6 +95,23 @@ def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(client, 
     assert good.outcome.status == "ok"
     assert any("flat-disk" in words and "again" in words for words in heard.told)
     assert {r.cell.algorithm for r in store.records()} == {"ends-the-worker", "good"}
+
+
+def test_an_interrupted_run_frees_its_workers_at_once(client, tmp_path):
+    class Interrupting(Watcher):
+        def starts(self, task, step):
+            raise KeyboardInterrupt
+
+    asleep = tasks_of("sleeps", surfaces=SURFACES[:1])
+    with pytest.raises(KeyboardInterrupt):
+        run_on_cluster(asleep, Store(tmp_path / "asleep"), client, watcher=Interrupting())
+    # It sleeps for ten minutes, and so long the lock of the machine would be held.
+    good = tasks_of("good", surfaces=SURFACES[:1])
+    began = monotonic()
+    (record,) = run_on_cluster(good, Store(tmp_path / "good"), client, faces=200)
+    assert record.outcome.status == "ok"
+    assert monotonic() - began < 300
+    assert Store(tmp_path / "asleep").finished() == []
 
 
 def test_machines_with_other_software_can_be_refused(client, tmp_path, monkeypatch):
