@@ -154,27 +154,29 @@ class Launcher:
             except ServerGoneError:
                 self.forks = False
                 return None
-        path = self._write(job.model_copy(update={"parent": self._server.pid}))
-        try:
-            forking = self._server.forking(path)
-            return run_limited(forking, limits, log, stopped=self.stopped.is_set)
-        except ServerGoneError:
+        ending = self._run_by(self._server, job, limits, log)
+        if ending is None:
             self.close()
-            return None
+        return ending
 
     def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
         """Run a judge forked from its server; return how it ended, None if it cannot be forked."""
         server = judges_server(self.number)
-        if server is None:
-            return None
-        path = self._write(job.model_copy(update={"parent": server.pid}))
-        try:
-            forking = server.forking(path)
-            return run_limited(forking, limits, log, alone=True, stopped=self.stopped.is_set)
-        except ServerGoneError:
+        ending = server and self._run_by(server, job, limits, log, alone=True)
+        if server is not None and ending is None:
             judges_server.cache_clear()
             server.close()
-            return None
+        return ending
+
+    def _run_by(
+        self, server: ForkServer, job: Job, limits: Limits, log: Path, *, alone: bool = False
+    ) -> ProcessEnd | None:
+        """Run a process forked from this server; return its end, None if the server is gone."""
+        path = self._write(job.model_copy(update={"parent": server.pid}))
+        with suppress(ServerGoneError):
+            start = server.forking(path)
+            return run_limited(start, limits, log, alone=alone, stopped=self.stopped.is_set)
+        return None
 
     def _write(self, job: Job) -> Path:
         path = self.scratch / "job.json"

@@ -5,7 +5,7 @@ memory is measured. What ends ok is then timed in rounds. A round has a fresh pr
 cell: surfaces in random order, the cells of a surface one after the other, in random order too, so
 a machine that slows down slows all that are compared. A cell has a fixed number of rounds, or is
 measured until its intervals are narrow (:mod:`cembench.running.schedule`), as long as time is
-left; where that does not last for the first look of all, the dearest end early. Where that is
+left; if it does not suffice for the first look of all cells, the most expensive end early. If
 possible the processes are forked from one that has loaded the libraries
 (:mod:`cembench.running.fork_server`), one for the checks and another one each round: what differs
 from one interpreter to the next (addresses, hash seeds) is the same for all cells of a round, and
