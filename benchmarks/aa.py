@@ -48,9 +48,10 @@ from cembench.results.many import corrected
 from cembench.results.records import Outcome, Record
 from cembench.results.store import Store
 from cembench.running.judging import Checked
-from cembench.running.local import Launcher, Options
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import generate_surface
+from cembench.running.timing import CellTimer
 
 PAGE = pages.ROOT / "docs/measuring.md"
 ALGORITHMS = ("cem", "ldm", "direct-cem", "lscm")
@@ -132,17 +133,17 @@ def _shared_run(chosen: argparse.Namespace, seed: int) -> list[Comparison]:
     groups = []
     with (
         tempfile.TemporaryDirectory() as folder,
-        closing(Launcher(Path(folder), Options(seed=seed))) as launcher,
+        closing(CellTimer(Path(folder), Options(seed=seed))) as timer,
     ):
         for surface in chosen.surfaces.split(","):
             mesh = generate_surface(registry, surface, chosen.faces)
             tasks = plan_cells(both, [mesh], {}, how, [str(TWINS)])
-            checked = [Checked.of(launcher.check(task)[0]) for task in tasks]
+            checked = [Checked.of(timer.check(task)[0]) for task in tasks]
             groups.append((tasks, checked, list[list[float]]()))
         for _ in range(LOOKS[0]):
-            launcher.close()
+            timer.close()
             for tasks, checked, seconds in groups:
-                found = launcher.together(tasks, checked)
+                found = timer.together(tasks, checked)
                 if not isinstance(found, Outcome):
                     seconds.append([one.seconds for one in found])
     return [

@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from cembench import DiskMesh, Parameterization, algorithm
 from cembench.results.records import Outcome, Round
 from cembench.running.judging import Checked
-from cembench.running.local import Launcher
 from cembench.running.plan import Task
+from cembench.running.timing import CellTimer
 
 #: How many algorithms there are.
 COUNT = 10
 
 
-def _check(self: Launcher, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
+def _check(self: CellTimer, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
     return Outcome(status="ok", uv_hash="x"), np.ones(task.mesh.n, complex)
 
 
-def _time(self: Launcher, task: Task, checked: Checked) -> Round | Outcome:
+def _time(self: CellTimer, task: Task, checked: Checked) -> Round | Outcome:
     return Round(calls=(1e-3,) * 5)
 
 
@@ -36,4 +36,4 @@ def _declare(number: int) -> None:
 
 for k in range(COUNT):
     _declare(k)
-Launcher.check, Launcher.time = _check, _time  # type: ignore[method-assign]
+CellTimer.check, CellTimer.time = _check, _time  # type: ignore[method-assign]

@@ -34,8 +34,10 @@ from cembench.results.records import Outcome, Round
 from cembench.results.store import Store
 from cembench.running.environment import for_measuring
 from cembench.running.judging import Checked
-from cembench.running.local import Launcher, Options, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
+from cembench.running.timing import CellTimer
 
 BARE = """
 import sys
@@ -89,12 +91,12 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
     told: dict[str, list[float]] = {"told / bare": [], "forked / fresh": []}
     shuffled = random.Random(0)
     with tempfile.TemporaryDirectory() as folder:
-        forking = Launcher(Path(folder), Options())
-        starting = Launcher(Path(folder), Options(), forks=False)
+        forking = CellTimer(Path(folder), Options())
+        starting = CellTimer(Path(folder), Options(), forks=False)
 
-        def by(launcher: Launcher) -> float:
-            found = launcher.time(task, Checked())
-            launcher.close()  # as in a run: another server each round
+        def by(timer: CellTimer) -> float:
+            found = timer.time(task, Checked())
+            timer.close()  # as in a run: another server each round
             if isinstance(found, Outcome):
                 sys.exit(found.cause)
             return found.seconds
@@ -126,7 +128,7 @@ def is_narrow(ratios: list[float]) -> bool:
     return i is not None and i.high - i.low < 2 * NARROW * found.ratio
 
 
-class NoProcess(Launcher):
+class NoProcess(CellTimer):
     """Answers at once what a process might."""
 
     def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
@@ -145,7 +147,7 @@ def empty_cells(count: int) -> tuple[float, float]:
     tasks = plan_cells(algorithms, meshes, {}, MeasurementSettings())
     planned = perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        records = run_tasks(tasks, Store(Path(folder)), launcher=NoProcess)
+        records = run_tasks(tasks, Store(Path(folder)), timer=NoProcess)
     assert len(records) == len(tasks)
     return planned - start, perf_counter() - planned
 

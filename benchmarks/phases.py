@@ -16,7 +16,8 @@ from pathlib import Path
 
 from cembench.registry import load_registry
 from cembench.results.store import Store
-from cembench.running.local import Options, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import generate_surface, kinds_of, load_file
 

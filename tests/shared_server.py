@@ -11,7 +11,7 @@ import pytest
 
 from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
-from cembench.running.local import Launcher
+from cembench.running.launcher import Launcher
 from cembench.running.process import run_limited
 
 
@@ -52,7 +52,7 @@ def one_server(_servers, monkeypatch):
         try:
             server = _servers.of(for_measuring(job.cell.threads), job.cell.backend)
             path = self._write(job.model_copy(update={"parent": server.pid}))
-            return run_limited(server.forking(path), limits, log, stopped=self._stopped.is_set)
+            return run_limited(server.forking(path), limits, log, stopped=self.stopped.is_set)
         except ServerGoneError:
             _servers.end()
             return started(self, job, limits, log)

@@ -14,10 +14,11 @@ from cembench.mesh.files import write_mesh
 from cembench.registry import load_registry
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
-from cembench.running.local import Options, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from tests.report.small_run import write_koebe
-from tests.validation.in_this_process import LauncherHere
+from tests.validation.in_this_process import TimerHere
 
 ALGORITHMS = ("cem", "harmonic-circle")
 RUN = ("run", "--mesh", "disk.obj", "-a", ",".join(ALGORITHMS), "--repeats", 1, "-o", "run")
@@ -68,12 +69,12 @@ def whole(tmp_path_factory):
     store = Store(folder / "run")
     chosen = [registry.algorithm(name) for name in ALGORITHMS]
     tasks = plan_cells(chosen, [mesh], {}, MeasurementSettings(repeats=1))
-    run_tasks(tasks, store, Options(), launcher=LauncherHere)
+    run_tasks(tasks, store, Options(), timer=TimerHere)
     (unfinished,) = plan_cells(
         [registry.algorithm("lscm")], [mesh], {}, MeasurementSettings(repeats=2)
     )
     samples = store.samples(unfinished.cell, describe_environment()["id"])
-    outcome, uv = LauncherHere(folder, Options()).check(unfinished)
+    outcome, uv = TimerHere(folder, Options()).check(unfinished)
     samples.save_check(outcome, uv)
     samples.save_round(0, outcome.rounds[0])
     store.save_plan([*(task.cell for task in tasks), unfinished.cell])
@@ -84,8 +85,8 @@ def whole(tmp_path_factory):
 @pytest.fixture
 def fuzzed(whole, cli, monkeypatch):
     """Make the run anew, spoil it by a seed and call a verb on it; exit code and messages."""
-    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
-    monkeypatch.setattr("cembench.running.local.describe_environment", lambda: {"id": "e"})
+    monkeypatch.setattr("cembench.running.local.CellTimer", TimerHere)
+    monkeypatch.setattr("cembench.running.recorder.describe_environment", lambda: {"id": "e"})
 
     def call(seed, verb):
         for name in ("run", "whole", "both"):

@@ -79,7 +79,7 @@ if TYPE_CHECKING:
     from cembench.report.surface_facts import SurfaceFacts
     from cembench.results.records import Record
     from cembench.results.store import Store
-    from cembench.running.local import Options
+    from cembench.running.options import Options
     from cembench.running.plan import Task
 
 app = typer.Typer(
@@ -283,7 +283,7 @@ def run(
     from cembench.results.record_rows import REFERENCE
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
-    from cembench.running.local import Options
+    from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from cembench.results.store import Store
     from cembench.running.cluster.connect import ClusterPlace
     from cembench.running.estimate import Estimate
-    from cembench.running.local import Options
+    from cembench.running.options import Options
     from cembench.running.plan import Task
 
 Cluster = Annotated[

@@ -156,7 +156,7 @@ def map_(
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.drawing.own_pictures import check_replaceable
     from cembench.results.record_rows import row
-    from cembench.running.local import Options
+    from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings
     from cembench.workflows import map_files
     from cembench.workflows.map_extras import Extras, check_extras, check_shells

@@ -208,7 +208,7 @@ def budget_seconds(given: str | None, profile: Profile | None) -> float:
         The text is not a time, or is outside the range.
 
     """
-    from cembench.running.local import USUAL_BUDGET
+    from cembench.running.options import USUAL_BUDGET
 
     if given is None:
         return USUAL_BUDGET if profile is None else USUAL_BUDGETS[profile]

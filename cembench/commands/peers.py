@@ -74,7 +74,8 @@ def peers(
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.external.present import missing
-    from cembench.running.local import Options, run_tasks
+    from cembench.running.local import run_tasks
+    from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)

@@ -18,8 +18,10 @@ from cembench.report.render.grid import GridColumn, grid
 from cembench.report.render.terminal import status_style
 from cembench.results.records import Record
 from cembench.results.store import Store
-from cembench.running.local import Options, Step, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import Task
+from cembench.running.watcher import Step, Watcher
 
 #: Number of cells in the live table.
 _SHOWN = 12

@@ -56,7 +56,7 @@ def reproduce(
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
-    from cembench.running.local import Options
+    from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 
     require(Extra.REPORT, "a report")

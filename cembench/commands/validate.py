@@ -103,7 +103,7 @@ def validate(
     met; 1: not; 2: wrong usage. docs/write_a_solver.md has an example.
     """
     from cembench.core import extras, folders
-    from cembench.running.local import Options
+    from cembench.running.options import Options
     from cembench.running.plan import distribute_parameters
     from cembench.validation.examine import ValidationOptions, examine
     from cembench.validation.solver import Solver, in_a_process, load_solver

@@ -110,11 +110,6 @@ COMPARED = (
 )
 
 
-def software_of(environment: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the versions and the commit of an environment."""
-    return {name: environment.get(name) for name in SOFTWARE}
-
-
 def differences(
     ours: Mapping[str, Any], theirs: Mapping[str, Any], facts: Sequence[str] = SOFTWARE
 ) -> list[str]:

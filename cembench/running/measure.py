@@ -40,7 +40,7 @@ from cembench.running.comparable import Used
 from cembench.running.external.call import ProgramCalls
 from cembench.running.external.present import library_version, missing
 from cembench.running.judge import Promise
-from cembench.running.judging import Checked, judged_calls, judged_check
+from cembench.running.judging import judged_check
 from cembench.running.memory import Memory, memory_of_call
 from cembench.running.motion import UNMOVED, moved
 from cembench.running.processor import Processor, after_call, before_call
@@ -224,43 +224,15 @@ def _called(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> tuple[Outco
     return _with_memory(outcome.model_copy(update=described), memory), uv
 
 
-def time_cell(
-    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, checked: Checked
-) -> Round | Outcome:
-    """Time calls on the original surface, and judge their maps here; see :func:`timed_calls`."""
-    calls = timed_calls(mesh, Timed(algorithm, cell))
-    if isinstance(calls, Outcome):
-        return calls
-    found, told = calls
-    named = [
-        (name, call.motion, call.uv)
-        for name, call in zip(told.names(), told.calls, strict=True)
-        if not isinstance(call.uv, Fault)
-    ]
-    judged = judged_calls(Promise.of(algorithm), mesh, checked, named, {})
-    if judged.faults:
-        return not_ok("invalid", *judged.faults)
-    return found.model_copy(update={"repeated": judged.repeated})
-
-
-def timed_calls(mesh: TriangleMesh, one: Timed) -> tuple[Round, TimedCalls] | Outcome:
-    """Time a call after a warm-up, or several calls if they are short.
-
-    Each call gets the surface in a different motion. The maps are judged after all timing. Returns
-    an outcome if the algorithm raised or returned no map.
-    """
-    found = timed_together(mesh, [one])
-    return found if isinstance(found, Outcome) else found[0][0]
-
-
 def timed_together(
     mesh: TriangleMesh, cells: Sequence[Timed]
 ) -> tuple[list[tuple[Round, TimedCalls]], TimedCalls] | Outcome:
-    """Time several algorithms in this process, as :func:`timed_calls` does one.
+    """Time a call of each algorithm after a warm-up, or several calls if they are short.
 
     First come the calls that are not timed, then those that are, each in random order: as many of
-    each algorithm as it has in a process of its own. Returns the round and the calls of each, and
-    the calls of all in their order; or an outcome if one raised or returned no map.
+    each algorithm as it has in a process of its own. Each call gets the surface in a different
+    motion. Returns the round and the calls of each, and the calls of all in their order; or an
+    outcome if one raised or returned no map. The maps are judged later.
     """
     first = cells[0].cell
     try:

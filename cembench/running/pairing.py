@@ -61,7 +61,7 @@ class Scatter:
 
         `prices` are the seconds of a round of each cell, `seconds` those that the run has left.
         """
-        told = (
+        scatter = (
             f"this machine: ratios of equal calls scatter by {self.separate:.1%} between processes "
             f"and by {self.together:.1%} within one, so algorithms are compared "
             f"{'within one process of each round' if pairs else 'between processes'}; "
@@ -70,7 +70,7 @@ class Scatter:
         costs = accumulate(sorted((COST if pairs else 1.0) * first * price for price in prices))
         bought = sum(cost <= seconds for cost in costs)
         if not bought:
-            return f"{told}the time is not enough for the {first} rounds that an interval takes"
+            return f"{scatter}the time is not enough for the {first} rounds that an interval takes"
         width = self.half_width(first, pairs=pairs)
         those = "each cell" if bought == len(prices) else f"about {bought} of {len(prices)} cells"
-        return f"{told}{first} rounds of {those} make ratios certain to ±{width:.1%} at best"
+        return f"{scatter}{first} rounds of {those} make ratios certain to ±{width:.1%} at best"

@@ -64,22 +64,19 @@ def quality_notes(
     reachable = float(angle_errors(mesh, known).mean())
     if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh)):
         return notes
-    causes = likely_causes(mesh, uv, extras)
+    causes = "; ".join(likely_causes(mesh, uv, extras))
+    harmonic = "a harmonic map of this mesh by harmonic measure"
     if error > FAR * reachable:
-        told = (
-            f"far from conformal: the mean angle error is {error:.2f} degrees, but a harmonic map "
-            f"of this mesh by harmonic measure reaches {reachable:.2f}. Likely cause: "
-            f"{'; '.join(causes) or 'the method, not the mesh'}"
-        )
-        notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
+        compared = f"but {harmonic} reaches {reachable:.2f}"
+        causes = causes or "the method, not the mesh"
     else:
-        told = (
-            f"far from conformal: the mean angle error is {error:.2f} degrees, and a harmonic map "
-            f"of this mesh by harmonic measure is no better ({reachable:.2f}). "
-            f"Likely cause: {'; '.join(causes) or 'the mesh is too coarse for this domain'}"
-        )
-        notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
-    return notes
+        compared = f"and {harmonic} is no better ({reachable:.2f})"
+        causes = causes or "the mesh is too coarse for this domain"
+    text = (
+        f"far from conformal: the mean angle error is {error:.2f} degrees, {compared}. Likely "
+        f"cause: {causes}"
+    )
+    return [*notes, Notice(NoticeKind.FAR_FROM_CONFORMAL, text)]
 
 
 def better_parameters(

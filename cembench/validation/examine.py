@@ -15,8 +15,10 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, Record
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
-from cembench.running.local import Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, PaperRole, plan_cells
+from cembench.running.watcher import Watcher
 from cembench.validation import surfaces
 from cembench.validation.contract import examine_contract
 from cembench.validation.correctness import examine_correctness

@@ -23,7 +23,7 @@ from cembench.results.intervals import ERROR, Interval
 from cembench.results.looks import LOOKS, next_look, share
 from cembench.results.records import Record, Round, lower_median
 from cembench.results.signed_rank import centre_interval
-from cembench.running.until_precise import cost
+from cembench.running.schedule import cost
 from cembench.validation.finding import ValidationFinding
 
 #: Largest allowed exponent. Factoring the Laplacian of a planar mesh costs faces^1.5

@@ -14,7 +14,8 @@ from cembench.core.errors import RegistryError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import COMMAND, Algorithm, Registry, declared_by, load_registry
 from cembench.results.records import Outcome
-from cembench.running.local import Options, map_once
+from cembench.running.local import map_once
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 from cembench.running.plugins import load_with_plugins
 

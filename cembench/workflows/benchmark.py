@@ -19,7 +19,8 @@ from cembench.results.looks import USUAL_PRECISION
 from cembench.results.record_rows import REFERENCE
 from cembench.results.records import Record
 from cembench.results.store import Store
-from cembench.running.local import DEFAULT_TIMEOUT, USUAL_BUDGET, Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import DEFAULT_TIMEOUT, USUAL_BUDGET, Options
 from cembench.running.pairing import Pairing
 from cembench.running.plan import (
     MeasurementSettings,
@@ -30,6 +31,7 @@ from cembench.running.plan import (
     plan_cells,
 )
 from cembench.running.surfaces import SurfaceInput, is_generated, kinds_of, load_surface
+from cembench.running.watcher import Watcher
 from cembench.workflows.notebook import html_table
 
 if TYPE_CHECKING:

@@ -21,7 +21,8 @@ from cembench.results.exhibits import (
     write_exhibit,
 )
 from cembench.results.records import MeshOrigin, Record
-from cembench.running.local import Options, map_once
+from cembench.running.local import map_once
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 
 #: The surface of the paper's Figures 1 and 7.

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from cembench.core.notices import Notice
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
-from cembench.running.local import Options, map_once
+from cembench.running.local import map_once
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
 from cembench.running.surfaces import SurfaceFile
 from cembench.workflows.map_extras import Extras, write_extras

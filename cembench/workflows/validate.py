@@ -10,7 +10,7 @@ from typing import Any
 
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable, write_model
-from cembench.running.local import Options
+from cembench.running.options import Options
 from cembench.running.plan import distribute_parameters
 from cembench.running.surfaces import SurfaceInput, load_surface
 from cembench.validation.examine import ValidationOptions, examine

@@ -11,7 +11,7 @@ from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import write_mesh
 from cembench.mesh.uvs import read_uv
-from cembench.running.local import Launcher
+from cembench.running.timing import CellTimer
 
 SCRIPT = Path(__file__).parents[1] / "running/external/misbehaves.py"
 
@@ -96,7 +96,7 @@ def test_a_program_that_is_not_there_is_skipped_with_what_brings_it(cli, face):
 
 
 def test_tables_and_rows_mark_the_program_and_tell_its_times(cli, monkeypatch):
-    monkeypatch.setattr("cembench.running.local.Launcher", LauncherWithoutForks)
+    monkeypatch.setattr("cembench.running.local.CellTimer", TimerWithoutForks)
     words = ("run", "--surfaces", "flat-disk", "--faces", 100, "--repeats", 1, "-a", "direct-cem")
     words += ("--command", command("normalised"), "--program", r"seconds=solve: (\S+) s")
     words += ("--program", "name=mine", "--reference", "direct-cem")
@@ -116,7 +116,7 @@ def test_tables_and_rows_mark_the_program_and_tell_its_times(cli, monkeypatch):
     assert row["speedup"] == pytest.approx(0.125 / ours["seconds"] - 1)
 
 
-class LauncherWithoutForks(Launcher):
+class TimerWithoutForks(CellTimer):
     """Starts a process where a server would have to be started for one."""
 
     def __init__(self, scratch, options):

@@ -5,7 +5,7 @@ import pytest
 from rich.console import Console
 
 from cembench.commands.progress import LiveProgress, Remaining, duration
-from cembench.running.local import Step
+from cembench.running.watcher import Step
 from tests.results.test_comparison import record_of
 
 

@@ -12,7 +12,7 @@ from cembench.mesh.files import read_mesh
 from cembench.registry import load_registry
 from cembench.results.records import Outcome
 from cembench.results.store import Store
-from cembench.running.local import Launcher
+from cembench.running.timing import CellTimer
 from tests.models_server import ModelsServer, content_of
 from tests.report.conftest import quick_drawing  # noqa: F401 - a fixture
 
@@ -65,14 +65,14 @@ def test_a_model_replaces_its_stand_in_and_all_is_reported(cli, one_model):
 
 
 def test_offline_no_server_is_asked_and_a_failed_cell_ends_with_1(cli, one_model, monkeypatch):
-    check = Launcher.check
+    check = CellTimer.check
 
     def failing(self, task):
         if task.cell.algorithm == "ldm":
             return Outcome(status="failed", cause="it gave up"), None
         return check(self, task)
 
-    monkeypatch.setattr(Launcher, "check", failing)
+    monkeypatch.setattr(CellTimer, "check", failing)
     names = ["nefertiti-stand-in"]
     monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
     code, out, err = cli("reproduce", "-o", "here", "--offline", "--budget", "0s")

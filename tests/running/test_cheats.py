@@ -10,7 +10,8 @@ from cembench.core.notices import NoticeKind, of_kind
 from cembench.registry import load_registry
 from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
-from cembench.running.local import Options, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import generate_surface
 from cembench.validation.examine import ValidationOptions, examine

@@ -10,40 +10,41 @@ import pytest
 from cembench.results.records import Outcome, Round
 from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
-from cembench.running.local import Launcher, Options
-from cembench.running.measure import Checked
+from cembench.running.judging import Checked
+from cembench.running.options import Options
+from cembench.running.timing import CellTimer
 from tests.running.test_local import MEMORY, tasks_of
 
 pytestmark = pytest.mark.skipif(not can_fork(1), reason="processes are not forked here")
 
 
 @pytest.fixture
-def launcher(tmp_path):
-    made = Launcher(tmp_path, Options())
+def timer(tmp_path):
+    made = CellTimer(tmp_path, Options())
     yield made
     made.close()
 
 
-def timed(launcher, name, **how):
-    return launcher.time(tasks_of(name, **how)[0], Checked())
+def timed(timer, name, **how):
+    return timer.time(tasks_of(name, **how)[0], Checked())
 
 
-def test_processes_of_a_round_are_forked_from_one_server_until_it_is_closed(launcher):
-    assert isinstance(timed(launcher, "good"), Round)
-    first = launcher._server.pid
-    assert isinstance(timed(launcher, "good"), Round)
-    assert launcher._server.pid == first
-    launcher.close()
+def test_processes_of_a_round_are_forked_from_one_server_until_it_is_closed(timer):
+    assert isinstance(timed(timer, "good"), Round)
+    first = timer.launcher._server.pid
+    assert isinstance(timed(timer, "good"), Round)
+    assert timer.launcher._server.pid == first
+    timer.close()
     assert not psutil.pid_exists(first)
-    assert isinstance(timed(launcher, "good"), Round)
-    assert launcher._server.pid != first
+    assert isinstance(timed(timer, "good"), Round)
+    assert timer.launcher._server.pid != first
 
 
-def test_a_forked_process_finds_pinned_threads_its_own_group_and_no_algorithm_loaded(launcher):
-    timed(launcher, "harmonic-circle")
-    forked = timed(launcher, "tells-where").cause
+def test_a_forked_process_finds_pinned_threads_its_own_group_and_no_algorithm_loaded(timer):
+    timed(timer, "harmonic-circle")
+    forked = timed(timer, "tells-where").cause
     assert forked.endswith("fork_server.py 1 True [] 0")
-    threaded = timed(launcher, "tells-where", threads=2).cause
+    threaded = timed(timer, "tells-where", threads=2).cause
     assert threaded.endswith("worker.py 2 True [] 0")
     for told in (forked, threaded):
         assert "glibc.malloc.hugetlb=" in told
@@ -60,21 +61,21 @@ def test_a_forked_process_finds_pinned_threads_its_own_group_and_no_algorithm_lo
     ],
 )
 def test_a_fault_in_a_forked_process_is_a_status_and_the_next_is_measured(
-    launcher, name, status, cause
+    timer, name, status, cause
 ):
-    launcher.options = Options(timeout=1 if name == "spins" else 600, memory_bytes=MEMORY)
-    found = timed(launcher, name)
-    launcher.options = Options(memory_bytes=MEMORY)
+    timer.launcher.options = Options(timeout=1 if name == "spins" else 600, memory_bytes=MEMORY)
+    found = timed(timer, name)
+    timer.launcher.options = Options(memory_bytes=MEMORY)
     assert (found.status, cause in found.cause) == (status, True), found.cause
-    server = launcher._server.pid
-    assert isinstance(timed(launcher, "good"), Round)
-    assert launcher._server.pid == server
+    server = timer.launcher._server.pid
+    assert isinstance(timed(timer, "good"), Round)
+    assert timer.launcher._server.pid == server
 
 
 @pytest.mark.parametrize("name", ["daemonises", "detaches-twice"])
-def test_what_a_forked_process_leaves_is_ended(launcher, name, tmp_path, monkeypatch):
+def test_what_a_forked_process_leaves_is_ended(timer, name, tmp_path, monkeypatch):
     monkeypatch.setenv("FAULTY_CHILDREN", str(tmp_path / "children"))
-    found = timed(launcher, name)
+    found = timed(timer, name)
     # A child may still be starting beside the next call, and then that is what is told.
     assert isinstance(found, Round) or found.status == "not_comparable", found
     children = (tmp_path / "children").read_text().split()
@@ -85,24 +86,24 @@ def test_what_a_forked_process_leaves_is_ended(launcher, name, tmp_path, monkeyp
         )
 
 
-def test_the_global_generator_differs_from_process_to_process(launcher):
+def test_the_global_generator_differs_from_process_to_process(timer):
     (task,) = tasks_of("draws")
-    checked, _ = launcher.check(task)
-    measured = [launcher.time(task, Checked.of(checked)) for _ in range(2)]
+    checked, _ = timer.check(task)
+    measured = [timer.time(task, Checked.of(checked)) for _ in range(2)]
     assert [one.repeated for one in measured] == [False, False]
 
 
-def test_without_its_server_a_process_has_failed_and_the_next_is_measured(launcher):
-    found = timed(launcher, "kills-its-parent")
+def test_without_its_server_a_process_has_failed_and_the_next_is_measured(timer):
+    found = timed(timer, "kills-its-parent")
     assert isinstance(found, Outcome)
     assert "ended by signal SIGKILL" in found.cause
-    assert isinstance(timed(launcher, "good"), Round)
-    assert launcher.forks
+    assert isinstance(timed(timer, "good"), Round)
+    assert timer.launcher.forks
 
 
-def test_without_a_server_processes_are_started(launcher, monkeypatch):
-    monkeypatch.setattr("cembench.running.local.can_fork", lambda threads: False)
-    assert timed(launcher, "tells-where").cause.endswith("worker.py 1 True [] 0")
+def test_without_a_server_processes_are_started(timer, monkeypatch):
+    monkeypatch.setattr("cembench.running.launcher.can_fork", lambda threads: False)
+    assert timed(timer, "tells-where").cause.endswith("worker.py 1 True [] 0")
     monkeypatch.undo()
     monkeypatch.setattr("cembench.running.fork_server.sys.executable", "/bin/false")
     with pytest.raises(ServerGoneError):

@@ -17,15 +17,12 @@ from cembench.results.records import FaultKind
 from cembench.results.store import Store
 from cembench.running.environment import ALLOCATOR, describe_environment, for_measuring
 from cembench.running.fork_server import can_fork
-from cembench.running.local import (
-    Launcher,
-    Options,
-    Watcher,
-    in_random_order,
-    map_once,
-    run_tasks,
-)
+from cembench.running.local import map_once, run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.schedule import CellState, in_random_order
+from cembench.running.timing import CellTimer
+from cembench.running.watcher import Watcher
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
 MEMORY = 500 * 2**20
@@ -73,7 +70,7 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause):
 
 
 def test_a_large_surface_that_memory_cannot_take_is_not_tried(monkeypatch):
-    monkeypatch.setattr("cembench.running.local.expected_bytes", lambda *_: 2.0 * MEMORY)
+    monkeypatch.setattr("cembench.running.timing.expected_bytes", lambda *_: 2.0 * MEMORY)
     (task,) = tasks_of("good")
     record, uv = map_once(task, Options(memory_bytes=MEMORY))
     assert (record.outcome.status, uv) == ("out_of_memory", None)
@@ -83,7 +80,7 @@ def test_a_large_surface_that_memory_cannot_take_is_not_tried(monkeypatch):
 
 
 def test_what_is_short_of_memory_beside_others_is_checked_alone(monkeypatch, tmp_path):
-    monkeypatch.setattr("cembench.running.local.expected_bytes", lambda *_: 0.75 * MEMORY)
+    monkeypatch.setattr("cembench.running.timing.expected_bytes", lambda *_: 0.75 * MEMORY)
     options = Options(memory_bytes=MEMORY, jobs=2)
     found = run_tasks(tasks_of("good", "harmonic-circle"), Store(tmp_path), options)
     assert [record.outcome.status for record in found] == ["ok", "ok"]
@@ -199,8 +196,8 @@ def test_the_memory_of_a_call_means_the_same_in_forked_and_started_processes(tmp
     (task,) = tasks_of("good", faces=20_000)
     found = {}
     for forks in (True, False):
-        with closing(Launcher(tmp_path / str(forks), Options(), forks=forks)) as launcher:
-            found[forks], _ = launcher.check(task)
+        with closing(CellTimer(tmp_path / str(forks), Options(), forks=forks)) as timer:
+            found[forks], _ = timer.check(task)
     assert found[True].uv_hash == found[False].uv_hash
     increases = [found[forks].memory_increase_bytes for forks in (True, False)]
     assert abs(increases[0] - increases[1]) < 4 * 2**20, increases
@@ -259,30 +256,28 @@ def _cells_of_three_surfaces():
     ]
     tasks = plan_cells(chosen, surfaces, {}, MeasurementSettings(repeats=1), [FAULTY])
     assert len({task.cell.mesh_hash for task in tasks}) == 3
-    return tasks
+    return [CellState(task, samples=None) for task in tasks]
 
 
 def test_the_order_within_a_round_is_random_and_set_by_the_seed():
-    tasks = _cells_of_three_surfaces()
+    cells = _cells_of_three_surfaces()
     first, again, next_round, other = (
-        [task.cell.label for task in in_random_order(tasks, seed, number)]
+        [state.label for state in in_random_order(cells, seed, number)]
         for seed, number in ((0, 0), (0, 0), (0, 1), (1, 0))
     )
-    assert sorted(first) == sorted(task.cell.label for task in tasks)
+    assert sorted(first) == sorted(state.label for state in cells)
     assert first == again
     assert first != next_round
     assert first != other
 
 
 def test_the_cells_of_a_surface_are_measured_one_after_the_other_in_any_order():
-    tasks = _cells_of_three_surfaces()
-    rounds = [in_random_order(tasks, 0, number) for number in range(400)]
+    cells = _cells_of_three_surfaces()
+    rounds = [in_random_order(cells, 0, number) for number in range(400)]
     for order in rounds:
-        surfaces = [task.cell.mesh_hash for task in order]
+        surfaces = [state.task.cell.mesh_hash for state in order]
         assert len(list(groupby(surfaces))) == 3
-    places = Counter(
-        (task.cell.label, place) for order in rounds for place, task in enumerate(order)
-    )
+    places = Counter((state.label, place) for order in rounds for place, state in enumerate(order))
     assert len(places) == 9 * 9  # every cell was at every place, and each about as often
     assert min(places.values()) > 400 / 9 / 2
 

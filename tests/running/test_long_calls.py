@@ -5,7 +5,9 @@ from cembench.core.parameterization import Parameterization
 from cembench.registry import algorithm, load_registry
 from cembench.results.records import Cell
 from cembench.running import measure
+from cembench.running.judging import Checked
 from cembench.running.surfaces import generate_surface
+from tests.validation.in_this_process import time_cell
 
 
 @pytest.mark.parametrize(("long", "calls"), [(0.0, 1), (60.0, measure.ENOUGH_CALLS + 1)])
@@ -22,6 +24,6 @@ def test_a_long_call_is_timed_at_once_and_a_short_one_after_a_warm_up(monkeypatc
 
     mesh = generate_surface(load_registry(), "flat-disk", 50)
     cell = Cell(algorithm="counted", code_hash="", mesh="flat-disk", mesh_hash=mesh.hash)
-    found = measure.time_cell(counted.__cembench__, mesh, cell, measure.Checked())
+    found = time_cell(counted.__cembench__, mesh, cell, Checked())
     assert len(made) == calls
     assert len(found.calls) == max(1, calls - 1)

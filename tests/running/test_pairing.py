@@ -12,11 +12,14 @@ from cembench.results.comparison import compare, paired_ratios
 from cembench.results.records import Fault, FaultKind, Round, not_ok
 from cembench.results.stability import scatter_words
 from cembench.results.store import Store
-from cembench.running.local import Launcher, Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.pairing import PROCESSES, Scatter
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.timing import CellTimer
+from cembench.running.watcher import Watcher
 from tests.running.test_cheats import CHEATS, surface  # noqa: F401 - a fixture
-from tests.running.test_until_precise import Invented, cells
+from tests.running.test_schedule import Invented, cells
 
 
 def test_the_scatter_between_processes_is_told_from_that_within_one():
@@ -78,7 +81,7 @@ class Listening(Watcher):
 
 
 def with_calls(kind):
-    """A launcher whose checks say what a call takes."""
+    """A timer whose checks say what a call takes."""
 
     class Checked(kind):
         def check(self, task):
@@ -169,13 +172,13 @@ def test_every_round_has_both_kinds_of_processes(tmp_path):
 
 def test_one_process_makes_the_calls_of_twins(tmp_path):
     task = cells(("cem",))[0]
-    launcher = Launcher(tmp_path, Options())
+    timer = CellTimer(tmp_path, Options())
     try:
-        outcome, _ = launcher.check(task)
+        outcome, _ = timer.check(task)
         checked = cembench.running.judging.Checked.of(outcome)
-        found = launcher.together([task, task], [checked, checked])
+        found = timer.together([task, task], [checked, checked])
     finally:
-        launcher.close()
+        timer.close()
     assert len(found) == 2
     assert all(one.repeated is not False for one in found)
     assert found[0].motions != found[1].motions

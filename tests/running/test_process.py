@@ -9,7 +9,7 @@ import pytest
 
 from cembench.core.notices import NoticeKind
 from cembench.results.records import Outcome
-from cembench.running import local, process
+from cembench.running import launcher, process
 from cembench.running.process import Limits, run_limited, spawning
 from cembench.running.worker import Answer
 
@@ -58,8 +58,8 @@ def test_a_double_fork_with_an_empty_environment_is_ended(tmp_path):
 def test_a_record_says_what_may_live_on_where_it_cannot_be_found(monkeypatch):
     answer = Answer(outcome=Outcome(status="ok"))
     for finds, hidden in ((True, False), (False, True)):
-        monkeypatch.setattr(local, "finds_all", lambda finds=finds: finds)
-        (note,) = local._with_note(answer, 2).outcome.notes
+        monkeypatch.setattr(launcher, "finds_all", lambda finds=finds: finds)
+        (note,) = launcher._with_note(answer, 2).outcome.notes
         assert note.kind is NoticeKind.PROCESSES_LEFT
         assert ("may live on" in note.text) is hidden
 

@@ -3,7 +3,10 @@
 from typing import ClassVar
 
 from cembench.registry import load_registry
-from cembench.running.measure import check_cell, time_cell
+from cembench.results.records import Fault, Outcome, not_ok
+from cembench.running.judge import Promise
+from cembench.running.judging import judged_calls
+from cembench.running.measure import Timed, check_cell, timed_together
 from cembench.validation.solver import Solver
 
 
@@ -13,13 +16,27 @@ def call_here(task):
     return check_cell(task.algorithm, own, task.cell)
 
 
+def time_cell(algorithm, mesh, cell, checked):
+    """Time calls on the original surface, and judge their maps here."""
+    timed = timed_together(mesh, [Timed(algorithm, cell)])
+    if isinstance(timed, Outcome):
+        return timed
+    ((measured, calls),) = timed[0]
+    maps = zip(calls.names(), calls.calls, strict=True)
+    named = [(name, c.motion, c.uv) for name, c in maps if not isinstance(c.uv, Fault)]
+    judged = judged_calls(Promise.of(algorithm), mesh, checked, named, {})
+    if judged.faults:
+        return not_ok("invalid", *judged.faults)
+    return measured.model_copy(update={"repeated": judged.repeated})
+
+
 def solver_here(name, plugin=None):
     plugins = () if plugin is None else (str(plugin),)
     return Solver(load_registry(plugins).algorithm(name), plugins, call=call_here)
 
 
-class LauncherHere:
-    """What a run starts instead of processes; its seconds are invented.
+class TimerHere:
+    """Checks and times cells in this process; its seconds are invented.
 
     A verdict on speed or growth must not come from the clock of a busy machine: a call takes
     faces^exponent microseconds, half of that for the factorisation.

@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 
 from cembench.results.records import Record
-from tests.validation.in_this_process import LauncherHere, call_here
+from tests.validation.in_this_process import TimerHere, call_here
 
 FILE = Path(__file__).with_name("wrong.py")
 TINY = ("--surfaces", "hemi-ellipsoid,cone", "--faces", 600, "--repeats", 2, "--up-to", 900)
@@ -14,7 +14,7 @@ TINY = ("--surfaces", "hemi-ellipsoid,cone", "--faces", 600, "--repeats", 2, "--
 def here(cli, monkeypatch):
     """The command line without processes of its own; what runs is the same."""
     monkeypatch.setattr("cembench.validation.solver.in_a_process", lambda options: call_here)
-    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
+    monkeypatch.setattr("cembench.running.local.CellTimer", TimerHere)
 
     def validate(name, *arguments):
         return cli("validate", f"{FILE}:{name}" if name else FILE, *arguments)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.validation.in_this_process import LauncherHere, call_here
+from tests.validation.in_this_process import TimerHere, call_here
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples/stop_at_angles.py"
@@ -25,7 +25,7 @@ def documented():
 @pytest.fixture
 def printed(cli, monkeypatch):
     monkeypatch.setattr("cembench.validation.solver.in_a_process", lambda options: call_here)
-    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
+    monkeypatch.setattr("cembench.running.local.CellTimer", TimerHere)
     few = ("--surfaces", "hemi-ellipsoid,cone", "--faces", 600, "--repeats", 1, "--up-to", 900)
     code, out, _ = cli("validate", EXAMPLE, *few)
     assert code == 0

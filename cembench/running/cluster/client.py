@@ -1,19 +1,18 @@
-"""Run cells on a cluster: send units, and save their records in the run's folder at once.
+"""Run cells on a cluster: send units to workers, and save their records in the run's folder.
 
-Where a unit goes is decided by dask's scheduler. It gets one unit for each worker that is there, so
-that a worker which is lost takes one unit with it and no other is suspected.
+Dask's scheduler decides which worker measures a unit, and sends the unit of a worker that is lost
+to another one. There are never more units under way than workers: so a lost worker had one unit,
+and no other is suspected of having ended it.
 """
 
 from __future__ import annotations
 
-import json
 import uuid
 import warnings
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from datetime import UTC, datetime
 from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
@@ -25,27 +24,28 @@ from pydantic import ValidationError
 from cembench.core.errors import ClusterError
 from cembench.results import run_folder
 from cembench.results.looks import next_look
-from cembench.results.machines import differences, software_of
+from cembench.results.machines import differences
 from cembench.results.records import Fault, FaultKind, Record, not_ok
 from cembench.results.store import Store
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from cembench.running.cluster.units import Parcel, grouped, makespan, parcel
-from cembench.running.cluster.worker import Answer, MeasurerGoneError, forget, measure_unit
-from cembench.running.environment import describe_environment
+from cembench.running.cluster.worker import Answer, describe_worker, forget, measure_unit
 from cembench.running.estimate import estimate
-from cembench.running.local import Options, Step, Watcher, kept_record, record_of
+from cembench.running.options import Options
 from cembench.running.plan import Task
+from cembench.running.recorder import Recorder, now, record_of, recording
+from cembench.running.watcher import Step, Watcher
 
 #: A unit that ended so many workers is recorded as failed.
 MOST_LOST = 2
-#: Seconds between two looks at which workers are there.
+#: Seconds between two looks at the connected workers.
 LOOK_EVERY = 1.0
-#: Seconds between two writings of how far the run is.
+#: Seconds between two saves of the progress.
 STATE_EVERY = 5.0
-#: Seconds for which there may be no worker before that is said.
+#: Seconds without any worker before a message says so.
 _PATIENCE = 5.0
-#: Seconds for which workers that cembench started on this machine may all be gone: dask starts them
-#: again, but only so often. Elsewhere others can join at any time.
+#: Seconds without any worker after which a run on this machine's own workers ends: dask restarts
+#: them, but only so often. On other clusters, workers can join at any time.
 LOCAL_PATIENCE = 120.0
 
 
@@ -61,101 +61,101 @@ def run_on_cluster(
 ) -> list[Record]:
     """Measure the cells that the store does not hold on a cluster; return records in order.
 
-    As :func:`cembench.running.local.run_tasks`, whose machinery each worker has. The budget is of
-    each machine, and a unit gets its share. `faces` is what registered surfaces were made with;
-    with `same_environment` a machine with other software than this one measures nothing.
+    Like :func:`cembench.running.local.run_tasks`, which each worker calls. The budget is that of
+    each machine, and a unit gets its share. `faces` is the size that registered surfaces were
+    generated with; with `same_environment`, machines with other software measure nothing.
 
     Raises
     ------
     ClusterError
-        The scheduler is gone, or the workers cannot measure; what is finished is in the store.
+        The scheduler is gone, or a worker cannot measure; finished units are in the store.
 
     """
-    options, watcher = options or Options(), watcher or Watcher()
-    with store.locked(watcher.waits):
-        store.save_plan([task.cell for task in tasks])
-        for mesh in {task.cell.mesh_hash: task.mesh for task in tasks}.values():
-            store.save_mesh(mesh)
-        run = _ClusterRun(
-            *(store, client, options, watcher, faces, same_environment, describe_environment())
-        )
+    with recording(tasks, store, options, watcher) as recorder:
+        run = _ClusterRun(recorder, client, faces, same_environment)
         try:
-            run.measure(tasks)
+            run.measure(recorder.pending(tasks))
         finally:
-            run.end()
-    return [run.records[task.cell.label] for task in tasks]
+            run.cancel()
+    return [recorder.records[task.cell.label] for task in tasks]
 
 
 @dataclass
-class _Flight:
-    """A unit that a worker has."""
+class _Assignment:
+    """A unit that is sent to a worker, or waits for one."""
 
     parcel: Parcel
     future: Future | None = None
-    sent_surface: bool = False
-    #: Workers that took it, by their addresses; and the machine of the last.
-    takers: list[str] = field(default_factory=list)
-    machine: str = ""
-    doing: str = ""
-    #: How often the process of a worker that measures it has ended.
-    ended: int = 0
+    sends_surface: bool = False
+    #: Addresses of the workers that took it, and what the last one does.
+    workers: list[str] = field(default_factory=list)
+    activity: str = ""
     #: When it was taken.
     since: float = field(default_factory=monotonic)
+
+    @property
+    def during(self) -> str:
+        """The activity, to be appended to a message."""
+        return f" in {self.activity}" if self.activity else ""
 
 
 @dataclass
 class _ClusterRun:
-    store: Store
+    """One sitting: the units that wait, and those that workers have."""
+
+    recorder: Recorder
     client: Client
-    options: Options
-    watcher: Watcher
     faces: int | None
     same_environment: bool
-    environment: dict[str, Any]
     topic: str = field(default_factory=lambda: f"cembench-{uuid.uuid4().hex[:12]}")
-    records: dict[str, Record] = field(default_factory=dict)
-    events: SimpleQueue[tuple[str, Any]] = field(default_factory=SimpleQueue)
-    waiting: deque[_Flight] = field(default_factory=deque)
-    flying: dict[str, _Flight] = field(default_factory=dict)
+    #: Events of workers, and assignments whose futures are done.
+    events: SimpleQueue[Mapping[str, Any] | tuple[_Assignment, Future]] = field(
+        default_factory=SimpleQueue
+    )
+    waiting: deque[_Assignment] = field(default_factory=deque)
+    #: By the keys of their units.
+    sent: dict[str, _Assignment] = field(default_factory=dict)
     state: ClusterState = field(default_factory=lambda: ClusterState(units=0))
+    #: The connected workers, and those whose software is not allowed, by their addresses.
+    workers: list[str] = field(default_factory=list)
+    refused: set[str] = field(default_factory=set)
+    #: By the addresses of workers, also of those that are lost.
     machines: dict[str, MachineState] = field(default_factory=dict)
     environments: dict[str, dict[str, Any]] = field(default_factory=dict)
-    refused: set[str] = field(default_factory=set)
-    workers: list[str] = field(default_factory=list)
+    #: When the workers were looked at, when there was one, and when the progress was saved.
     looked: float = 0.0
-    since: float = field(default_factory=monotonic)
-    #: Expected seconds of the units that are done, and what they took.
+    alone_since: float = field(default_factory=monotonic)
+    saved: float = 0.0
+    reported_alone: bool = False
+    #: The software of the last machine that is refused.
+    differing: str = ""
+    #: Expected and actual seconds of the units that are done.
     expected: float = 0.0
     taken: float = 0.0
-    saved: float = 0.0
-    told_alone: bool = False
 
-    def measure(self, tasks: Sequence[Task]) -> None:
-        asked = {task.cell.label for task in tasks}
-        pending = []
-        for task in tasks:
-            kept = kept_record(task, self.store, self.options, asked)
-            if kept is None:
-                pending.append(task)
-            else:
-                self._finish(task, kept, kept=True)
+    @property
+    def watcher(self) -> Watcher:
+        return self.recorder.watcher
+
+    def measure(self, pending: Sequence[Task]) -> None:
         if not pending:
             return
         self._look()
-        self.waiting.extend(_Flight(one) for one in self._parcels(pending))
+        self.waiting.extend(_Assignment(one) for one in self._parcels(pending))
         self.state.units = len(self.waiting)
-        rounds = next_look(0, self.options.most_rounds)
+        rounds = next_look(0, self.recorder.options.most_rounds)
         self.watcher.begins(sum(1 + (task.cell.repeats or rounds) for task in pending))
-        self.client.subscribe_topic(self.topic, self._hear)
+        self.client.subscribe_topic(self.topic, lambda event: self.events.put(event[1]))
         self._save_state(at_once=True)
-        while self.waiting or self.flying:
-            self._send()
+        while self.waiting or self.sent:
+            while self.waiting and len(self.sent) < len(self._usable()):
+                self._submit(self.waiting.popleft())
             self._handle_next()
         self._save_state(at_once=True)
 
-    def end(self) -> None:
+    def cancel(self) -> None:
         """Cancel the units that workers have; the workers notice it."""
-        futures = [flight.future for flight in self.flying.values() if flight.future is not None]
+        futures = [one.future for one in self.sent.values() if one.future is not None]
         with suppress(Exception):  # the scheduler may be gone
             self.client.unsubscribe_topic(self.topic)
         if futures and self.client.status == "running":
@@ -163,15 +163,15 @@ class _ClusterRun:
                 self.client.cancel(futures, force=True)
 
     def _parcels(self, pending: Sequence[Task]) -> list[Parcel]:
-        """Pack the units, the longest first: a long last one keeps the others waiting."""
-        token = run_folder.claim(self.store.folder).token or ""
-        if self.options.fresh or self.options.rerun_failed:
-            token += self.topic  # what an earlier run left unfinished on a machine does not count
-        groups = grouped(pending)
+        """Pack the units, the longest first: a long last one would keep the others waiting."""
+        options = self.recorder.options
+        token = run_folder.claim(self.recorder.store.folder).token or ""
+        if options.fresh or options.rerun_failed:
+            token += self.topic  # unfinished units of earlier runs are not resumed
         known: dict[str, list[Record]] = {}
-        for record in self.store.finished():
+        for record in self.recorder.store.finished():
             known.setdefault(record.cell.algorithm, []).append(record)
-        software = software_of(self.environment) if self.same_environment else {}
+        groups = grouped(pending)
         costs = [
             sum(
                 estimate(t.cell, t.facts.faces, known.get(t.cell.algorithm, ())).seconds
@@ -179,38 +179,27 @@ class _ClusterRun:
             )
             for group in groups
         ]
-        share = self.options.budget
-        if share is not None:  # of each second that is expected, so that no unit is cut more
+        share = options.budget
+        if share is not None:  # per expected second, so that all units are cut by the same factor
             share *= max(1, len(self.workers)) / sum(costs)
-        found = []
+        parcels = []
         for group, seconds in zip(groups, costs, strict=True):
-            budget = None if share is None else share * seconds
-            options = replace(self.options, budget=budget)
-            found.append(parcel(group, token, options, self.faces, software, seconds))
-        return sorted(found, key=lambda one: -one.seconds)
-
-    def _hear(self, event: tuple[Any, Mapping[str, Any]]) -> None:
-        about = event[1]
-        for one in about["events"]:
-            self.events.put(("event", {**one, "unit": about["unit"], "machine": about["machine"]}))
-
-    def _send(self) -> None:
-        """Send a unit to each worker that has none."""
-        while self.waiting and len(self.flying) < len(self._usable()):
-            self._submit(self.waiting.popleft())
+            own = replace(options, budget=None if share is None else share * seconds)
+            parcels.append(parcel(group, token, own, self.faces, seconds))
+        return sorted(parcels, key=lambda one: -one.seconds)
 
     def _usable(self) -> list[str]:
         return [worker for worker in self.workers if worker not in self.refused]
 
-    def _submit(self, flight: _Flight, worker: str | None = None) -> None:
-        one = flight.parcel
+    def _submit(self, assignment: _Assignment, worker: str | None = None) -> None:
+        one = assignment.parcel
         mesh = one.surface
-        arrays = (np.asarray(mesh.V), np.asarray(mesh.F)) if flight.sent_surface else None
-        chosen: dict[str, Any] = {}
+        arrays = (np.asarray(mesh.V), np.asarray(mesh.F)) if assignment.sends_surface else None
+        where: dict[str, Any] = {}
         if worker is not None:
-            chosen = {"workers": [worker], "allow_other_workers": not self.refused}
+            where = {"workers": [worker], "allow_other_workers": not self.refused}
         elif self.refused:
-            chosen = {"workers": self._usable()}
+            where = {"workers": self._usable()}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that the arrays are large
             future = self.client.submit(
@@ -221,239 +210,221 @@ class _ClusterRun:
                 self.topic,
                 key=f"cembench-unit-{one.unit.key}-{uuid.uuid4().hex[:6]}",
                 pure=False,
-                **chosen,
+                **where,
             )
-        flight.future = future
-        self.flying[one.unit.key] = flight
-        future.add_done_callback(lambda done: self.events.put(("done", (one.unit.key, done))))
+        assignment.future = future
+        self.sent[one.unit.key] = assignment
+        future.add_done_callback(lambda done: self.events.put((assignment, done)))
+
+    def _submit_again(self, assignment: _Assignment) -> None:
+        del self.sent[assignment.parcel.unit.key]
+        assignment.sends_surface = False
+        self.waiting.appendleft(assignment)
 
     def _handle_next(self) -> None:
-        try:
-            what, about = self.events.get(timeout=LOOK_EVERY)
-        except Empty:
-            self._look()
-            return
-        if what == "event":
-            self._event(about)
-        else:
-            key, future = about
-            flight = self.flying.get(key)
-            if flight is not None and flight.future is future:
-                self._landed(flight, future)
+        with suppress(Empty):
+            event = self.events.get(timeout=LOOK_EVERY)
+            if isinstance(event, Mapping):
+                assignment = self.sent.get(event["unit"])
+                if assignment is not None:
+                    self._handle_event(assignment, event)
+            elif event[0].future is event[1]:
+                self._handle_end(*event)
         if monotonic() - self.looked > LOOK_EVERY:
             self._look()
 
     def _look(self) -> None:
-        """Find the connected workers; raise if the scheduler cannot be reached."""
+        """Update the connected workers, and describe the new ones.
+
+        Raises
+        ------
+        ClusterError
+            The scheduler cannot be reached, or no worker is left that can measure.
+
+        """
         self.looked = monotonic()
         if self.client.status != "running":
-            raise self._gone()
+            raise self._scheduler_gone()
         try:
-            found = sorted(self.client.nthreads())
-        except (OSError, TimeoutError) as error:
-            raise self._gone() from error
-        if found != self.workers:
-            for worker in set(self.workers) - set(found):
-                if worker in self.machines:
-                    self.machines[worker].lost = True
-            self.workers = found
-            names = [self.machines[w].machine if w in self.machines else w for w in found]
-            self.watcher.machines(names)
-        if found:
-            self.since = self.looked
-        elif isinstance(self.client.cluster, LocalCluster) and (
-            self.looked - self.since > LOCAL_PATIENCE
-        ):
-            raise ClusterError(
-                f"all workers of this machine are gone, and none was started again within "
-                f"{LOCAL_PATIENCE:g} s; {len(self.records)} finished cells are in "
-                f"{self.store.folder}. See whether its memory suffices; the same command goes on."
+            connected = sorted(self.client.nthreads())
+            new = [worker for worker in connected if worker not in self.environments]
+            described = (
+                self.client.run(describe_worker, workers=new, on_error="ignore") if new else {}
             )
-        elif self.looked - self.since > _PATIENCE and not self.told_alone:
-            self.told_alone = True
-            self.watcher.shows("no worker is there yet; waiting for one")
+        except (OSError, TimeoutError) as error:
+            raise self._scheduler_gone() from error
+        for worker, environment in described.items():
+            self._add_worker(worker, environment)
+        connected = [worker for worker in connected if worker in self.environments]
+        if connected != self.workers:
+            for worker in set(self.workers) - set(connected):
+                self.machines[worker].lost = True
+            self.workers = connected
+            self.watcher.machines([self._machine_of(worker) for worker in connected])
+        if connected and not self._usable():
+            raise ClusterError(
+                f"no worker has the software of this machine ({self.differing}). Install the same "
+                "on the workers, or leave out --same-environment."
+            )
+        if connected:
+            self.alone_since = self.looked
+        alone = self.looked - self.alone_since
+        if isinstance(self.client.cluster, LocalCluster) and alone > LOCAL_PATIENCE:
+            raise ClusterError(
+                f"all workers of this machine are gone, and none was restarted within "
+                f"{LOCAL_PATIENCE:g} s; {self._saved_cells()}. Check whether the memory suffices; "
+                "the same command goes on."
+            )
+        if alone > _PATIENCE and not self.reported_alone:
+            self.reported_alone = True
+            self.watcher.shows("no worker is connected yet; waiting for one")
         self._save_state()
 
-    def _gone(self) -> ClusterError:
-        left = len(self.waiting) + len(self.flying)
+    def _add_worker(self, worker: str, environment: dict[str, Any]) -> None:
+        """Note a new worker; show once a machine if its software differs from the client's."""
+        machine = environment["machine"]
+        others = differences(self.recorder.environment, environment)
+        is_new = all(state.machine != machine for state in self.machines.values())
+        self.machines[worker] = MachineState(machine=machine)
+        self.environments[worker] = environment
+        if not others:
+            return
+        text = "; ".join(others)
+        if self.same_environment:
+            self.refused.add(worker)
+            self.differing = f"{machine}: {text}"
+            self.watcher.shows(f"{machine} measures nothing: its software differs: {text}")
+        elif is_new:
+            self.watcher.shows(f"{machine} has other software: {text}")
+
+    def _machine_of(self, worker: str) -> str:
+        return self.machines[worker].machine
+
+    def _saved_cells(self) -> str:
+        return f"{len(self.recorder.records)} finished cells are in {self.recorder.store.folder}"
+
+    def _scheduler_gone(self) -> ClusterError:
+        left = len(self.waiting) + len(self.sent)
         return ClusterError(
-            f"the scheduler is gone; {len(self.records)} finished cells are in "
-            f"{self.store.folder}, {left} surfaces are left. Start a scheduler and workers; the "
-            "same command goes on."
+            f"the scheduler is gone; {self._saved_cells()}, {left} surfaces are left. Start a "
+            "scheduler and workers; the same command goes on."
         )
 
-    def _event(self, about: Mapping[str, Any]) -> None:
-        flight = self.flying.get(about["unit"])
-        if flight is None:
-            return
-        if about["what"] == "takes":
-            self._taken(flight, about["worker"], about["machine"])
-            return
-        task = flight.parcel.by_label.get(about.get("cell", ""))
-        if about["what"] == "began":
-            self._known(about["machine"], json.loads(about["environment"]))
-        elif about["what"] == "queues":
-            flight.doing = "waits for another worker of its machine"
-        elif task is None:
-            return
-        elif about["what"] == "adds_rounds":
-            self.watcher.adds_rounds(task, about["rounds"])
-        else:
-            step = Step(**about["step"])
-            flight.doing = f"{step} of {task.cell.algorithm}"
-            if about["what"] == "starts":
+    def _handle_event(self, assignment: _Assignment, event: Mapping[str, Any]) -> None:
+        """Show the progress of a unit."""
+        task = assignment.parcel.by_label.get(event.get("cell", ""))
+        if event["what"] == "takes":
+            self._handle_taken(assignment, event["worker"])
+        elif event["what"] == "queues":
+            assignment.activity = "waits for another worker of its machine"
+        elif task is not None and event["what"] == "adds_rounds":
+            self.watcher.adds_rounds(task, event["rounds"])
+        elif task is not None:
+            step = Step(**event["step"])
+            assignment.activity = f"{step} of {task.cell.algorithm}"
+            if event["what"] == "starts":
                 self.watcher.starts(task, step)
             else:
-                self.watcher.ends(task, step, about["seconds"])
-        if flight.takers and flight.takers[-1] in self.machines:
-            where = f"{flight.parcel.unit.mesh}: {flight.doing}" if flight.doing else ""
-            self.machines[flight.takers[-1]].at = where or flight.parcel.unit.mesh
+                self.watcher.ends(task, step, event["seconds"])
+        if event["worker"] in self.machines:
+            mesh = assignment.parcel.unit.mesh
+            activity = f"{mesh}: {assignment.activity}" if assignment.activity else mesh
+            self.machines[event["worker"]].at = activity
 
-    def _known(self, machine: str, environment: dict[str, Any]) -> None:
-        """Report once if the software of a machine differs from ours."""
-        told = differences(self.environment, environment)
-        if told and machine not in self.environments:
-            self.watcher.shows(f"{machine} has other software: {'; '.join(told)}")
-        self.environments[machine] = environment
-
-    def _taken(self, flight: _Flight, worker: str, machine: str) -> None:
-        """Record who measures a unit; give up a unit that has ended too many workers."""
-        flight.takers.append(worker)
-        flight.since = monotonic()
-        self.machines.setdefault(worker, MachineState(machine=machine))
-        if len(flight.takers) > 1:
-            self._tell_again(flight, machine)
-        flight.machine = machine
-        if len(flight.takers) + flight.ended > MOST_LOST and flight.future is not None:
-            future, flight.future = flight.future, None
+    def _handle_taken(self, assignment: _Assignment, worker: str) -> None:
+        """Note which worker measures a unit; give up a unit that has ended too many workers."""
+        unit = assignment.parcel.unit
+        if assignment.workers:
+            self.watcher.shows(
+                f"{unit.mesh} ({unit.cells[0].solves}) is measured again on "
+                f"{self._machine_of(worker)}: the worker on "
+                f"{self._machine_of(assignment.workers[-1])} was lost{assignment.during}"
+            )
+        assignment.workers.append(worker)
+        assignment.since = monotonic()
+        if len(assignment.workers) > MOST_LOST and assignment.future is not None:
+            future, assignment.future = assignment.future, None
             with suppress(Exception):
                 self.client.cancel([future], force=True)
-            self._give_up(flight)
+            self._give_up(assignment)
 
-    def _tell_again(self, flight: _Flight, machine: str) -> None:
-        unit = flight.parcel.unit
-        self.watcher.shows(
-            f"{unit.mesh} ({unit.cells[0].solves}) is measured again on {machine}: the worker on "
-            f"{flight.machine} was lost{f' in {flight.doing}' if flight.doing else ''}"
-        )
-
-    def _landed(self, flight: _Flight, future: Future) -> None:
+    def _handle_end(self, assignment: _Assignment, future: Future) -> None:
         if future.status == "finished":
-            self._take(flight, future.result())
+            self._handle_answer(assignment, future.result())
         elif future.status in ("cancelled", "lost"):
             if self.client.status != "running":
-                raise self._gone()
-            self._send_again(flight)
+                raise self._scheduler_gone()
+            self._submit_again(assignment)
+        elif isinstance(error := future.exception(), KilledWorker):
+            self._give_up(assignment)
         else:
-            error = future.exception()
-            if isinstance(error, KilledWorker):
-                self._give_up(flight)
-            elif isinstance(error, MeasurerGoneError):
-                flight.ended += 1
-                if flight.ended >= MOST_LOST:
-                    self._give_up(flight)
-                else:
-                    self.watcher.shows(f"{flight.parcel.unit.mesh} is measured again: {error}")
-                    flight.takers.clear()
-                    self._send_again(flight)
-            else:
-                where = f" on {flight.machine}" if flight.machine else ""
-                mesh = flight.parcel.unit.mesh
-                raise ClusterError(f"{mesh} cannot be measured{where}: {error}") from error
+            mesh, workers = assignment.parcel.unit.mesh, assignment.workers
+            where = f" on {self._machine_of(workers[-1])}" if workers else ""
+            raise ClusterError(f"{mesh} cannot be measured{where}: {error}") from error
 
-    def _send_again(self, flight: _Flight) -> None:
-        del self.flying[flight.parcel.unit.key]
-        flight.sent_surface = False
-        self.waiting.appendleft(flight)
-
-    def _take(self, flight: _Flight, answer: Answer) -> None:
-        """Save the records of a unit, or send what its worker asks for."""
-        unit = flight.parcel.unit
-        state = self.machines.setdefault(answer.address, MachineState(machine=answer.machine))
-        state.machine, state.at = answer.machine, ""
+    def _handle_answer(self, assignment: _Assignment, answer: Answer) -> None:
+        """Save the records of a unit, or send it again with its surface."""
         if answer.lacks_surface:
-            flight.sent_surface = True
-            self._submit(flight, answer.address)
+            assignment.sends_surface = True
+            self._submit(assignment, answer.worker)
             return
-        if answer.refused:
-            self._refuse(flight, answer)
-            return
-        tasks = {task.cell.key: task for task in flight.parcel.tasks}
-        for signed, uv in answer.records:
+        state = self.machines[answer.worker]
+        state.at = ""
+        tasks = {task.cell.key: task for task in assignment.parcel.tasks}
+        for content, uv in answer.records:
             try:
-                record = Record.model_validate_json(signed)
+                record = Record.model_validate_json(content)
             except ValidationError as error:
-                why = f"{answer.machine} sent a record that cannot be read"
+                why = f"{state.machine} sent a record that cannot be read"
                 raise ClusterError(f"{why}: {error.errors()[0]['msg']}.") from error
             task = tasks.pop(record.cell.key, None)
-            environment = (answer.environments or {}).get(record.environment)
+            environment = answer.environments.get(record.environment)
             if task is not None and environment is not None:
-                self.store.save(record, uv, environment)
-                self._finish(task, record, kept=False)
+                self.recorder.save(task, record, uv, environment)
         if tasks:
-            raise ClusterError(f"{answer.machine} sent no record of {len(tasks)} cells; run again.")
-        del self.flying[unit.key]
+            raise ClusterError(f"{state.machine} sent no record of {len(tasks)} cells; run again.")
         state.units += 1
-        self._done(flight)
+        self._count(assignment)
+        key = assignment.parcel.unit.key
         with suppress(Exception):  # it is deleted after some days anyway
-            self.client.run(forget, [unit.key], workers=[answer.address], wait=False)
+            self.client.run(forget, key, workers=[answer.worker], wait=False)
 
-    def _done(self, flight: _Flight) -> None:
+    def _give_up(self, assignment: _Assignment) -> None:
+        """Record the cells of a unit that ended its workers as failed."""
+        last = assignment.workers[-1] if assignment.workers else None
+        machine = self._machine_of(last) if last else "a machine of the cluster"
+        environment = self.environments[last] if last else self.recorder.environment
+        detail = (
+            f"its surface ended {MOST_LOST} workers that measured it, the last on "
+            f"{machine}{assignment.during}"
+        )
+        outcome = not_ok("failed", Fault(kind=FaultKind.WORKERS_LOST, detail=detail))
+        for task in assignment.parcel.tasks:
+            record = record_of(task, outcome, environment["id"], now())
+            self.recorder.save(task, record, None, environment)
+        self._count(assignment)
+
+    def _count(self, assignment: _Assignment) -> None:
+        """Count a unit as done."""
+        self.sent.pop(assignment.parcel.unit.key, None)
         self.state.done += 1
-        self.expected += flight.parcel.seconds
-        self.taken += monotonic() - flight.since
+        self.expected += assignment.parcel.seconds
+        self.taken += monotonic() - assignment.since
         self._save_state(at_once=True)
 
     def _seconds_left(self) -> float | None:
-        """Return the ratio of the actual to the expected seconds of the finished units."""
+        """Return the estimated seconds left, by what finished units took; None before the first."""
         if not self.expected or not self.workers:
             return None
         slower = self.taken / self.expected
         left = [slower * one.parcel.seconds for one in self.waiting]
-        now = monotonic()
-        left += [
-            max(0.0, slower * one.parcel.seconds - (now - one.since))
-            for one in self.flying.values()
-        ]
-        names = {self.machines[w].machine if w in self.machines else w for w in self._usable()}
-        return makespan(left, max(1, len(names)))
+        for one in self.sent.values():
+            left.append(max(0.0, slower * one.parcel.seconds - (monotonic() - one.since)))
+        return makespan(left, max(1, len({self._machine_of(w) for w in self._usable()})))
 
     def _save_state(self, *, at_once: bool = False) -> None:
         if at_once or monotonic() - self.saved > STATE_EVERY:
             self.saved = monotonic()
             self.state.machines = list(self.machines.values())
             self.state.seconds_left = self._seconds_left()
-            save_state(self.store.folder, self.state)
-
-    def _refuse(self, flight: _Flight, answer: Answer) -> None:
-        self.refused.add(answer.address)
-        told = f"{answer.machine} measures nothing: its software differs: {answer.refused}"
-        self.watcher.shows(told)
-        flight.takers.clear()
-        self._send_again(flight)
-        if not self._usable():
-            raise ClusterError(
-                f"no worker has the software of this machine ({answer.machine}: {answer.refused}). "
-                "Install the same on the workers, or leave out --same-environment."
-            )
-
-    def _give_up(self, flight: _Flight) -> None:
-        """Record the cells of a unit that ends every worker as failed."""
-        machine = flight.machine or "a machine of the cluster"
-        told = (
-            f"its surface ended {MOST_LOST} workers that measured it, the last on {machine}"
-            f"{f' in {flight.doing}' if flight.doing else ''}"
-        )
-        fault = Fault(kind=FaultKind.WORKERS_LOST, detail=told)
-        environment = self.environments.get(flight.machine, self.environment)
-        now = datetime.now(UTC).isoformat(timespec="seconds")
-        for task in flight.parcel.tasks:
-            record = record_of(task, not_ok("failed", fault), environment["id"], now)
-            self.store.save(record, None, environment)
-            self._finish(task, record, kept=False)
-        self.flying.pop(flight.parcel.unit.key, None)
-        self._done(flight)
-
-    def _finish(self, task: Task, record: Record, *, kept: bool) -> None:
-        self.records[task.cell.label] = record
-        self.watcher.finished(task, record, kept=kept)
+            save_state(self.recorder.store.folder, self.state)

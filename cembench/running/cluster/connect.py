@@ -1,8 +1,8 @@
 """Connect to the cluster that ``--cluster`` names: local workers, a scheduler, or Slurm.
 
-Whoever may talk to a scheduler or worker of dask runs code as the user who started it. So all that
-is started here talks through TLS with certificates made for the one run, and its pages are for this
-machine alone.
+Anybody who can connect to a scheduler or worker of dask can run code as the user who started it. So
+everything that is started here uses TLS with certificates made for the one run, and its web pages
+are served to this machine only.
 """
 
 from __future__ import annotations
@@ -22,33 +22,33 @@ from cembench.running.cluster.host import place
 if TYPE_CHECKING:
     from distributed import Client
 
-#: Seconds in which a scheduler has to answer.
+#: Seconds after which an attempt to reach a scheduler is given up.
 CONNECT_SECONDS = 15
-#: Where schedulers and workers show their pages, which ask for no certificate.
+#: Address of the web pages of schedulers and workers, which ask for no certificate.
 _PAGES = "127.0.0.1:0"
-#: Variables of dask that name the certificates of a scheduler that somebody else started.
+#: Variables of dask for the certificates of a scheduler that the user started.
 TLS_VARIABLES = tuple(
     f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__KEY", "CLIENT__CERT")
 )
-#: The modules that each kind of place needs.
+#: The modules that each kind of cluster needs.
 MODULES: Mapping[str, tuple[str, ...]] = {
     "address": ("dask", "distributed"),
     "local": ("dask", "distributed", "cryptography"),
     "slurm": ("dask", "distributed", "cryptography", "dask_jobqueue"),
 }
-#: What ``slurm:`` takes: name, default (None: required), and what it means.
+#: The settings of ``slurm:``: name, default (None: required), and meaning.
 SLURM = {
-    "partition": (None, "the partition (queue)"),
-    "cores": (None, "cores of a machine"),
-    "memory": ("4GB", "memory of a job, as 60GB"),
-    "machines": ("1", "how many jobs at a time, one a machine"),
-    "walltime": ("12:00:00", "hours:minutes:seconds of a job"),
-    "account": ("", "who pays"),
-    "exclusive": ("yes", "yes: nobody else is on the machine; no"),
-    "interface": ("", "the network, as ib0"),
+    "partition": (None, "partition (queue)"),
+    "cores": (None, "cores per machine"),
+    "memory": ("4GB", "memory per job, e.g. 60GB"),
+    "machines": ("1", "number of jobs at a time, one per machine"),
+    "walltime": ("12:00:00", "time limit of a job, hours:minutes:seconds"),
+    "account": ("", "account to charge"),
+    "exclusive": ("yes", "yes or no: exclusive nodes"),
+    "interface": ("", "network interface, e.g. ib0"),
 }
-#: Dask's own watch over its workers, which would take time from what they measure: the names of
-#: its configuration, and what is set. docs/cluster.md has them for workers that users start.
+#: Settings of dask that switch off its profiling of workers, which would disturb measurements.
+#: docs/cluster.md has them for workers that users start.
 QUIET = {"distributed.worker.profile.enabled": False, "distributed.admin.tick.interval": "1s"}
 _LOCAL = re.compile(r"local:([1-9]\d{0,2})")
 _ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
@@ -56,7 +56,7 @@ _ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
 
 @dataclass(frozen=True)
 class ClusterPlace:
-    """The location of the workers, as given by ``--cluster``."""
+    """A cluster, as named by ``--cluster``."""
 
     #: "local", "address" or "slurm".
     kind: str
@@ -66,7 +66,7 @@ class ClusterPlace:
 
     @property
     def is_open(self) -> bool:
-        """Whether anybody who reaches its port can run code there."""
+        """Whether anybody who can connect to its port can run code there."""
         return self.address.startswith("tcp:")
 
 
@@ -95,40 +95,43 @@ def parse_cluster(text: str) -> ClusterPlace:
         return ClusterPlace("slurm", settings=_settings(rest))
     raise ParameterError(
         f"--cluster {text!r} is not allowed; write local:4 (workers on this machine), "
-        "tls://HOST:8786 or tcp://HOST:8786 (a scheduler that runs), or "
+        "tls://HOST:8786 or tcp://HOST:8786 (a running scheduler), or "
         "slurm:partition=cpu,cores=16,machines=10."
     )
 
 
 def _settings(text: str) -> dict[str, str]:
-    found: dict[str, str] = {}
+    settings: dict[str, str] = {}
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals or name not in SLURM or not value:
             raise ParameterError(f"--cluster slurm: {part!r} is not allowed; {_allowed()}")
-        found[name] = value
-    missing = [name for name, (usual, _) in SLURM.items() if usual is None and name not in found]
+        settings[name] = value
+    missing = [name for name, (usual, _) in SLURM.items() if usual is None and name not in settings]
     if missing:
         raise ParameterError(f"--cluster slurm: {missing[0]} is missing; {_allowed()}")
-    found = {name: found.get(name, usual or "") for name, (usual, _) in SLURM.items()}
+    settings = {name: settings.get(name, usual or "") for name, (usual, _) in SLURM.items()}
     for name in ("cores", "machines"):
-        if not re.fullmatch(r"[1-9]\d{0,4}", found[name]):
+        if not re.fullmatch(r"[1-9]\d{0,4}", settings[name]):
             raise ParameterError(
-                f"--cluster slurm: {name}={found[name]} is no whole number above 0; {_allowed()}"
+                f"--cluster slurm: {name}={settings[name]} is not a positive whole number; "
+                f"{_allowed()}"
             )
-    if found["exclusive"] not in ("yes", "no"):
-        raise ParameterError(f"--cluster slurm: exclusive is yes or no; {_allowed()}")
-    return found
+    if settings["exclusive"] not in ("yes", "no"):
+        raise ParameterError(
+            f"--cluster slurm: exclusive={settings['exclusive']} is not allowed; {_allowed()}"
+        )
+    return settings
 
 
 def _allowed() -> str:
-    told = "; ".join(f"{name}: {words}" for name, (_, words) in SLURM.items())
-    return f"name=value with commas between. {told}."
+    meanings = "; ".join(f"{name}: {meaning}" for name, (_, meaning) in SLURM.items())
+    return f"write name=value, separated by commas. {meanings}."
 
 
 @contextmanager
 def connected(where: ClusterPlace) -> Iterator[Client]:
-    """Yield a client; workers that it started end with it.
+    """Yield a client; workers that are started here end with it.
 
     Raises
     ------
@@ -145,7 +148,7 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
     if where.kind == "address":
         try:
             client = Client(where.address, timeout=CONNECT_SECONDS, set_as_default=False)
-        except (TypeError, RuntimeError) as error:  # dask's for certificates that are missing
+        except (TypeError, RuntimeError) as error:  # raised by dask if certificates are missing
             raise ClusterError(
                 f"{where.address} cannot be reached through TLS: {error}. Set "
                 f"{', '.join(TLS_VARIABLES)} to the files of the certificates."
@@ -158,7 +161,7 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
         with client:
             yield client
         return
-    # The first worker that a unit ends may be bad luck, the second is the unit's.
+    # The first worker that is lost with a unit may be a coincidence; the second is its fault.
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1, **QUIET}),
         _local(where) if where.kind == "local" else _slurm(where) as cluster,
@@ -168,7 +171,7 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
 
 
 def quiet_variables() -> dict[str, str]:
-    """Return what is set by :data:`QUIET`, as variables for workers that are started elsewhere."""
+    """Return :data:`QUIET` as environment variables, for workers that are started elsewhere."""
     return {
         f"DASK_{name.upper().replace('-', '_').replace('.', '__')}": str(value)
         for name, value in QUIET.items()

@@ -17,12 +17,12 @@ Seconds = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class MachineState(BaseModel):
-    """A worker and the unit that it measures."""
+    """A worker, the number of units it measured, and its current activity."""
 
     machine: Printable
     units: Count = 0
     lost: bool = False
-    #: The surface and policy that it measures, and the process that it last told of.
+    #: The surface that it measures, and the last process that it reported.
     at: Printable = ""
 
 

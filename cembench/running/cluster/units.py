@@ -1,12 +1,13 @@
-"""Units of work for a machine: one surface under one policy, with its algorithms and rounds.
+"""Units of work: one surface under one policy, with all its algorithms and rounds.
 
-So every ratio is formed of seconds from one machine and one sitting.
+A unit is measured by one machine, so the seconds of every ratio are from one machine and sitting.
 """
 
 from __future__ import annotations
 
 import hashlib
 import heapq
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -20,10 +21,10 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import COMMAND
 from cembench.results.comparison import circumstances
 from cembench.results.records import Cell, MeshFacts
-from cembench.running.local import Options
+from cembench.running.options import Options
 from cembench.running.plan import Task
 
-#: Files of plug-ins: by the plug-in as it was named, their content by relative path.
+#: The files of plug-ins, by the name of the plug-in: their content by relative path.
 PluginFiles = dict[str, dict[str, bytes]]
 
 
@@ -32,28 +33,26 @@ class Unit(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    #: Of the run's folder: two runs never share what a worker keeps of an unfinished unit.
+    #: The token of the run's folder: two runs never resume each other's unfinished units.
     token: str
     cells: tuple[Cell, ...]
     mesh_type: str
     notices: tuple[Notice, ...]
     facts: MeshFacts
-    #: How many triangles a registered surface was asked for; None: its usual number.
+    #: Requested number of triangles of a registered surface; None: its default.
     faces: int | None = None
     plugins: tuple[str, ...] = ()
     options: dict[str, Any] = {}
-    #: What a machine has to have in common with the client; empty: nothing.
-    software: dict[str, Any] = {}
 
     @property
     def key(self) -> str:
-        """Hash of what is measured and for which run, not of how its cells are gone about.
+        """Hash of the measured content and the run; settings such as the budget are excluded.
 
-        So what a worker keeps of an unfinished unit counts when the run goes on with another
-        budget, or with more machines to share it.
+        So a worker resumes an unfinished unit of a run that goes on with another budget, or with
+        more machines to share it.
         """
-        what = self.model_dump_json(include={"token", "cells", "mesh_type"})
-        return hashlib.sha256(what.encode()).hexdigest()[:24]
+        content = self.model_dump_json(include={"token", "cells", "mesh_type"})
+        return hashlib.sha256(content.encode()).hexdigest()[:24]
 
     @property
     def mesh(self) -> str:
@@ -92,10 +91,10 @@ class Parcel:
 
 def grouped(tasks: Sequence[Task]) -> list[list[Task]]:
     """Return the tasks of each unit: same surface, policy, back end and threads, in order."""
-    found: dict[tuple[str, str], list[Task]] = {}
+    groups: dict[tuple[str, str], list[Task]] = {}
     for task in tasks:
-        found.setdefault((circumstances(task.cell), task.cell.mesh), []).append(task)
-    return list(found.values())
+        groups.setdefault((circumstances(task.cell), task.cell.mesh), []).append(task)
+    return list(groups.values())
 
 
 def parcel(
@@ -103,7 +102,6 @@ def parcel(
     token: str,
     options: Options,
     faces: int | None = None,
-    software: dict[str, Any] | None = None,
     seconds: float = 0.0,
 ) -> Parcel:
     """Pack the tasks of one unit."""
@@ -117,17 +115,16 @@ def parcel(
         facts=first.facts,
         faces=faces,
         plugins=plugins,
-        # The worker's folder holds nothing of before, unless it is to be gone on from.
+        # The worker's folder is empty unless the unit is resumed.
         options=asdict(replace(options, fresh=False, rerun_failed=False)),
-        software=software or {},
     )
     return Parcel(unit, tuple(tasks), files, seconds)
 
 
 def _plugins(tasks: Sequence[Task]) -> tuple[tuple[str, ...], PluginFiles]:
-    """Return the plug-ins that these tasks need, and the files of those.
+    """Return the names of the plug-ins that these tasks need, and the files of those.
 
-    A module, or a program's command line, has to be on the workers: only its name travels.
+    A module, or the program of a command line, has to be on the workers: only its name is sent.
     """
     named: list[str] = []
     files: PluginFiles = {}
@@ -150,7 +147,7 @@ def _declares(plugin: Path, task: Task) -> bool:
 
 
 def makespan(seconds: Sequence[float], machines: int) -> float:
-    """Return the seconds that `machines` machines take for all units, the longest first.
+    """Return the seconds that `machines` machines take for all units, longest first.
 
     >>> makespan([3.0, 2.0, 2.0], 2)
     4.0
@@ -162,19 +159,14 @@ def makespan(seconds: Sequence[float], machines: int) -> float:
 
 
 def most_useful(seconds: Sequence[float]) -> int:
-    """Return how many machines are of use at most: with them, the longest unit takes as long.
+    """Return the number of machines beyond which the run takes as long as its longest unit.
 
-    One per cent is no matter.
+    Differences below 1 % are ignored.
 
     >>> most_useful([3.0, 2.0, 1.0])
     2
     """
-    enough, longest = len(seconds), max(seconds, default=0.0)
-    fewest = 1
-    while fewest < enough:
-        tried = (fewest + enough) // 2
-        if makespan(seconds, tried) > 1.01 * longest:
-            fewest = tried + 1
-        else:
-            enough = tried
-    return enough
+    longest = max(seconds, default=0.0)
+    numbers = range(1, len(seconds))
+    enough = bisect_left(numbers, True, key=lambda n: makespan(seconds, n) <= 1.01 * longest)
+    return min(len(seconds), 1 + enough)

@@ -1,67 +1,68 @@
-"""A dask worker: it measures a unit in a separate process and returns the records."""
+"""Measure units in a dask worker, and return their records.
+
+A worker does what :func:`~cembench.running.local.run_tasks` does on one machine: algorithms are
+called in processes of their own, which end with the worker. A thread looks whether the client still
+waits for the unit, and stops the process that runs if it does not.
+"""
 
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import signal
-import subprocess
-import sys
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass
-from math import inf
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
-from queue import Empty, SimpleQueue
-from time import monotonic
-from typing import IO, Any
+from typing import Any
 
 import dask
 import numpy as np
+import psutil
 from distributed import get_worker
 from numpy.typing import NDArray
 
-from cembench.core.atomic import write_bytes, write_text
+from cembench.core.atomic import write_bytes
 from cembench.core.errors import CembenchError, ClusterError
 from cembench.core.loading import is_there, read_bytes
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import load_registry
+from cembench.registry import Algorithm, load_algorithm, load_registry
+from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster import host
-from cembench.running.cluster.measure import RUN, UNIT
 from cembench.running.cluster.units import PluginFiles, Unit
-from cembench.running.environment import machine_name
+from cembench.running.environment import describe_environment, machine_name, usable_cores
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
+from cembench.running.plan import Task
+from cembench.running.sources import hash_of, sources_of
 from cembench.running.surfaces import generate_surface
+from cembench.running.timing import CellTimer
+from cembench.running.watcher import Step, Watcher
+from cembench.running.worker import MESH_TYPES
 
-#: Seconds between two looks whether anybody still wants the unit.
 LOOK_EVERY = 1.0
-#: Seconds between two messages of what happens: what comes between them travels together.
-TELL_EVERY = 0.05
-#: A record's file, and its map.
-Found = tuple[bytes, NDArray[np.complex128] | None]
-
-#: Takes what happened since it was last called.
-Tell = Callable[[Sequence[Mapping[str, Any]]], None]
-#: What a process tells last of a unit.
-_ENDS = ("done", "refused", "failed", "gone")
-
-_one_unit = threading.Lock()
+#: The folder of the unit's own run, in the unit's folder.
+RUN = "run"
+#: Sends an event to the client.
+Send = Callable[[Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The records of a unit, or the reason why this machine does not measure it."""
+    """The records of a unit, or that the worker needs its surface."""
 
-    machine: str
-    address: str
-    records: tuple[Found, ...] = ()
-    environments: Mapping[str, dict[str, Any]] | None = None
-    #: The surface is not here and cannot be generated: send the unit again, with it.
+    #: The address of the worker.
+    worker: str
+    #: The files of the records, each with its map.
+    records: Sequence[tuple[bytes, NDArray[np.complex128] | None]] = ()
+    #: By their ids.
+    environments: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    #: The worker cannot generate the surface; send the unit again, with it.
     lacks_surface: bool = False
-    #: In what the software differs, where it must not.
-    refused: str = ""
 
 
 def dask_setup(worker: Any) -> None:
@@ -72,86 +73,193 @@ def dask_setup(worker: Any) -> None:
 def measure_unit(
     text: str, plugins: PluginFiles, surface: host.Arrays | None, topic: str
 ) -> Answer:
-    """Measure a unit; a worker has one at a time. Events go to the topic.
+    """Measure a unit, given as JSON, and send events to the topic; run by a dask worker.
 
     Raises
     ------
     ClusterError
-        It cannot be measured here, whatever is sent; or nobody wants it any more.
+        This machine cannot measure the unit, or the unit was cancelled.
 
     """
     worker = get_worker()
     key = worker.get_current_task()
-
-    def tell(events: Sequence[Mapping[str, Any]]) -> None:
-        about = {"unit": unit_key, "machine": machine_name(), "events": list(events)}
-        worker.log_event(topic, about)
 
     def is_wanted() -> bool:
         state = worker.state.tasks.get(key)
         return state is not None and state.state in ("executing", "long-running")
 
     unit = Unit.model_validate_json(text)
-    unit_key = unit.key
-    with _one_unit:
-        about = (machine_name(), worker.address)
+    origin = {"unit": unit.key, "worker": worker.address}
+    forwarder = Forwarder(lambda event: worker.log_event(topic, {**origin, **event}))
+    _unset_dask_variables()
+    with _cancelling(forwarder.cancelled, is_wanted), host.machine_lock(forwarder.waits):
         host.clear_old()
-        if not _has_surface(unit, surface):
-            return Answer(*about, lacks_surface=True)
-        folder = host.unit_folder(unit_key)
-        placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
-        write_text(folder / UNIT, placed.model_dump_json())
-        tell([{"what": "takes", "worker": worker.address}])
-        refused = _measurer().measure(unit_key, tell, is_wanted)
-        if refused:
-            return Answer(*about, refused=refused)
-        store = Store(folder / RUN)
-        return Answer(*about, _found(store, unit), store.environments())
+        try:
+            mesh = surface_of(unit, surface)
+            if mesh is None:
+                return Answer(worker.address, lacks_surface=True)
+            forwarder.send({"what": "takes"})
+            placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
+            store = Store(host.unit_folder(unit.key) / RUN)
+            measure(placed, mesh, store, forwarder)
+        except CembenchError:
+            raise
+        except Exception:  # perhaps of a class that the client cannot unpickle
+            raise ClusterError(traceback.format_exc()) from None
+        files = [(cell, store.record_file(cell)) for cell in unit.cells]
+        records = [(read_bytes(file), store.uv(cell)) for cell, file in files if is_there(file)]
+        return Answer(worker.address, records, store.environments())
 
 
-async def forget(keys: list[str]) -> None:
-    """Delete the files of units whose records the client has; the result is not awaited."""
-    host.forget_units(keys)
+def describe_worker() -> dict[str, Any]:
+    """Return the environment of this worker, with the libraries loaded that measure."""
+    return describe_environment()
 
 
-def _found(store: Store, unit: Unit) -> tuple[Found, ...]:
-    """Return the records of a unit as they lie on disk, with their maps."""
-    files = [(cell, store.record_file(cell)) for cell in unit.cells]
-    return tuple((read_bytes(file), store.uv(cell)) for cell, file in files if is_there(file))
+async def forget(key: str) -> None:
+    """Delete the files of a unit whose records the client has."""
+    host.forget_unit(key)
 
 
-def _has_surface(unit: Unit, sent: host.Arrays | None) -> bool:
-    """Make the surface available: stored before, sent, or generated."""
-    if host.kept_surface(unit.mesh_hash) is not None:
-        return True
-    arrays = sent or _generated(unit)
-    if arrays is not None:
-        host.keep_surface(unit.mesh_hash, arrays)
-    return arrays is not None
+class Forwarder(Watcher):
+    """Forwards the progress of a unit to the client, until the unit is cancelled."""
+
+    def __init__(self, send: Send) -> None:
+        self.send = send
+        self.cancelled = threading.Event()
+
+    def waits(self) -> None:
+        """Forward that another worker of the machine measures; called every second."""
+        self._forward({"what": "queues"})
+
+    def adds_rounds(self, task: Task, rounds: int) -> None:
+        """Forward the event to the client."""
+        self._forward({"what": "adds_rounds", "cell": task.cell.label, "rounds": rounds})
+
+    def starts(self, task: Task, step: Step) -> None:
+        """Forward the event to the client."""
+        self._forward({"what": "starts", "cell": task.cell.label, "step": vars(step)})
+
+    def ends(self, task: Task, step: Step, seconds: float) -> None:
+        """Forward the event; of a cancelled unit nothing is saved that was stopped."""
+        about = {"cell": task.cell.label, "step": vars(step), "seconds": seconds}
+        self._forward({"what": "ends", **about})
+
+    def _forward(self, event: Mapping[str, Any]) -> None:
+        if self.cancelled.is_set():
+            raise ClusterError("the unit was cancelled: its client does not wait for it any more.")
+        self.send(event)
+
+
+@contextmanager
+def _cancelling(cancelled: threading.Event, is_wanted: Callable[[], bool]) -> Iterator[None]:
+    """Set the event as soon as nobody waits for the unit that is measured in this block."""
+    ended = threading.Event()
+
+    def look() -> None:
+        while not ended.wait(LOOK_EVERY):
+            if not is_wanted():
+                cancelled.set()
+                return
+
+    thread = threading.Thread(target=look, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        thread.join()
+
+
+def measure(unit: Unit, mesh: TriangleMesh, store: Store, forwarder: Forwarder) -> list[Record]:
+    """Measure a unit, or resume it if the store has a part of it; return its records.
+
+    Raises
+    ------
+    ClusterError
+        The machine has other code than the client, or the unit was cancelled.
+
+    """
+    tasks = []
+    for cell in unit.cells:
+        algorithm = _algorithm(cell.algorithm, unit.plugins)
+        sources = sources_of(algorithm)
+        if hash_of(sources) != cell.code_hash:
+            raise ClusterError(
+                f"{cell.algorithm} has other code on {machine_name()} than on the client: "
+                f"{', '.join(sources)} differ. Install the same version of cembench and of "
+                "plug-ins on all machines."
+            )
+        tasks.append(Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources))
+
+    def timer(scratch: Path, options: Options) -> CellTimer:
+        return CellTimer(scratch, options, stopped=forwarder.cancelled)
+
+    return run_tasks(tasks, store, _options(unit), forwarder, timer)
+
+
+@cache
+def _algorithm(name: str, plugins: tuple[str, ...]) -> Algorithm:
+    """Return an algorithm, loaded once in a process: the folders of plug-ins change with them."""
+    return load_algorithm(name, plugins)
+
+
+def _options(unit: Unit) -> Options:
+    """Return the options of the run, bounded by the memory and the cores of this machine."""
+    options = unit.run_options()
+    free = int(0.9 * psutil.virtual_memory().available)
+    jobs = min(options.jobs, usable_cores())
+    return replace(options, memory_bytes=options.memory_bytes or free, jobs=jobs)
+
+
+def surface_of(unit: Unit, sent: host.Arrays | None) -> TriangleMesh | None:
+    """Return the surface of a unit: stored on this machine, sent, or generated; None if it is not.
+
+    Raises
+    ------
+    ClusterError
+        What was sent is not the surface of the unit.
+
+    """
+    mesh = _checked(unit, host.stored_surface(unit.mesh_hash))
+    if mesh is None:
+        mesh = _checked(unit, sent or _generated(unit))
+        if mesh is not None:
+            host.store_surface(unit.mesh_hash, (mesh.V, mesh.F))
+        elif sent is not None:
+            raise ClusterError(f"the surface {unit.mesh} arrived damaged; run again.")
+    return mesh
+
+
+def _checked(unit: Unit, arrays: host.Arrays | None) -> TriangleMesh | None:
+    """Return the mesh of these arrays if it is the surface of the unit, to the last bit."""
+    if arrays is None:
+        return None
+    mesh = MESH_TYPES[unit.mesh_type].trusted(*arrays, unit.mesh, unit.notices)
+    mesh.V.setflags(write=False)
+    mesh.F.setflags(write=False)
+    return mesh if mesh.hash == unit.mesh_hash else None
 
 
 def _generated(unit: Unit) -> host.Arrays | None:
-    """Generate a registered surface, unless that takes longer than sending it.
-
-    Another surface of the same name, or one that differs in a bit on this machine, is none.
-    """
+    """Generate a registered surface; None if that takes longer than sending it."""
     registry = load_registry()
     family = registry.surfaces.get(unit.mesh)
     if family is None or family.kept is not None:
         return None
     try:
-        made: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
+        mesh: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
     except CembenchError:  # its data, or a library, are not on this machine
         return None
-    return (made.V, made.F) if made.hash == unit.mesh_hash else None
+    return mesh.V, mesh.F
 
 
-def _placed(named: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
-    """Write the files of plug-ins, once per content; return the names of the plug-ins here."""
-    here = []
-    for plugin in named:
+def _placed(plugins: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
+    """Write the files of plug-ins to a folder named by their content; return the new names."""
+    placed = []
+    for plugin in plugins:
         if plugin not in files:
-            here.append(plugin)
+            placed.append(plugin)
             continue
         digest = hashlib.sha256()
         for name, content in sorted(files[plugin].items()):
@@ -161,101 +269,15 @@ def _placed(named: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
             path = folder / name
             if not path.is_file() or read_bytes(path) != content:
                 write_bytes(path, content)
-        here.append(str(folder / Path(plugin).name))
-    return tuple(here)
+        placed.append(str(folder / Path(plugin).name))
+    return tuple(placed)
 
 
-class Measurer:
-    """The measuring process, started once per worker, and again after it has ended."""
+def _unset_dask_variables() -> None:
+    """Unset the variables that dask set for this process, such as those of the allocator.
 
-    def __init__(self) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "cembench.running.cluster.measure"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=_environment(),
-            text=True,
-            start_new_session=True,  # Ctrl-C is the client's
-        )
-        self.lines: SimpleQueue[str | None] = SimpleQueue()
-        threading.Thread(target=self._read, args=(self.process.stdout,), daemon=True).start()
-
-    def _read(self, stream: IO[str]) -> None:
-        for line in stream:
-            self.lines.put(line)
-        self.lines.put(None)
-
-    def measure(self, key: str, tell: Tell, is_wanted: Callable[[], bool]) -> str:
-        """Measure a unit; return why it is refused, or nothing. Ends if it is cancelled."""
-        assert self.process.stdin is not None
-        try:
-            self.process.stdin.write(key + "\n")
-            self.process.stdin.flush()
-        except OSError as error:
-            raise MeasurerGoneError(f"the process that measures ended before: {error}") from error
-        untold: list[Mapping[str, Any]] = []
-        told, looked = -inf, monotonic()
-        while True:
-            event = self._next(told + TELL_EVERY if untold else looked + LOOK_EVERY)
-            ended = event is not None and event["what"] in _ENDS
-            if event is not None and not ended:
-                untold.append(event)
-            now = monotonic()
-            if untold and (ended or now >= told + TELL_EVERY):
-                tell(untold)
-                untold, told = [], now
-            if event is not None and ended:
-                return self._why(event)
-            if now >= looked + LOOK_EVERY:
-                looked = now
-                if not is_wanted():
-                    self.close()
-                    raise ClusterError("nobody waits for this unit any more.")
-
-    def _next(self, until: float) -> Mapping[str, Any] | None:
-        """Return what the process tells next; None where it tells nothing until then."""
-        try:
-            line = self.lines.get(timeout=max(0.0, until - monotonic()))
-        except Empty:
-            return None
-        return {"what": "gone"} if line is None else dict(json.loads(line))
-
-    def _why(self, event: Mapping[str, Any]) -> str:
-        """Return why a unit is refused, or nothing; raise where it could not be measured."""
-        if event["what"] == "gone":
-            code = self.process.wait()
-            raise MeasurerGoneError(f"the process that measures ended with code {code}")
-        if event["what"] == "failed":
-            raise ClusterError(event["why"])
-        return str(event.get("why", ""))
-
-    def close(self) -> None:
-        """End the process and everything it started."""
-        self.process.kill()
-        self.process.wait()
-
-
-class MeasurerGoneError(Exception):
-    """The measuring process ended without an answer."""
-
-
-_measurers: list[Measurer] = []
-
-
-def _measurer() -> Measurer:
-    """Return the measuring process; start one if there is none."""
-    if _measurers and _measurers[0].process.poll() is None:
-        return _measurers[0]
-    _measurers[:] = [Measurer()]
-    return _measurers[0]
-
-
-def _environment() -> dict[str, str]:
-    """Return the environment of this process without the memory settings of dask."""
-    theirs = dask.config.get("distributed.nanny.pre-spawn-environ", {})
-    found = dict(os.environ)
-    for name, value in theirs.items():
-        if found.get(name) == str(value):
-            with suppress(KeyError):
-                del found[name]
-    return found
+    Processes that measure would inherit them, and their seconds would differ from a local run's.
+    """
+    for name, value in dask.config.get("distributed.nanny.pre-spawn-environ", {}).items():
+        if os.environ.get(name) == str(value):
+            del os.environ[name]

@@ -18,6 +18,7 @@ from pathlib import Path
 from time import perf_counter, sleep
 from typing import Any
 
+import numpy as np
 import psutil
 
 from cembench.core.clock import Timing
@@ -25,13 +26,12 @@ from cembench.core.errors import NotThere, shortened
 from cembench.core.notices import Notice, NoticeKind
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.core.program import UNITS
-from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm
 from cembench.results.records import FaultKind, ProgramRun, lower_median
 from cembench.running.external.exchange import largest_output, read_output, write_input
 from cembench.running.external.faults import ProgramFault
 from cembench.running.external.present import missing
-from cembench.running.external.small_mesh import small_mesh
 from cembench.running.returned import Returned
 
 #: Phase name for the wall clock of a program.
@@ -44,8 +44,8 @@ SEARCHED, KEPT = 2**22, 4000
 VERSION_SECONDS = 20.0
 #: Seconds between two looks at the memory of a checked program.
 LOOK_EVERY = 0.005
-#: Maximum number of runs on the small mesh.
-STARTS = 3
+#: Maximum number of runs on the small mesh, its rings of vertices, and vertices per ring.
+STARTS, RINGS, AROUND = 3, 4, 9
 
 _folder_of_process: list[Path] = []
 
@@ -194,6 +194,30 @@ class ProgramCalls:
             return None
         lines = said[:KEPT].decode(errors="replace").strip().splitlines()
         return shortened(lines[0], 200) if lines else None
+
+
+def small_mesh(like: TriangleMesh) -> TriangleMesh:
+    """Return a mesh on which solving costs nothing, for measuring a program's start-up time.
+
+    It is a shallow cap of 63 triangles; for a surface with holes, of 54 triangles with a hole.
+    """
+    holed = isinstance(like, HoledMesh)
+    angle = 2 * np.pi * (np.arange(AROUND)[None, :] + 0.5 * np.arange(RINGS)[:, None]) / AROUND
+    radius = (np.arange(RINGS) + 1.0)[:, None] / RINGS * np.ones(AROUND)
+    x, y = (radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()
+    V = np.stack([x, y, 0.3 * (1 - x**2 - y**2)], axis=1)
+    k = np.arange(AROUND)
+    after = (k + 1) % AROUND
+    F = [
+        np.stack(three, axis=1) + AROUND * ring
+        for ring in range(RINGS - 1)
+        for three in ((k, k + AROUND, after), (after, k + AROUND, after + AROUND))
+    ]
+    if not holed:
+        V = np.concatenate([V, [[0.0, 0.0, 0.3]]])
+        F.append(np.stack([np.full(AROUND, len(V) - 1), k, after], axis=1))
+    kind = HoledMesh if holed else DiskMesh
+    return kind.from_arrays(V, np.concatenate(F), name="small")
 
 
 @contextmanager

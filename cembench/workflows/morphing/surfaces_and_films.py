@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Registry
-from cembench.running.local import Options, map_once
+from cembench.running.local import map_once
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, paper_roles, plan_cells
 from cembench.running.surfaces import is_generated, load_surface
 from cembench.workflows.morphing import writers

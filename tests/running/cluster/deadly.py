@@ -1,4 +1,4 @@
-"""Algorithms that end what measures them."""
+"""An algorithm that ends the worker that measures it."""
 
 import time
 
@@ -9,21 +9,12 @@ from cembench import DiskMesh, Parameterization, algorithm
 
 @algorithm("ends-the-worker", title="Ends the worker", target="disk")
 def ends_the_worker(mesh: DiskMesh) -> Parameterization:
-    _measurer().parent().kill()
+    _worker().kill()
     time.sleep(600)
 
 
-@algorithm("ends-the-measurer", title="Ends the measurer", target="disk")
-def ends_the_measurer(mesh: DiskMesh) -> Parameterization:
-    _measurer().kill()
-    time.sleep(600)
-
-
-def _measurer() -> psutil.Process:
-    """Return the measuring process of the worker; between it and a call may be a fork server."""
-    (found,) = (
-        one
-        for one in psutil.Process().parents()
-        if "cembench.running.cluster.measure" in one.cmdline()
-    )
-    return found
+def _worker() -> psutil.Process:
+    """Return the dask worker; between it and a call may be a fork server."""
+    ours = ("cembench.running.fork_server", "cembench.running.worker")
+    this = psutil.Process()
+    return next(one for one in this.parents() if not set(ours) & set(one.cmdline()))

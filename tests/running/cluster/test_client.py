@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 
 import pytest
 from cembench.surfaces.cone import cone
@@ -11,9 +12,12 @@ from cembench.core.errors import ClusterError
 from cembench.registry import load_registry
 from cembench.results.records import FaultKind
 from cembench.results.store import Store
+from cembench.running import recorder
 from cembench.running.cluster.state import read_state
-from cembench.running.local import Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.watcher import Watcher
 from cembench.workflows.benchmark import benchmark
 from tests.running.test_local import FAULTY
 
@@ -78,11 +82,8 @@ def test_two_workers_give_the_same_maps_and_statuses_as_one_process(client, tmp_
     assert again.steps == []
 
 
-@pytest.mark.parametrize("who", ["worker", pytest.param("measurer", marks=pytest.mark.slow)])
-def test_a_unit_that_ends_what_measures_it_twice_is_recorded_and_the_rest_measured(
-    client, tmp_path, who
-):
-    deadly = tasks_of(f"ends-the-{who}", surfaces=SURFACES[:1], plugin=DEADLY)
+def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(client, tmp_path):
+    deadly = tasks_of("ends-the-worker", surfaces=SURFACES[:1], plugin=DEADLY)
     tasks = [*deadly, *tasks_of("good", surfaces=SURFACES[1:])]
     store, heard = Store(tmp_path), Listener()
     first, good = run_on_cluster(tasks, store, client, watcher=heard, faces=200)
@@ -90,15 +91,32 @@ def test_a_unit_that_ends_what_measures_it_twice_is_recorded_and_the_rest_measur
     (fault,) = first.outcome.faults
     assert fault.kind is FaultKind.WORKERS_LOST
     assert "ended 2 workers" in fault.detail
-    assert f"check of ends-the-{who}" in fault.detail
+    assert "check of ends-the-worker" in fault.detail
     assert good.outcome.status == "ok"
     assert any("flat-disk" in words and "again" in words for words in heard.told)
-    assert {r.cell.algorithm for r in store.records()} == {f"ends-the-{who}", "good"}
+    assert {r.cell.algorithm for r in store.records()} == {"ends-the-worker", "good"}
+
+
+def test_an_interrupted_run_frees_its_workers_at_once(client, tmp_path):
+    class Interrupting(Watcher):
+        def starts(self, task, step):
+            raise KeyboardInterrupt
+
+    asleep = tasks_of("sleeps", surfaces=SURFACES[:1])
+    with pytest.raises(KeyboardInterrupt):
+        run_on_cluster(asleep, Store(tmp_path / "asleep"), client, watcher=Interrupting())
+    # It sleeps for ten minutes, and so long the lock of the machine would be held.
+    good = tasks_of("good", surfaces=SURFACES[:1])
+    began = monotonic()
+    (record,) = run_on_cluster(good, Store(tmp_path / "good"), client, faces=200)
+    assert record.outcome.status == "ok"
+    assert monotonic() - began < 300
+    assert Store(tmp_path / "asleep").finished() == []
 
 
 def test_machines_with_other_software_can_be_refused(client, tmp_path, monkeypatch):
-    true = module.describe_environment()
-    monkeypatch.setattr(module, "describe_environment", lambda: true | {"python": "2.7"})
+    true = recorder.describe_environment()
+    monkeypatch.setattr(recorder, "describe_environment", lambda: true | {"python": "2.7"})
     heard = Listener()
     with pytest.raises(ClusterError, match="no worker has the software"):
         run_on_cluster(
@@ -109,8 +127,8 @@ def test_machines_with_other_software_can_be_refused(client, tmp_path, monkeypat
 
 
 def test_other_software_is_named(client, tmp_path, monkeypatch):
-    true = module.describe_environment()
-    monkeypatch.setattr(module, "describe_environment", lambda: true | {"python": "2.7"})
+    true = recorder.describe_environment()
+    monkeypatch.setattr(recorder, "describe_environment", lambda: true | {"python": "2.7"})
     heard = Listener()
     (record,) = run_on_cluster(
         tasks_of("good", surfaces=SURFACES[:1]), Store(tmp_path), client, watcher=heard, faces=200
@@ -123,7 +141,7 @@ def test_what_a_worker_cannot_measure_ends_the_run_and_says_where(client, tmp_pa
     tasks = tasks_of("good", surfaces=SURFACES[:1])
     other = tasks[0].cell.model_copy(update={"code_hash": "0" * 64})
     tasks = [replace(tasks[0], cell=other)]
-    with pytest.raises(ClusterError, match=r"flat-disk cannot be measured on .*: good is other"):
+    with pytest.raises(ClusterError, match=r"flat-disk cannot be measured on .*: good has other"):
         run_on_cluster(tasks, Store(tmp_path), client, Options(), faces=200)
 
 

@@ -97,7 +97,7 @@ class Cluster:
             return {name: process.pid for name, process in self.running.items()}.items()
         if kind == "recorded":
             return set(self.records())
-        names = {"taken": "*/unit.json", "measured": "*/run/samples/*/*.jsonl"}
+        names = {"taken": "*/run/cembench.json", "measured": "*/run/samples/*/*.jsonl"}
         found = set()
         for path in self.cache.glob(f"cluster/units/{names[kind]}"):
             with suppress(FileNotFoundError):  # finished, and deleted

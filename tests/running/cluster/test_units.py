@@ -1,9 +1,7 @@
 """What travels, and the machine that it travels to; no scheduler takes part."""
 
 import json
-import os
 import sys
-import tempfile
 import threading
 from dataclasses import replace
 from pathlib import Path
@@ -14,18 +12,21 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench.commands.cluster import hours, show_hours
 from cembench.core.errors import ClusterError, ParameterError
 from cembench.registry import load_registry
-from cembench.results.machines import differences, software_of
+from cembench.results.machines import differences
 from cembench.results.store import Store
 from cembench.running.cluster import host
 from cembench.running.cluster.connect import parse_cluster, quiet_variables
-from cembench.running.cluster.measure import measure
 from cembench.running.cluster.state import ClusterState, MachineState, read_state, save_state
 from cembench.running.cluster.units import Unit, grouped, makespan, parcel
 from cembench.running.environment import MACHINE_VARIABLE, describe_environment
 from cembench.running.estimate import Estimate
-from cembench.running.local import Options, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from tests.running.test_local import FAULTY, tasks_of
+
+pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
+from cembench.running.cluster.worker import Forwarder, measure, surface_of
 
 NO_TOKEN = "0" * 32
 
@@ -131,80 +132,77 @@ def test_places_are_read():
     assert (found["partition"], found["machines"], found["exclusive"]) == ("cpu", "10", "yes")
 
 
-def test_a_machine_times_for_one_alone(tmp_path):
-    path = tmp_path / "lock"
-    order = []
-    with host.Turn(path) as first, host.Turn(path) as second, host.Turn(path) as third:
-        first.share()
-        second.share()  # checks run side by side
-        waiting = threading.Event()
+def test_one_worker_of_a_machine_measures_at_a_time():
+    order, waiting = [], threading.Event()
 
-        def times():
-            third.alone(waiting.set)
-            order.append("times")
+    def other():
+        with host.machine_lock(waiting.set):
+            order.append("second")
 
-        thread = threading.Thread(target=times)
+    with host.machine_lock(lambda: None):
+        thread = threading.Thread(target=other)
         thread.start()
-        waiting.wait()
-        order.append("checked")
-        first.__exit__()
-        first.__enter__()
-        second.__exit__()
-        second.__enter__()
-        thread.join()
-        asked = threading.Event()
+        assert waiting.wait(30)
+        order.append("first")
+    thread.join()
+    assert order == ["first", "second"]
 
-        def checks():
-            asked.set()
-            first.share()
-            order.append("checks again")
 
-        thread = threading.Thread(target=checks)
-        thread.start()
-        asked.wait()
-        order.append("timed")
-        third.__exit__()
-        thread.join()
-        third.__enter__()
-    assert order == ["checked", "times", "timed", "checks again"]
+def test_a_unit_that_is_cancelled_does_not_wait_for_its_machine():
+    def cancelled():
+        raise ClusterError("cancelled")
+
+    with (
+        host.machine_lock(lambda: None),
+        pytest.raises(ClusterError, match="cancelled"),
+        host.machine_lock(cancelled),
+    ):
+        pass
+
+
+def test_a_lock_that_cannot_be_opened_is_an_error_with_its_remedy():
+    host.place().mkdir(parents=True)
+    (host.place() / "locks").touch()
+    with pytest.raises(ClusterError, match="Set CEMBENCH_CACHE"), host.machine_lock(lambda: None):
+        pass
 
 
 def test_a_surface_is_kept_by_its_hash_and_a_damaged_one_is_not():
     mesh = flat_disk(100)
-    assert host.kept_surface(mesh.hash) is None
-    host.keep_surface(mesh.hash, (mesh.V, mesh.F))
-    V, F = host.kept_surface(mesh.hash)
+    assert host.stored_surface(mesh.hash) is None
+    host.store_surface(mesh.hash, (mesh.V, mesh.F))
+    V, F = host.stored_surface(mesh.hash)
     assert (V == mesh.V).all()
     assert (F == mesh.F).all()
     (file,) = (host.place() / "surfaces").iterdir()
     file.write_bytes(b"no archive")
-    assert host.kept_surface(mesh.hash) is None
+    assert host.stored_surface(mesh.hash) is None
     assert not file.exists()
 
 
 def test_what_nobody_came_back_for_is_deleted():
     mesh = flat_disk(100)
-    host.keep_surface(mesh.hash, (mesh.V, mesh.F))
+    host.store_surface(mesh.hash, (mesh.V, mesh.F))
     (host.unit_folder("a") / "run").mkdir(parents=True)
     host.clear_old()
-    assert host.kept_surface(mesh.hash) is not None
+    assert host.stored_surface(mesh.hash) is not None
     host.clear_old(days=-1)
-    assert host.kept_surface(mesh.hash) is None
+    assert host.stored_surface(mesh.hash) is None
     assert not host.unit_folder("a").exists()
 
 
 def test_a_unit_comes_to_the_same_as_on_one_machine(tmp_path):
     tasks = tasks_of("good", "nan")
     unit = parcel(tasks, NO_TOKEN, Options()).unit
-    host.keep_surface(unit.mesh_hash, (tasks[0].mesh.V, tasks[0].mesh.F))
     told = []
-    there = measure(unit, tmp_path / "there", told.append)
+    store = Store(tmp_path / "there")
+    there = measure(unit, tasks[0].mesh, store, Forwarder(told.append))
+    assert [store.find(task.cell) for task in tasks] == there
     here = run_tasks(tasks, Store(tmp_path / "here"))
     for a, b in zip(there, here, strict=True):
         assert (a.cell, a.sources, a.outcome.status) == (b.cell, b.sources, b.outcome.status)
         assert a.outcome.uv_hash == b.outcome.uv_hash
-    assert told[0]["what"] == "began"
-    assert {event["what"] for event in told[1:]} == {"starts", "ends"}
+    assert {event["what"] for event in told} == {"starts", "ends"}
     assert json.loads(json.dumps(told)) == told
 
 
@@ -214,23 +212,22 @@ def test_other_code_under_the_same_name_is_refused(tmp_path):
         for task in tasks_of("good")
     ]
     unit = parcel(tasks, NO_TOKEN, Options()).unit
-    host.keep_surface(unit.mesh_hash, (tasks[0].mesh.V, tasks[0].mesh.F))
-    with pytest.raises(ClusterError, match=r"good is other code on .* faulty.py"):
-        measure(unit, tmp_path, lambda event: None)
+    with pytest.raises(ClusterError, match=r"good has other code on .* faulty.py"):
+        measure(unit, tasks[0].mesh, Store(tmp_path), Forwarder(lambda event: None))
 
 
-def test_a_surface_that_is_gone_is_told(tmp_path):
-    with pytest.raises(ClusterError, match="not on this machine any more"):
-        measure(parcel(tasks_of("good"), NO_TOKEN, Options()).unit, tmp_path, lambda event: None)
-
-
-def test_other_software_is_refused_where_it_must_not_be(tmp_path):
-    software = software_of(describe_environment()) | {"python": "2.7"}
-    unit = parcel(tasks_of("good"), NO_TOKEN, Options(), software=software).unit
-    told = []
-    assert measure(unit, tmp_path, told.append) is None
-    assert told[0]["what"] == "refused"
-    assert told[0]["why"].startswith("python: 2.7 / ")
+def test_a_surface_is_stored_once_it_was_sent_and_another_one_is_refused():
+    (task,) = tasks_of("good")
+    unit = parcel([task], NO_TOKEN, Options()).unit
+    V, F = task.mesh.V, task.mesh.F
+    assert surface_of(unit, None) is None
+    with pytest.raises(ClusterError, match="arrived damaged"):
+        surface_of(unit, (V + 1, F))
+    assert surface_of(unit, (V, F)).hash == task.mesh.hash
+    assert surface_of(unit, None).hash == task.mesh.hash
+    host.store_surface(unit.mesh_hash, (V + 1, F))
+    assert surface_of(unit, None) is None
+    assert surface_of(unit, (V, F)).hash == task.mesh.hash
 
 
 def test_differences_of_software_name_library_and_versions():
@@ -262,57 +259,6 @@ def test_what_is_kept_of_a_unit_counts_under_another_share_of_the_budget():
     assert one.options != other.options
     assert one.key == other.key
     assert parcel(tasks_of("nan"), NO_TOKEN, Options(budget=5.0)).unit.key != one.key
-
-
-def test_whose_turn_it_is_hangs_on_one_file_of_the_machine(tmp_path, monkeypatch):
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    monkeypatch.setattr(tempfile, "tempdir", None)
-    assert host.Turn().path == Path(f"/tmp/cembench-{os.geteuid()}/machine.lock")
-    path = tmp_path / "lock"
-    with host.Turn(path) as one:
-        one.alone()
-        with host.Turn(path) as other:
-            assert not other._lock(alone=True, at_once=True)
-    (tmp_path / "link").symlink_to(path)
-    os.mkfifo(tmp_path / "fifo")
-    for cannot in (tmp_path / "none" / "lock", tmp_path / "link", tmp_path / "fifo"):
-        with (
-            pytest.raises(ClusterError, match="by which the workers of a machine take turns"),
-            host.Turn(cannot),
-        ):
-            pass
-
-
-@pytest.mark.parametrize("taken", ["link", "file", "open to all", "another user's"])
-def test_whoever_takes_the_name_of_the_lock_stops_nothing(tmp_path, monkeypatch, taken):
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "common"))
-    monkeypatch.setattr(host, "Path", lambda name: Path(str(name).replace("/tmp", "/none")))
-    ours = tmp_path / "common" / f"cembench-{os.geteuid()}"
-    (tmp_path / "common").mkdir()
-    if taken == "link":
-        (tmp_path / "elsewhere").mkdir()
-        ours.symlink_to(tmp_path / "elsewhere")
-    elif taken == "file":
-        ours.touch()
-    else:
-        ours.mkdir()
-        ours.chmod(0o777 if taken == "open to all" else 0o700)
-    if taken == "another user's":
-        if os.geteuid() != 0:
-            pytest.skip("NOT CHECKED: only root can give a folder to another user")
-        os.chown(ours, 12345, -1)
-    with host.Turn() as turn:
-        assert turn.path.parent.parent == host.place() / "locks"
-        turn.alone()
-
-
-def test_a_lock_of_another_users_is_not_taken(tmp_path):
-    if os.geteuid() != 0:
-        pytest.skip("NOT CHECKED: only root can give a file to another user")
-    (tmp_path / "lock").touch()
-    os.chown(tmp_path / "lock", 12345, -1)
-    with pytest.raises(ClusterError, match="regular file of this user's"):
-        host.Turn(tmp_path / "lock").__enter__()
 
 
 def test_the_page_names_how_dask_is_kept_quiet():

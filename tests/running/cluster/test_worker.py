@@ -1,94 +1,62 @@
-"""What a worker tells of the process that measures, and when it lets go of it."""
+"""What a worker does with a unit that nobody waits for, and with a surface that it lacks."""
 
-import itertools
-import json
-from queue import SimpleQueue
+import os
+import threading
 
+import dask
 import pytest
 
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
 from cembench.core.errors import ClusterError, MeshError
+from cembench.results.store import Store
 from cembench.running.cluster import worker
 from cembench.running.cluster.units import parcel
-from cembench.running.cluster.worker import Measurer, MeasurerGoneError
-from cembench.running.local import Options
+from cembench.running.cluster.worker import Forwarder, measure
+from cembench.running.options import Options
 from tests.running.cluster.test_units import NO_TOKEN, two_surfaces
+from tests.running.test_local import tasks_of
 
 
-class Process:
-    """Stands for the process that measures."""
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_cancelled_unit_ends_at_once_and_saves_nothing_that_was_stopped(
+    tmp_path, monkeypatch, jobs
+):
+    monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(worker, "LOOK_EVERY", 0.05)
+    tasks = tasks_of("sleeps", "spins")
+    unit = parcel(tasks, NO_TOKEN, Options(jobs=jobs)).unit
+    started = threading.Event()
 
-    def __init__(self):
-        self.stdin, self.killed = self, False
+    def send(event):
+        if event["what"] == "starts":
+            started.set()
 
-    def write(self, text):
-        self.asked = text
-
-    def flush(self):
-        pass
-
-    def kill(self):
-        self.killed = True
-
-    def wait(self):
-        return -9
-
-
-def measurer(lines):
-    found = Measurer.__new__(Measurer)
-    found.process = Process()
-    found.lines = lines
-    return found
+    forwarder = Forwarder(send)
+    with (
+        pytest.raises(ClusterError, match="cancelled"),
+        worker._cancelling(forwarder.cancelled, lambda: not started.is_set()),
+    ):
+        measure(unit, tasks[0].mesh, Store(tmp_path / "run"), forwarder)
+    assert Store(tmp_path / "run").finished() == []
+    assert list((tmp_path / "run").glob("samples/*/*.jsonl")) == []
 
 
-def said(*whats):
-    lines = SimpleQueue()
-    for what in whats:
-        lines.put(what and json.dumps({"what": what}))
-    return lines
-
-
-def test_what_happens_soon_after_each_other_is_told_together(monkeypatch):
-    monkeypatch.setattr(worker, "TELL_EVERY", 1e9)
-    told = []
-    asked = measurer(said("began", "starts", "ends", "starts", "ends", "done"))
-    assert asked.measure("a key", told.append, lambda: True) == ""
-    assert asked.process.asked == "a key\n"
-    assert [[event["what"] for event in events] for events in told] == [
-        ["began"],
-        ["starts", "ends", "starts", "ends"],
-    ]
-
-
-def test_what_a_process_told_before_it_ended_arrives():
-    told = []
-    with pytest.raises(MeasurerGoneError, match="code -9"):
-        measurer(said("starts", None)).measure("a key", told.append, lambda: True)
-    assert [event["what"] for events in told for event in events] == ["starts"]
-
-
-def test_a_process_that_ended_before_it_was_asked_is_told(monkeypatch):
-    def broken(text):
-        raise BrokenPipeError(32, "Broken pipe")
-
-    asked = measurer(said("done"))
-    monkeypatch.setattr(asked.process, "write", broken)
-    with pytest.raises(MeasurerGoneError, match="ended before"):
-        asked.measure("a key", lambda events: None, lambda: True)
-
-
-def test_a_unit_that_nobody_waits_for_ends_also_while_much_happens(monkeypatch):
+def test_a_unit_that_is_wanted_is_not_cancelled(monkeypatch):
     monkeypatch.setattr(worker, "LOOK_EVERY", 0.0)
+    cancelled, looked = threading.Event(), threading.Event()
+    with worker._cancelling(cancelled, lambda: looked.set() or True):
+        assert looked.wait(30)
+    assert not cancelled.is_set()
 
-    class Endless:
-        def get(self, timeout):
-            return json.dumps({"what": "starts"})
 
-    wanted = itertools.chain([True, True], itertools.repeat(False))
-    asked = measurer(Endless())
-    with pytest.raises(ClusterError, match="nobody waits"):
-        asked.measure("a key", lambda events: None, lambda: next(wanted))
-    assert asked.process.killed
+def test_settings_that_dask_made_for_a_worker_are_not_inherited_by_what_it_measures(monkeypatch):
+    theirs = {"MALLOC_TRIM_THRESHOLD_": 65536, "OMP_NUM_THREADS": 1}
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "65536")
+    monkeypatch.setenv("OMP_NUM_THREADS", "4")
+    with dask.config.set({"distributed.nanny.pre-spawn-environ": theirs}):
+        worker._unset_dask_variables()
+    assert "MALLOC_TRIM_THRESHOLD_" not in os.environ
+    assert os.environ["OMP_NUM_THREADS"] == "4"  # the user's own
 
 
 def test_a_surface_whose_data_are_not_on_the_machine_is_sent(monkeypatch):

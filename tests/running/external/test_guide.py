@@ -16,7 +16,7 @@ from cembench.registry import load_registry
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table
 from cembench.results.records import FaultKind
-from tests.validation.in_this_process import LauncherHere, call_here
+from tests.validation.in_this_process import TimerHere, call_here
 
 ROOT = Path(__file__).parents[3]
 EXAMPLES = ROOT / "examples/external"
@@ -79,7 +79,7 @@ def test_the_octave_example_maps_to_the_disk(typed):
 
 def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli, monkeypatch):
     """The report is another test's matter: drawing it takes longer than measuring."""
-    monkeypatch.setattr("cembench.running.local.Launcher", LauncherHere)
+    monkeypatch.setattr("cembench.running.local.CellTimer", TimerHere)
     monkeypatch.setattr("cembench.commands.report.make_report", lambda run, *_: (None, run))
     (line,) = (one for one in commands() if " peers " in one)
     printed = " ".join(typed(line).split())

@@ -17,8 +17,9 @@ from cembench.results.comparison import compare
 from cembench.results.records import FaultKind, Round
 from cembench.results.store import Store
 from cembench.results.verify import Depth, verify
-from cembench.running.local import Options, map_once, run_tasks
+from cembench.running.local import map_once, run_tasks
 from cembench.running.measure import check_cell
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.validation.quality import compare_speed
 

@@ -12,9 +12,11 @@ from cembench.results.comparison import compare, is_unstable, paired_ratios
 from cembench.results.records import Neighbours, Outcome, Round
 from cembench.results.store import Store
 from cembench.running import local
-from cembench.running.local import Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.until_precise import affordable, cheapest, cost, lack
+from cembench.running.schedule import affordable, cheapest, cost, lack
+from cembench.running.watcher import Watcher
 
 
 @pytest.fixture(autouse=True)
@@ -30,7 +32,7 @@ def cells(names=("cem", "lscm", "fdm"), precision=0.05, **how):
 
 
 class Invented:
-    """In place of a launcher: the seconds of an algorithm scatter as much as its entry says."""
+    """In place of a timer: the seconds of an algorithm scatter as much as its entry says."""
 
     scatter = {"cem": 0.01, "lscm": 0.01, "fdm": 0.15}  # noqa: RUF012
 
@@ -136,8 +138,8 @@ def test_a_run_ends_near_its_budget(tmp_path, monkeypatch, budget, scatter, look
     monkeypatch.setattr(local, "monotonic", clock)
     began = clock.now
     tasks = many_cells()
-    launcher = timed_by(clock, scatter)
-    records = run_tasks(tasks, Store(tmp_path), Options(budget=budget), None, launcher)
+    invented = timed_by(clock, scatter)
+    records = run_tasks(tasks, Store(tmp_path), Options(budget=budget), None, invented)
     spent = clock.now - began
     print(spent, [len(r.outcome.rounds) for r in records])
     # The checks and one round of each cell take about 95 s, and seven rounds of all 375.

@@ -1,4 +1,4 @@
-"""Checks side by side: the same outcomes as one after another, and an interrupt ends them all."""
+"""Checks in parallel: the same outcomes as one after another, and an interrupt ends them all."""
 
 import threading
 from contextlib import contextmanager
@@ -10,9 +10,12 @@ from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench.registry import load_registry
 from cembench.results.store import Store
-from cembench.running.local import Options, Watcher, run_tasks
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
+from cembench.running.parallel_checks import check_in_parallel
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.side_by_side import check_side_by_side
+from cembench.running.schedule import CellState
+from cembench.running.watcher import Watcher
 
 SLEEPER = """
 import time
@@ -49,16 +52,20 @@ class Checker:
 
 
 @contextmanager
-def unwatched(task):
+def unwatched(state):
     yield
+
+
+def states(tasks):
+    return [CellState(task, samples=None) for task in tasks]
 
 
 def test_as_many_checks_run_at_a_time_as_there_are_checkers():
     barrier = threading.Barrier(2)  # no check ends unless another one runs beside it
     checkers = [Checker(barrier) for _ in range(2)]
-    found = list(check_side_by_side(["a", "b", "c", "d"], checkers, unwatched))
-    assert sorted(task for task, _, _ in found) == ["a", "b", "c", "d"]
-    assert all(outcome == (f"outcome of {task}", None) for task, outcome, _ in found)
+    found = list(check_in_parallel(states("abcd"), checkers, unwatched))
+    assert sorted(state.task for state, _ in found) == ["a", "b", "c", "d"]
+    assert all(outcome == (f"outcome of {state.task}", None) for state, outcome in found)
     assert Checker.most == 2
     assert not any(checker.stopped.is_set() for checker in checkers)
 
@@ -73,7 +80,7 @@ def test_a_fault_of_a_checker_is_raised_and_the_others_are_stopped():
 
     checkers = [Faulty(None), Faulty(None)]
     with pytest.raises(OSError, match="no room"):
-        list(check_side_by_side(["a", "b", "c"], checkers, unwatched))
+        list(check_in_parallel(states("abc"), checkers, unwatched))
     assert all(checker.stopped.is_set() for checker in checkers)
 
 
