@@ -220,6 +220,8 @@ class Paper(_Part):
     #: What it was measured on.
     machine: str = ""
     profiles: ProfileLimits = ProfileLimits()
+    #: What its rate of speedup is.
+    rate: str = "the rate of speedup, t / t_reference - 1"
     #: Averages in its text, by what is averaged and by algorithm.
     stated: Mapping[str, Mapping[str, float]] = {}
     pictures: tuple[Picture, ...] = ()

@@ -1,6 +1,6 @@
 """Averages of speedup rates, in two readings of the paper's means.
 
-A rate is Eq. 33, t / t_CEM - 1. The paper averages rates arithmetically (8.5, 17.2, 4.1), where one
+A rate is t / t_CEM - 1. The paper averages rates arithmetically, where one
 large ratio counts as much as many small ones, and converts that mean to a saving. The geometric
 mean of the ratios and the mean of the savings weight every model equally.
 """

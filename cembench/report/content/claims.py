@@ -97,7 +97,7 @@ def known_names(evidence: Evidence) -> dict[str, Any]:
         "models_of": lambda plot: paper.plotted(plot).models,
         "exhibits_of": lambda *of: [e.title for e in evidence.exhibits if e.figure in of],
     }
-    data = {"tables": paper.tables, "compared": paper.compared, "reference": paper.reference}
+    data = {"tables": paper.tables, "compared": paper.compared, "reference": evidence.reference}
     return {**own, **data, **paper.numbers, **paper.functions()}
 
 

@@ -41,9 +41,8 @@ def claim_of_the_paper(evidence: Evidence) -> str:
         else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_SURFACES} models)"
     )
     return (
-        f"CEM against {names}: printed {printed}; here {here}. This is the rate of speedup "
-        "(Eq. 33: 0 for equal times, 1 if CEM takes half the time), averaged over the models; "
-        f"here over {' and '.join(over)}, {intervals}."
+        f"{paper.reference.upper()} against {names}: printed {printed}; here {here}. This is "
+        f"{paper.rate}, averaged over the models; here over {' and '.join(over)}, {intervals}."
     )
 
 

@@ -1,9 +1,9 @@
-"""The rates of speedup of CEM over the others (Eq. 33) in a paper's table, and their averages."""
+"""The rates of speedup over the others in a paper's table, and their averages."""
 
 from __future__ import annotations
 
 from cembench.report.content.averages import READINGS, corrected_rate, percent, printed_rates
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import Evidence
 from cembench.report.content.linear_algebra_work import work_of
 from cembench.report.content.printed_beside_measured import (
     absent_models,
@@ -108,7 +108,7 @@ def _work_row(evidence: Evidence, policy: str) -> tuple[Value, ...]:
 
 def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:
     """Return an algorithm's numeric factorisations over CEM's, of the models that count."""
-    series, base = evidence.series_of(algorithm), evidence.series_of(REFERENCE)
+    series, base = evidence.series_of(algorithm), evidence.series_of(evidence.reference)
     ratios = []
     for surface in evidence.one_per_model if series and base else ():
         assert series is not None

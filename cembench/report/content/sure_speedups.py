@@ -1,4 +1,4 @@
-"""Statistical certainty of the speedups in Table 2: singly, together, and over surfaces."""
+"""Statistical certainty of the speedups: singly, together, and over surfaces."""
 
 from __future__ import annotations
 
@@ -8,12 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cembench.report.content.evidence import (
-    REFERENCE,
-    AlgorithmSeries,
-    Evidence,
-    MeasuredSurface,
-)
+from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
@@ -28,9 +23,9 @@ from cembench.results.many import (
 CAPTION = (
     "'One by one': the number of surfaces on which the 95 % interval of the ratio within rounds "
     "excludes 1. 'Together': the number when all of the {n} verdicts of this table must be right "
-    "with 95 % (Holm). 'Over surfaces': whether CEM wins on more surfaces than by chance "
-    "(two-sided sign test), and the geometric mean of t / t_CEM with a 95 % interval over surfaces "
-    "and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
+    "with 95 % (Holm). 'Over surfaces': whether {cem} wins on more surfaces than by chance "
+    "(two-sided sign test), and the geometric mean of t / t_{cem} with a 95 % interval over "
+    "surfaces and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
     f"{NOT_DETECTED}"
 )
 ONCE = " Each model counts once, and is preferred over its stand-in."
@@ -38,7 +33,7 @@ ONCE = " Each model counts once, and is preferred over its stand-in."
 
 @dataclass(frozen=True)
 class _Compared:
-    """An algorithm compared with CEM: a comparison and the rounds' ratios for each surface."""
+    """An algorithm: its comparison with the reference and the rounds' ratios on each surface."""
 
     series: AlgorithmSeries
     found: Sequence[Comparison]
@@ -46,7 +41,7 @@ class _Compared:
 
 
 def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
-    """Return tables on the certainty of speedups over CEM; empty without comparable rounds."""
+    """Return tables on the certainty of the speedups; empty without comparable rounds."""
     compared = [c for series in evidence.disk_series if (c := _compared(evidence, series, policy))]
     if not compared:
         return []
@@ -55,12 +50,13 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
     for c in compared:
         both = [next(together) for _ in c.found]
         rows.append(_row(c, both))
-    number = sum(len(c.found) for c in compared)
+    number, cem = sum(len(c.found) for c in compared), evidence.reference.upper()
+    verdicts = (f"{cem} faster", f"{cem} slower", "undecided")
     columns = (
         Column("algorithm", numeric=False),
         Column("surfaces"),
-        *(Column(name, "one by one") for name in ("CEM faster", "CEM slower", "undecided")),
-        *(Column(name, "together") for name in ("CEM faster", "CEM slower", "undecided")),
+        *(Column(name, "one by one") for name in verdicts),
+        *(Column(name, "together") for name in verdicts),
         *(Column(name, "over surfaces") for name in ("wins", "sign test", "mean", "95 % interval")),
     )
     return [
@@ -69,7 +65,8 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
             title=f"Certainty of the speedups{in_policy(evidence, policy)}",
             columns=columns,
             rows=tuple(rows),
-            caption=CAPTION.format(n=number) + (ONCE if evidence.stand_ins_left_out else ""),
+            caption=CAPTION.format(n=number, cem=cem)
+            + (ONCE if evidence.stand_ins_left_out else ""),
         )
     ]
 
@@ -80,7 +77,7 @@ def paired_rounds(
     policy: str,
     surfaces: Sequence[MeasuredSurface],
 ) -> list[tuple[Comparison, list[float]]]:
-    """Return the comparison with CEM and the ratios of the rounds, for surfaces that have both."""
+    """Return the comparison with the reference and the rounds' ratios on surfaces with both."""
     found = []
     for surface in surfaces:
         record = evidence.find(surface, series, policy)
@@ -92,7 +89,7 @@ def paired_rounds(
 
 
 def _compared(evidence: Evidence, series: AlgorithmSeries, policy: str) -> _Compared | None:
-    if series.algorithm == REFERENCE or not series.main:
+    if series.algorithm == evidence.reference or not series.main:
         return None
     surfaces = (*evidence.one_per_model, *evidence.others)
     found = paired_rounds(evidence, series, policy, surfaces)
@@ -119,7 +116,7 @@ def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ..
 
 
 def _verdicts(found: Sequence[Comparison]) -> list[Value]:
-    """Return the numbers of surfaces on which CEM is faster, slower, or undecided."""
+    """Return the numbers of surfaces on which the reference is faster, slower, or undecided."""
     counts = Counter(one.verdict for one in found)
     faster, slower = counts["slower"], counts["faster"]  # the verdict is about the other algorithm
     return [count(faster), count(slower), count(len(found) - faster - slower)]

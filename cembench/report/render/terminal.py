@@ -131,7 +131,7 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
 
 
 def speedups_table(records: Sequence[Record], reference: str) -> RenderableType | None:
-    """Return the speedups of the reference over the others (Eq. 33), with their intervals.
+    """Return the speedups of the reference over the others, with their intervals.
 
     If no cell has enough rounds for an interval, a remark says so, and each surface has one row.
     None if there is nothing to compare.
@@ -147,9 +147,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> RenderableType 
             compared.append((record, found))
     if not compared:
         return None
-    heading = Text(
-        f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)", style="bold"
-    )
+    heading = Text(f"\nSpeedup of {reference} over the others: t / t_{reference} - 1", style="bold")
     if all(found.verdict == "too few rounds" for _, found in compared):
         told = (
             f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
