@@ -13,61 +13,71 @@ import importlib
 import importlib.util
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from cembench.core.errors import RegistryError, describe_error
 from cembench.core.names import digest
 from cembench.results.intervals import DEFAULT_ROUNDS
+from cembench.results.profiles import Profile
 
 if TYPE_CHECKING:
     from cembench.registry import Algorithm
 
 #: Group of the entry points of papers.
 GROUP = "cembench.papers"
+#: Files that a paper need not have.
+_OPTIONAL = ("runs.toml", "claims.toml")
 #: Fields in which names in braces stand for words and numbers.
 _PROSE = frozenset({"title", "caption", "quote", "place", "test", "remark"})
 REMEDY = "Repair it; papers/cem is an example."
 #: The file that a part of a paper is in; others are in paper.toml.
-_FILES = {"runs": "runs.toml", "claims": "claims.toml", "numbers": "claims.toml"} | dict.fromkeys(
-    ("tables", "printed", "errata"), "tables.toml"
-)
+_ELSEWHERE = {
+    **dict.fromkeys(("folder", "package"), ""),
+    **dict.fromkeys(("tables", "printed", "errata"), "tables.toml"),
+    **dict.fromkeys(("claims", "numbers"), "claims.toml"),
+    "runs": "runs.toml",
+}
 
+#: The plots of the report that can be a figure of a paper.
+PlotName = Literal[
+    "energy_by_iteration",
+    "angle_histograms",
+    "cost_by_faces",
+    "energy_over_models",
+    "angles_over_models",
+]
 #: Printed figures of a model by column; None where the paper has a dash.
 Row = Mapping[str, float | None]
-
-
-@dataclass(frozen=True)
-class Citation:
-    """Where a paper was published; `place` is the journal with volume, year and pages."""
-
-    title: str
-    authors: str
-    place: str
-    doi: str
-
-    @property
-    def address(self) -> str:
-        """The address that the doi resolves to."""
-        return f"https://doi.org/{self.doi}"
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, given: Any) -> Any:
+        for name in given if isinstance(given, dict) else ():
+            if name not in cls.model_fields:
+                raise ValueError(_unknown(name, cls.model_fields))
+        return given
+
 
 class ProfileLimits(_Part):
-    """The number of smallest models in `quick`, and the most triangles of one in `standard`."""
+    """The number of smallest models in `quick`, and the most triangles of one in `standard`.
+
+    `budgets` are the seconds after which cells get no more rounds, by profile.
+    """
 
     quick: int = 8
     standard: int = 210_000
+    budgets: Mapping[Profile, float] = {}
 
 
 class Picture(_Part):
@@ -91,11 +101,16 @@ class PlottedFigure(_Part):
 
 
 class ExpectedExhibit(_Part):
-    """A figure that a command of cembench adds to a run."""
+    """A figure that a command of cembench adds to a run, as an exhibit of this kind.
+
+    With `models` it is one only for surfaces that are, or stand in for, these, in this order.
+    """
 
     figure: str
     shows: str
     command: str
+    exhibit: str
+    models: tuple[str, ...] = ()
 
 
 class PrintedFigure(_Part):
@@ -211,6 +226,7 @@ class Paper(_Part):
     package: str = ""
     title: str
     authors: str
+    #: The journal with volume, year and pages.
     place: str
     doi: str
     #: Under their names in cembench, in the order of the columns.
@@ -223,9 +239,9 @@ class Paper(_Part):
     #: What its rate of speedup is.
     rate: str = "the rate of speedup, t / t_reference - 1"
     #: Averages in its text, by what is averaged and by algorithm.
-    stated: Mapping[str, Mapping[str, float]] = {}
+    stated: Mapping[Literal["rate", "saving"], Mapping[str, float]] = {}
     pictures: tuple[Picture, ...] = ()
-    plots: Mapping[str, PlottedFigure] = {}
+    plots: Mapping[PlotName, PlottedFigure] = {}
     exhibits: tuple[ExpectedExhibit, ...] = ()
     #: The printed tables with their misprints, by number, model and column.
     tables: Mapping[int, Mapping[str, Row]] = {}
@@ -237,9 +253,9 @@ class Paper(_Part):
     numbers: Mapping[str, Any] = {}
 
     @property
-    def citation(self) -> Citation:
-        """Where it was published."""
-        return Citation(self.title, self.authors, self.place, self.doi)
+    def address(self) -> str:
+        """The address that the doi resolves to."""
+        return f"https://doi.org/{self.doi}"
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -272,9 +288,20 @@ class Paper(_Part):
         """Return the number of triangles of a model."""
         return self.count(model, "faces")
 
-    def plotted(self, plot: str) -> PlottedFigure:
+    def plotted(self, plot: PlotName) -> PlottedFigure:
         """Return the figure that is plotted in this way; an empty one if there is none."""
         return self.plots.get(plot, PlottedFigure())
+
+    def exhibited(self, exhibit: str, models: Sequence[str] = ()) -> str:
+        """Return the figure that an exhibit of this kind on these models is; "" if none."""
+        return next(
+            (
+                one.figure
+                for one in self.exhibits
+                if one.exhibit == exhibit and one.models in ((), tuple(models))
+            ),
+            "",
+        )
 
     def as_printed(self, model: str, algorithms: Iterable[Algorithm]) -> dict[str, Any]:
         """Return the parameters with which the paper ran algorithms on this model of its own.
@@ -360,9 +387,10 @@ def read_paper(folder: Path, package: str = "") -> Paper:
 
     """
     folder = folder.absolute()
-    about = _read_toml(folder / "paper.toml")
-    listed = _read_toml(folder / "tables.toml")
-    claimed = _read_toml(folder / "claims.toml", optional=True)
+    of_paper = [name for name in Paper.model_fields if name not in _ELSEWHERE]
+    about = _read_toml(folder / "paper.toml", of_paper)
+    listed = _read_toml(folder / "tables.toml", ("tables", "errata"))
+    claimed = _read_toml(folder / "claims.toml", ("numbers", "words", "cases", "claims"))
     words = {"machine": about.get("machine", ""), "fewest_rounds": DEFAULT_ROUNDS}
     printed, tables = {}, {}
     for entry in _spelled_out(folder / "tables.toml", listed, "tables", words):
@@ -377,7 +405,7 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         "tables": tables,
         "printed": printed,
         "errata": listed.get("errata", ()),
-        "runs": _read_toml(folder / "runs.toml", optional=True).get("runs", ()),
+        "runs": _read_toml(folder / "runs.toml", ("runs",)).get("runs", ()),
         "claims": _spelled_out(folder / "claims.toml", claimed, "claims", words),
         "numbers": claimed.get("numbers", {}),
         "folder": folder,
@@ -386,12 +414,11 @@ def read_paper(folder: Path, package: str = "") -> Paper:
     try:
         paper = Paper.model_validate(parts)
     except ValidationError as error:
-        first, *place = error.errors()[0]["loc"]
-        file = folder / _FILES.get(str(first), "paper.toml")
-        what = error.errors()[0]["msg"].lower()
-        known = [name for name in Paper.model_fields if name not in ("folder", "package", *_FILES)]
-        allowed = "" if place or first in _FILES else f"; allowed are {', '.join(known)}"
-        raise _wrong(file, ".".join(map(str, (first, *place))), what + allowed) from error
+        first = error.errors()[0]
+        file = folder / _ELSEWHERE.get(str(first["loc"][0]), "paper.toml")
+        what = first["msg"].removeprefix("Value error, ")
+        what = what[0].lower() + what[1:]
+        raise _wrong(file, ".".join(map(str, first["loc"])), what) from error
     _check(paper)
     return paper
 
@@ -409,6 +436,7 @@ def _check(paper: Paper) -> None:
     named = [picture.model for picture in paper.pictures]
     named += [model for one in paper.plots.values() for model in one.models]
     named += [model for one in paper.runs for model in one.models]
+    named += [model for one in paper.exhibits for model in one.models]
     for model in named:
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"
@@ -435,13 +463,22 @@ def _read_text(file: Path) -> str:
         raise RegistryError(f"{file} of a paper cannot be read: {why}. {REMEDY}") from error
 
 
-def _read_toml(file: Path, *, optional: bool = False) -> dict[str, Any]:
-    if optional and not file.exists():
+def _read_toml(file: Path, allowed: Collection[str]) -> dict[str, Any]:
+    """Return what a file holds under these names; nothing if it is left out and may be."""
+    if file.name in _OPTIONAL and not file.exists():
         return {}
     try:
-        return tomllib.loads(_read_text(file))
+        read = tomllib.loads(_read_text(file))
     except tomllib.TOMLDecodeError as error:
         raise RegistryError(f"{file} is not TOML: {error}. {REMEDY}") from error
+    for name in read:
+        if name not in allowed:
+            raise _wrong(file, "at the top", _unknown(name, allowed))
+    return read
+
+
+def _unknown(name: str, allowed: Iterable[str]) -> str:
+    return f"{name!r} is not known here; allowed are {', '.join(allowed)}"
 
 
 def _entries(file: Path, read: Mapping[str, Any], name: str) -> list[dict[str, Any]]:

@@ -82,8 +82,37 @@ def test_cembench_s_own_paper_is_installed_and_the_usual_one():
 @pytest.mark.parametrize(
     ("file", "old", "new", "told"),
     [
-        ("paper.toml", "title", "titel", r"paper.toml: title: field required; allowed are title, "),
-        ("paper.toml", "machine", "speed", r"paper.toml: speed: extra inputs .*; allowed are"),
+        (
+            "paper.toml",
+            "title",
+            "titel",
+            r"paper.toml: at the top: 'titel' is not known here; allowed are title, au",
+        ),
+        (
+            "paper.toml",
+            "machine",
+            "speed",
+            r"paper.toml: at the top: 'speed' is not known here; allowed are title",
+        ),
+        ("paper.toml", 'doi = "10.1/x"', "", "paper.toml: doi: field required"),
+        (
+            "paper.toml",
+            "machine =",
+            "claims =",
+            "paper.toml: at the top: 'claims' is not known here",
+        ),
+        (
+            "tables.toml",
+            "[[tables]]",
+            "[[errata]]\n[[figures]]",
+            "'figures' is not known here; allo",
+        ),
+        (
+            "claims.toml",
+            "[words]",
+            "[word]",
+            "'word' is not known here; allowed are numbers, words,",
+        ),
         ("paper.toml", "reference =", "reference", r"paper.toml is not TOML: .*line 7"),
         (
             "paper.toml",
@@ -95,7 +124,12 @@ def test_cembench_s_own_paper_is_installed_and_the_usual_one():
         ("tables.toml", '"seconds.csv"', '"s.csv"', r"s\.csv of a paper cannot be read: No such"),
         ("tables.toml", "[[tables]]", "[tables]", r"tables: write each as a table \[\[tables\]\]"),
         ("tables.toml", "{machine}", "{laptop}", r"\{'laptop'\} is no word of \[words\]; known: m"),
-        ("tables.toml", "title =", "heading =", "tables.toml: printed.1.title: field required"),
+        (
+            "tables.toml",
+            "title =",
+            "heading =",
+            "tables.toml: printed.1: 'heading' is not known here; allowed are title, cap",
+        ),
         ("seconds.csv", "0.5,0.25", "fast,0.25", "tables.1.Foot.lscm: input should be a valid num"),
         ("seconds.csv", "0.5,0.25", "0.25", "seconds.csv: line 2: 3 cells, under 4 headings"),
         ("seconds.csv", "Hand", "Foot", "seconds.csv: line 3: the model 'Foot' occurs twice"),
@@ -112,8 +146,18 @@ def test_cembench_s_own_paper_is_installed_and_the_usual_one():
             "{least}",
             r"\{'least'\} is no word of \[words\]; known: machine",
         ),
-        ("claims.toml", "holds =", "hold =", r"claims.toml: claims.0.holds: field required"),
-        ("claims.toml", "place", "plase", "claims.toml: claims.0.place: field required"),
+        (
+            "claims.toml",
+            "holds =",
+            "hold =",
+            r"claims.toml: claims.0: 'hold' is not known here; allowed are name",
+        ),
+        (
+            "claims.toml",
+            "place",
+            "plase",
+            "claims.toml: claims.0: 'plase' is not known here; allowed are name, qu",
+        ),
     ],
 )
 def test_what_is_wrong_in_a_paper_is_said_with_its_place(folder, file, old, new, told):
@@ -132,6 +176,10 @@ model = "Foot"
 column = "fdm"
 reason = "a slip"
 """
+PLOT = """
+[plots.cost_by_face]
+fig = "Figure 1"
+"""
 PICTURE = """
 [[pictures]]
 figure = "Figure 1"
@@ -148,6 +196,12 @@ model = "Nose"
             "claims.toml",
             "[[claims]]" + FILES["claims.toml"].partition("[[claims]]")[2],
             "claim 'quick': occurs twice",
+        ),
+        ("paper.toml", PLOT, "plots.cost_by_face.*should be 'energy_by_iteration', 'angle_hist"),
+        (
+            "paper.toml",
+            PLOT.replace("face", "faces"),
+            "plots.cost_by_faces: 'fig' is not known here",
         ),
         ("paper.toml", PICTURE, "model 'Nose': no printed table has it; known: Foot, Hand"),
     ],

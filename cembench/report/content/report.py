@@ -106,7 +106,7 @@ def build_report(
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
         records=evidence.rows,
-        paper=evidence.paper.citation if of_paper else None,
+        paper=evidence.paper if of_paper else None,
     )
 
 

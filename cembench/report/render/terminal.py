@@ -336,9 +336,10 @@ def _printed(record: Record) -> str:
     """Return the paper's printed figures for this surface and algorithm, as text."""
     row, name = record.mesh.paper_row, record.cell.algorithm
     what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
-    tables = paper_of(row).tables
-    printed = {**tables.get(3, {}).get(row, {}), **tables.get(4, {}).get(row, {})}
-    energy, mean, sd = (printed.get(name + end) for end in ("", "_mean", "_sd"))
+    energy, mean, sd = (
+        paper_of(row).printed_figure(column, name, row)
+        for column in ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
+    )
     if energy is None or mean is None or sd is None:
         return what
     return f"{what}; printed: E_C {energy:.4f}, mean angle error {mean:.2f}, SD {sd:.2f}"
@@ -350,7 +351,7 @@ def _given(record: Record) -> str:
 
 
 def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
-    """Return counts of surfaces, their agreement with Table 2, and their conformal-factor span."""
+    """Return counts of surfaces, whether these are the paper's, and conformal-factor spans."""
     rows: list[list[str | Text]] = []
     for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
         mesh, check = facts.mesh, row_check(facts.mesh)
@@ -367,7 +368,7 @@ def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
             ]
         )
     heads = figures("vertices", "faces", "boundary", "not Delaunay", "span")
-    table = grid([names("surface"), *heads, names("Table 2")], rows)
+    table = grid([names("surface"), *heads, names("in print")], rows)
     folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
     span = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
     return Group(table, Text(f"{span}\nthumbnails: {', '.join(folders)}", style="dim"))
