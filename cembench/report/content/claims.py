@@ -48,11 +48,11 @@ def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
 def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
     """Return the run's frame with what claims need besides.
 
-    `policy` is the number of the linear-algebra policy, and `under` its name in brackets if there
-    are several. `chosen` are the records that stand for their algorithm on a surface, whatever the
-    policy; `model` those of the paper's models and `counted` those of one surface for each.
-    `speedup`, `speedup_low` and `verdict` compare with the main parameters of the reference.
-    `below_one` is the share of the corners whose angles change by less than a degree.
+    `policy` is the number of the linear-algebra policy. `chosen` are the records that stand for
+    their algorithm on a surface, whatever the policy; `model` those of the paper's models and
+    `counted` those of one surface for each. `speedup`, `speedup_low` and `verdict` compare with the
+    main parameters of the reference. `below_one` is the share of the corners whose angles change by
+    less than a degree.
     """
     import pandas as pd
 
@@ -67,7 +67,6 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
         rows.append(
             {
                 "policy": evidence.policies.index(record.cell.solves),
-                "under": under(record.cell.solves, evidence),
                 "chosen": chosen,
                 "model": bool(surface.paper_row),
                 "counted": surface in evidence.one_per_model,
@@ -91,7 +90,7 @@ def known_names(evidence: Evidence) -> dict[str, Any]:
 
     own: dict[str, Callable[..., Any]] = {
         "disk": disk,
-        "lacking_rounds": lacking_words,
+        "under": lambda policy: under(policy, evidence),
         "printed": paper.printed_figure,
         "stated": lambda what, algorithm: paper.stated[what][algorithm],
         "models_of": lambda plot: paper.plotted(plot).models,
@@ -161,15 +160,6 @@ def verdict_of(held: int, tested: int, lacking: int = 0) -> Verdict:
     if held == tested:
         return "holds"
     return "holds in part" if held else "does not hold here"
-
-
-def lacking_words(lacking: int, tested: int) -> str:
-    """Return on how many surfaces there are too few rounds for an interval; "" if on none.
-
-    >>> lacking_words(2, 6)
-    '; too few rounds on 2 more'
-    """
-    return f"; too few rounds on {lacking}{' more' * bool(tested)}" if lacking else ""
 
 
 def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:

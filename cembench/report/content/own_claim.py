@@ -31,10 +31,8 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
     origins = Counter(surface.origin for surface in evidence.one_per_model)
     models, others = origins["model"], origins["stand-in"]
-    over = [
-        *([f"{models} of its models"] if models else []),
-        *([f"{others} stand-in{'s' if others > 1 else ''}"] if others else []),
-    ]
+    over = [f"{models} of its models"] if models else []
+    over += [f"{others} stand-in{'s' if others > 1 else ''}"] if others else []
     intervals = (
         "with 95 % intervals over models and rounds"
         if any(sure for _, (_, sure) in told)
@@ -50,7 +48,7 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     """Return the measured averages as text, and whether one of them has an interval."""
     told, sure = [], False
     for algorithm in evidence.paper.compared:
-        rates, _ = measured_rates(evidence, algorithm, policy)
+        rates = list(measured_rates(evidence, algorithm, policy).values())
         series = evidence.series_of(algorithm)
         if not rates or series is None:
             told.append("not measured")

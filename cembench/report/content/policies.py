@@ -81,7 +81,7 @@ def speedups_table(evidence: Evidence) -> Table:
     for s in series:
         cells = [words(s.label)]
         for policy in BOTH:
-            rates, _ = measured_rates(evidence, s.algorithm, policy)
+            rates = list(measured_rates(evidence, s.algorithm, policy).values())
             if not rates:
                 cells += [missing("no rate"), missing("no rate")]
             else:

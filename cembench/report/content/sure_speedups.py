@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -31,26 +31,23 @@ CAPTION = (
 ONCE = " Each model counts once, and is preferred over its stand-in."
 
 
-@dataclass(frozen=True)
-class _Compared:
-    """An algorithm: its comparison with the reference and the rounds' ratios on each surface."""
-
-    series: AlgorithmSeries
-    found: Sequence[Comparison]
-    ratios: Sequence[Sequence[float]]
+#: The comparisons of an algorithm with the reference, and the rounds' ratios, of each surface.
+_Compared = list[tuple[Comparison, list[float]]]
 
 
 def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
     """Return tables on the certainty of the speedups; empty without comparable rounds."""
-    compared = [c for series in evidence.disk_series if (c := _compared(evidence, series, policy))]
+    surfaces = (*evidence.one_per_model, *evidence.others)
+    compared = {
+        series.label: found
+        for series in evidence.disk_series
+        if series.main and series.algorithm != evidence.reference
+        if (found := paired_rounds(evidence, series, policy, surfaces))
+    }
     if not compared:
         return []
-    together = iter(corrected([one for c in compared for one in c.found]))
-    rows = []
-    for c in compared:
-        both = [next(together) for _ in c.found]
-        rows.append(_row(c, both))
-    number, cem = sum(len(c.found) for c in compared), evidence.reference.upper()
+    together = corrected([one for found in compared.values() for one, _ in found])
+    number, cem, left = len(together), evidence.reference.upper(), iter(together)
     verdicts = (f"{cem} faster", f"{cem} slower", "undecided")
     columns = (
         Column("algorithm", numeric=False),
@@ -64,7 +61,10 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
             name=f"sure-speedups{policy_suffix(policy, evidence)}",
             title=f"Certainty of the speedups{in_policy(evidence, policy)}",
             columns=columns,
-            rows=tuple(rows),
+            rows=tuple(
+                _row(label, found, list(islice(left, len(found))))
+                for label, found in compared.items()
+            ),
             caption=CAPTION.format(n=number, cem=cem)
             + (ONCE if evidence.stand_ins_left_out else ""),
         )
@@ -76,7 +76,7 @@ def paired_rounds(
     series: AlgorithmSeries,
     policy: str,
     surfaces: Sequence[MeasuredSurface],
-) -> list[tuple[Comparison, list[float]]]:
+) -> _Compared:
     """Return the comparison with the reference and the rounds' ratios on surfaces with both."""
     found = []
     for surface in surfaces:
@@ -88,23 +88,15 @@ def paired_rounds(
     return found
 
 
-def _compared(evidence: Evidence, series: AlgorithmSeries, policy: str) -> _Compared | None:
-    if series.algorithm == evidence.reference or not series.main:
-        return None
-    surfaces = (*evidence.one_per_model, *evidence.others)
-    found = paired_rounds(evidence, series, policy, surfaces)
-    return _Compared(series, *zip(*found, strict=True)) if found else None
-
-
-def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
-    figures = [one.ratio for one in compared.found]
+def _row(label: str, compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
+    figures = [one.ratio for one, _ in compared]
     wins, losses = sum(r > 1 for r in figures), sum(r < 1 for r in figures)
     p, mean = sign_test(wins, losses), float(geometric(np.array(figures)))
-    interval = average_interval(compared.ratios, geometric)
+    interval = average_interval([ratios for _, ratios in compared], geometric)
     return (
-        words(compared.series.label),
+        words(label),
         count(len(figures)),
-        *_verdicts(compared.found),
+        *_verdicts([one for one, _ in compared]),
         *_verdicts(together),
         Value(f"{wins} of {wins + losses}", wins, "derived"),
         Value(f"p = {p:.2g}", p, "derived"),
