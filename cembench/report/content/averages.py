@@ -55,12 +55,9 @@ READINGS = (
 
 def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = None) -> list[float]:
     """Return the printed rates for these models (default: all), misprints from the seconds."""
-    rates = []
-    for model in paper.models if models is None else models:
-        rate = corrected_rate(paper, model, algorithm)
-        if rate is not None:
-            rates.append(rate)
-    return rates
+    chosen = paper.models if models is None else models
+    rates = (corrected_rate(paper, model, algorithm) for model in chosen)
+    return [rate for rate in rates if rate is not None]
 
 
 def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:

@@ -6,7 +6,8 @@ expressions (:class:`cembench.results.papers.StatedClaim`). They are evaluated h
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.errors import ParameterError
@@ -17,12 +18,19 @@ from cembench.report.document import Claim, Verdict
 from cembench.results.comparison import compare
 from cembench.results.frame import evaluate, filled
 from cembench.results.papers import StatedClaim
+from cembench.results.records import MeshOrigin
 
 if TYPE_CHECKING:
     import pandas as pd
 
 #: The surfaces' inspections by the hash of the mesh.
 Inspections = Mapping[str, Inspection]
+#: Words for surfaces by origin.
+_KINDS: Mapping[MeshOrigin, str] = {
+    "model": "the paper's own models",
+    "stand-in": "stand-ins for the paper's models",
+    "surface": "surfaces that are not in the paper",
+}
 
 
 def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
@@ -88,16 +96,19 @@ def known_names(evidence: Evidence) -> dict[str, Any]:
         mesh = evidence.mesh(next(s for s in evidence.surfaces if s.mesh_hash == place))
         return mesh if mesh is not None and len(mesh.loops) == 1 else None
 
-    own: dict[str, Callable[..., Any]] = {
+    return {
         "disk": disk,
         "under": lambda policy: under(policy, evidence),
         "printed": paper.printed_figure,
         "stated": lambda what, algorithm: paper.stated[what][algorithm],
         "models_of": lambda plot: paper.plotted(plot).models,
         "exhibits_of": lambda *of: [e.title for e in evidence.exhibits if e.figure in of],
+        "tables": paper.tables,
+        "compared": paper.compared,
+        "reference": evidence.reference,
+        **paper.numbers,
+        **paper.functions(),
     }
-    data = {"tables": paper.tables, "compared": paper.compared, "reference": evidence.reference}
-    return {**own, **data, **paper.numbers, **paper.functions()}
 
 
 def _tested(
@@ -164,19 +175,12 @@ def verdict_of(held: int, tested: int, lacking: int = 0) -> Verdict:
 
 def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:
     """Return a sentence on the kinds of surfaces behind a verdict."""
-    kinds = {
-        "model": "the paper's own models",
-        "stand-in": "stand-ins for the paper's models",
-        "surface": "surfaces that are not in the paper",
-    }
-    counts = {kind: sum(s.origin == kind for s in surfaces) for kind in kinds}
-    said = [f"{count} on {kinds[kind]}" for kind, count in counts.items() if count]
-    if not said:
+    counts = Counter(surface.origin for surface in surfaces)
+    kinds = [f"{counts[kind]} on {words}" for kind, words in _KINDS.items() if counts[kind]]
+    if not kinds:
         return "Nothing in this run to test it on."
-    words = f"Surfaces tested: {', '.join(said)}."
-    if not counts["model"]:
-        words += " None is a model of the paper itself: the verdict is about the algorithms here."
-    return words
+    own = " None is a model of the paper itself: the verdict is about the algorithms here."
+    return f"Surfaces tested: {', '.join(kinds)}.{own * (not counts['model'])}"
 
 
 def under(policy: str, evidence: Evidence) -> str:

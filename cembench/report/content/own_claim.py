@@ -49,15 +49,13 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     told, sure = [], False
     for algorithm in evidence.paper.compared:
         rates = list(measured_rates(evidence, algorithm, policy).values())
-        series = evidence.series_of(algorithm)
-        if not rates or series is None:
-            told.append("not measured")
-            continue
-        rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
-        interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
-        sure = sure or interval is not None
+        series, interval = evidence.series_of(algorithm), None
+        if rates and series is not None:
+            rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
+            interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
         between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
-        told.append(f"{mean_rate(rates):.1f}{between}")
+        told.append(f"{mean_rate(rates):.1f}{between}" if rates else "not measured")
+        sure = sure or interval is not None
     return ", ".join(told), sure
 
 
@@ -66,11 +64,9 @@ def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
     parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
     for verdict, (one, several) in VERDICTS.items():
         found = [claim for claim in claims if claim.verdict == verdict]
-        if not found:
-            continue
-        parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
-        parts.append(one if len(found) == 1 else several)
-        if verdict in _NAMED:
-            for k, claim in enumerate(found):
-                parts += [", " if k else ": ", claim]
+        if found:
+            parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
+            parts.append(one if len(found) == 1 else several)
+        for k, claim in enumerate(found if verdict in _NAMED else ()):
+            parts += [", " if k else ": ", claim]
     return (*parts, ".")

@@ -47,13 +47,13 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
                 if claim is None
                 else Value(reading.show(claim), claim, "printed")
             )
-            for rates in sets[algorithm]:
-                if rates:
-                    cells.append(
-                        Value(reading.show(reading.of(rates)), reading.of(rates), "derived")
-                    )
-                else:
-                    cells.append(missing("no rate to average"))
+            means = [reading.of(rates) if rates else None for rates in sets[algorithm]]
+            cells += [
+                missing("no rate to average")
+                if mean is None
+                else Value(reading.show(mean), mean, "derived")
+                for mean in means
+            ]
         rows.append(tuple(cells))
     if any(work_ratios(evidence, a, policy) for a in evidence.paper.compared):
         rows.append(_work_row(evidence, policy))

@@ -28,7 +28,7 @@ CAPTION = (
     "surfaces and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
     f"{NOT_DETECTED}"
 )
-ONCE = " Each model counts once, and is preferred over its stand-in."
+_ONCE = " Each model counts once, and is preferred over its stand-in."
 
 
 #: The comparisons of an algorithm with the reference, and the rounds' ratios, of each surface.
@@ -65,8 +65,7 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
                 _row(label, found, list(islice(left, len(found))))
                 for label, found in compared.items()
             ),
-            caption=CAPTION.format(n=number, cem=cem)
-            + (ONCE if evidence.stand_ins_left_out else ""),
+            caption=CAPTION.format(n=number, cem=cem) + _ONCE * bool(evidence.stand_ins_left_out),
         )
     ]
 
