@@ -71,7 +71,8 @@ def cost_by_faces(evidence: Evidence) -> Plot:
     paper, figure = evidence.paper, evidence.paper.plotted("cost_by_faces")
     usual = series_styles(paper.algorithms)
     groups = [(a.upper(), usual[a], printed_points(paper, a)) for a in paper.algorithms]
-    panels.append(_panel(groups, f"printed in the paper (Table {paper.table_of('seconds')})"))
+    number = paper.table_of("seconds")
+    panels.append(_panel(groups, "printed in the paper" + f" (Table {number})" * bool(number)))
     return Plot(
         figure.anchor or "cost-by-faces",
         "Computational cost against number of triangles",
