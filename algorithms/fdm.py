@@ -65,8 +65,8 @@ def fdm(
     program where the article leaves it open: the boundary edge that goes to z = 1 has the least sum
     of abs(mu) over its two ends, with mu of a vertex the mean over its triangles; a reflected
     triangle's coefficient carries a factor 1/3; the 1 % of vertices held far out are counted on the
-    doubled surface. On Chinese Lion the published standard deviation of angles, 2.04, needs both of
-    the first two (2.05 with either one left out); the third changes no printed digit.
+    doubled surface. The published standard deviations of angles need both of the first two
+    (docs/algorithms.md has the figures); the third changes no printed digit.
 
     Decided here: the midpoint of that edge is taken across the branch cut of the argument; a start
     that folds is replaced by uniform weights; triangles that have collapsed in the plane take the

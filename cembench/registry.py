@@ -443,7 +443,7 @@ def surface_family(
     notes : str
         Remarks (default: the docstring after its first line).
     paper_row : str
-        The model in the paper's Table 1 that the surface stands for, if any; the profiles consist
+        The model of a paper that the surface stands for, if any; the profiles consist
         of these surfaces.
     landmarks : callable, optional
         Returns the named vertices, such as the tip of a nose, of a mesh of any size that the

@@ -1,4 +1,4 @@
-"""The twenty stand-ins, one for each row of the paper's Table 2, with their landmarks.
+"""The stand-ins, one for each model of the paper, with their landmarks.
 
 Each is a function ``(faces, *, seed, delaunay) -> DiskMesh`` whose default size is that of its row;
 the result is cached (:mod:`meshes_gen.cache`).

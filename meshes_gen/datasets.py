@@ -1,4 +1,6 @@
-"""Real meshes that can be fetched: those in `real_meshes.tsv`, and the ICT face model."""
+"""Real meshes that can be fetched: those in `real_meshes.tsv`, models of installed papers in their
+`models.tsv`, and the ICT face model.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +8,17 @@ import csv
 import itertools
 from collections.abc import Mapping
 from functools import partial
-from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
+from cembench.core.errors import RegistryError, describe_error
 from cembench.mesh.datasets import Dataset, Part
+from cembench.results.papers import papers
 
 from .ict_model import EXPRESSIONS, IDENTITIES, NEUTRAL, model_folder, read_small, small_arrays
 
+#: The table of meshes that are no model of a paper.
+OWN = Path(__file__).with_name("real_meshes.tsv")
 _RAW = "https://raw.githubusercontent.com"
 _ICT = f"{_RAW}/ICT-VGL/ICT-FaceKit/da5f95a607f5e6b37755b38d3385d7f2853732e5/FaceXModel"
 #: Approximate bytes of one model file; all are text files with the same number of lines.
@@ -21,7 +26,7 @@ _ICT_SIZE = 2_558_000
 
 
 def dataset_of(row: Mapping[str, str]) -> Dataset:
-    """Return the dataset of a row of `real_meshes.tsv`; empty cells mean unknown."""
+    """Return the dataset of a row of such a table; empty cells mean unknown."""
     first, _, last = row["polygons"].partition("-")
     vertices, _, triangles = row["arrays"].partition(",")
     return Dataset(
@@ -41,9 +46,29 @@ def dataset_of(row: Mapping[str, str]) -> Dataset:
     )
 
 
+def read_datasets(file: Path) -> list[Dataset]:
+    """Return the datasets of a table.
+
+    Raises
+    ------
+    RegistryError
+        A column or a cell is missing, or a number is none.
+
+    """
+    lines = file.read_text(encoding="utf-8").splitlines()
+    try:
+        return [dataset_of(row) for row in csv.DictReader(lines, delimiter="\t")]
+    except (KeyError, ValueError, TypeError, AttributeError) as error:
+        raise RegistryError(
+            f"{file} is no table of meshes: {describe_error(error)}. Give it the columns of "
+            f"{OWN}, with a number of faces in each line."
+        ) from error
+
+
 def _real_meshes() -> tuple[Dataset, ...]:
-    text = (files(__package__) / "real_meshes.tsv").read_text(encoding="utf-8")
-    return tuple(map(dataset_of, csv.DictReader(text.splitlines(), delimiter="\t")))
+    of_papers = (paper.folder / "models.tsv" for paper in papers().values())
+    tables = (*(file for file in of_papers if file.is_file()), OWN)
+    return tuple(dataset for file in tables for dataset in read_datasets(file))
 
 
 def _ict_file(name: str) -> Dataset:

@@ -1,4 +1,4 @@
-"""The twenty models of the CEM paper with their counts, which the stand-ins match."""
+"""The models of the installed papers with their counts, which the stand-ins match."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cembench.results.papers import find_paper
+from cembench.results.papers import papers
 
 
 @dataclass(frozen=True)
 class Row:
-    """A model of the paper: its printed name and counts."""
+    """A model of a paper: its printed name and counts."""
 
     model: str
     vertices: int
@@ -33,14 +33,14 @@ class Row:
 
 
 def _rows() -> Mapping[str, Row]:
-    paper = find_paper("cem")
     return {
         model.lower().replace("'s ", " ").replace(" ", "-") + "-stand-in": Row(
             model, paper.count(model, "vertices"), paper.faces(model)
         )
+        for paper in reversed([*papers().values()])
         for model in paper.models
     }
 
 
-#: The rows in the paper's order, under the names of their stand-ins ("ho-pouting-face-stand-in").
+#: The rows under the names of their stand-ins ("ho-pouting-face-stand-in").
 ROWS = _rows()

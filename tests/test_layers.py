@@ -73,7 +73,7 @@ BUDGETS = {
     "results": 4_000,
     "running": 7_210,
     "drawing": 1_750,
-    "report": 7_950,
+    "report": 7_970,
     "validation": 2_400,
     "workflows": 6_100,
     "commands": 4_100,

@@ -140,7 +140,7 @@ def list_(
     """List the algorithms and surfaces.
 
     `list surfaces` also describes the stand-ins for the paper's models: their
-    counts, whether they match their rows of Table 2, how unevenly CEM scales
+    counts, whether these match the printed ones, how unevenly CEM scales
     them, and where their thumbnails are. Only stand-ins that were measured are
     shown; --measure measures the others.
     """
@@ -192,7 +192,7 @@ def run(
     profile: Annotated[
         Profile | None,
         typer.Option(
-            help="The paper's models: the 8 smallest, those up to 210 k faces, or all 20."
+            help="The paper's models: the smallest, those up to a number of faces, or all."
         ),
     ] = None,
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
@@ -225,7 +225,7 @@ def run(
             "-a",
             "--algorithms",
             help="Comma-separated, or all. Default: the usual ones (see `cembench list`), or the "
-            "paper's four for `--profile quick`.",
+            "paper's own for `--profile quick`.",
         ),
     ] = [],  # noqa: B006
     parameter: Parameters = [],  # noqa: B006

@@ -1,4 +1,4 @@
-"""The command `holes`: the steps of Koebe's method and its result (Figures 1 and 7)."""
+"""The command `holes`: the steps of Koebe's method and its result."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cembench.commands.console import Json, complain, err, out, print_json
 from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
 
-#: The surface of the paper's Figures 1 and 7.
+#: The surface that is mapped where none is named.
 STAND_IN = "ho-face-with-holes"
 
 
@@ -40,7 +40,7 @@ def holes(
     ] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """Map surfaces with holes, and draw the steps of Koebe's method (Figures 1 and 7).
+    """Map surfaces with holes, and draw the steps of Koebe's method.
 
     One sweep is the paper's Algorithm 2. The table compares it with the best
     number of sweeps, by conformal energy, and with every other algorithm for this

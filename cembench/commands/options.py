@@ -101,8 +101,7 @@ Budget = Annotated[
     typer.Option(
         metavar="TIME",
         help="Time of the run, e.g. 30m. While it lasts cells get rounds, the cheapest their first "
-        "7 before others; each has one (default: 105s for `quick`, 1h for `standard`, 4h for "
-        "`paper`, else 30m).",
+        "7 before others; each has one (default: that of the profile, else 30m).",
     ),
 ]
 
@@ -172,8 +171,6 @@ Verify = Annotated[
 ]
 
 
-#: Seconds after which cells get no more rounds.
-USUAL_BUDGETS = {Profile.quick: 105.0, Profile.standard: 3600.0, Profile.paper: 4 * 3600.0}
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
 
@@ -211,7 +208,11 @@ def budget_seconds(given: str | None, profile: Profile | None) -> float:
     from cembench.running.options import USUAL_BUDGET
 
     if given is None:
-        return USUAL_BUDGET if profile is None else USUAL_BUDGETS[profile]
+        from cembench.results.papers import usual_paper
+        from cembench.running.local import USUAL_BUDGET
+
+        budgets = usual_paper().profiles.budgets
+        return budgets.get(profile, USUAL_BUDGET) if profile else USUAL_BUDGET
     text = given.strip().lower()
     try:
         seconds = float(text[:-1]) * _UNITS[text[-1:]]

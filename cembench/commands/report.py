@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -35,6 +34,8 @@ PaperName = Annotated[
         help="The paper whose tables and claims it has: an installed one, or its folder.",
     ),
 ]
+#: What ``--json`` has of the paper.
+CITATION = {"title", "authors", "place", "doi"}
 #: Processes that draw, at most: each holds a surface with its maps.
 MOST_DRAWING = 2
 
@@ -133,7 +134,7 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
     found = report.findings
     return {
         "title": report.title,
-        "paper": asdict(report.paper) if report.paper else None,
+        "paper": report.paper and report.paper.model_dump(include=CITATION),
         "findings": [plain(sentence) for sentence in found.sentences] if found else [],
         "suspects": list(found.suspects) if found else [],
         "report": str(folder),

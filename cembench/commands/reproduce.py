@@ -41,7 +41,7 @@ def reproduce(
     fresh: Fresh = False,
     as_json: Json = False,
 ) -> None:
-    """Measure the paper's algorithms on its eight smallest models, and write a report.
+    """Measure the paper's algorithms on its smallest models, and write a report.
 
     Models that are public are fetched (20 seconds at most), and the others have
     stand-ins. It takes about five minutes. What the folder already holds is not

@@ -98,7 +98,7 @@ def _angles(V: Real, F: NDArray[np.int64]) -> Real:
 
 
 def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:
-    """Return the absolute change of each corner's angle in degrees (Table 4), shape (m, 3)."""
+    """Return the absolute change of each corner's angle in degrees, shape (m, 3)."""
     image = _coordinates(uv)
     return in_blocks(lambda some: np.abs(_angles(mesh.V, some) - _angles(image, some)), mesh.F)
 

@@ -61,8 +61,8 @@ def slug(name: str, longest: int = LONGEST) -> str:
 
     Different names may have the same slug: see :func:`distinct_slugs`.
 
-    >>> slug("Liu's Wry Face")
-    'liu-s-wry-face'
+    >>> slug("Ann's Wry Face")
+    'ann-s-wry-face'
     """
     plain = re.sub(r"[^A-Za-z0-9]+", "-", name).strip("-").lower() or "unnamed"
     if len(plain) <= longest:

@@ -73,7 +73,7 @@ class Dataset:
     size : int or None
         Bytes, if known; no more are read.
     paper_row : str
-        The model of the paper's Table 1 that the mesh is, if any.
+        The model of a paper that the mesh is, if any.
     mesh_hash : str
         Hash of the mesh, by which it is recognised in other files; "" if unknown.
     group : str

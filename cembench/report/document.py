@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Any, Literal, TypeAlias
 
-from cembench.results.papers import Citation
+from cembench.results.papers import Paper
 
 #: Origin of a number; a table never mixes two origins in a column without a mark.
 Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
@@ -118,7 +118,7 @@ class Figure:
     alternative : str
         Text for readers who cannot see it.
     paper : str
-        The paper's figure that it reproduces, e.g. "Figure 8"; empty for others.
+        The paper's figure that it reproduces; empty for others.
     record : str
         Key of the record whose map it shows; empty for others.
 
@@ -266,7 +266,7 @@ class Report:
     #: Records by key, as rows (cembench.results.record_rows), that the values link to.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
-    paper: Citation | None = None
+    paper: Paper | None = None
 
 
 def missing(why: str, text: str = "-") -> Value:

@@ -24,11 +24,12 @@ from cembench.core.atomic import draft_folder, unwritable, write_text
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.names import distinct_slugs
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import build_report
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.results.machines import machine_of, machine_of_record, software_differences
+from cembench.results.record_rows import REFERENCE
 
 #: Is told which run's report is made, how many are done, and how many there are.
 Progress = Callable[[str, int, int], None]

@@ -124,7 +124,7 @@ def factor_spans(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> dict[str, fl
 
 
 def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
-    """Return how well a surface matches its row of the paper's Table 2; None without a row.
+    """Return how well a surface matches the counts printed for its model; None without a row.
 
     Deviations are relative to the row's counts; a disk with V vertices and F triangles has
     2 V - F - 2 vertices on its boundary.

@@ -13,6 +13,7 @@ from typing import Any
 
 from cembench.conformal.atlas import ATLAS_METRICS
 from cembench.conformal.metrics import METRICS, Metric
+from cembench.core.notices import NoticeKind, of_kind
 from cembench.results.comparison import is_unstable, seconds_interval
 from cembench.results.external_words import solve_words
 from cembench.results.records import LinearAlgebraWork, Outcome, Record
@@ -265,6 +266,7 @@ DERIVED = (
     ),
     _C("factor_millions", _in(MILLION, "entries"), "factor, M", form=".3g", lacking=_uncounted),
     _C("solve_from", _solve_from, "solve from"),
+    _C("definition_1", lambda r: of_kind(NoticeKind.DEFINITION_1, r.mesh.notices)),
     _C("faults", lambda r: sorted({fault.kind.value for fault in r.outcome.faults})),
 )  # fmt: skip
 #: All columns by name.

@@ -46,7 +46,7 @@ UNSTABLE_WIDTH = 2 * USUAL_PRECISION
 class Comparison:
     """Ratio of a record's seconds to those of a reference.
 
-    `speedup` is Eq. 33 of the paper, t / t_reference - 1: how much faster the reference is.
+    `speedup` is t / t_reference - 1: how much faster the reference is.
     `verdict` is about the record, not the reference.
     """
 
@@ -65,7 +65,7 @@ class Comparison:
 
     @property
     def speedup(self) -> float:
-        """Eq. 33: 0 for equal times, 1 if the reference takes half the time."""
+        """Rate of speedup: 0 for equal times, 1 if the reference takes half the time."""
         return self.ratio - 1
 
     @property

@@ -53,7 +53,7 @@ class ExhibitTable(BaseModel):
 class Exhibit(BaseModel):
     """Pictures and tables that a report shows in their own section.
 
-    `figure` is the paper's figure that it reproduces ("Figure 7"), if any; `origin` names the
+    `figure` is the paper's figure that it reproduces, if any; `origin` names the
     surface; `command` makes it again; `facts` are figures by name, as the command's ``--json``
     prints them.
     """

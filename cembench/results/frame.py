@@ -2,30 +2,34 @@
 
 An expression is Python over the frame's columns (:mod:`cembench.results.columns`) and these
 functions, e.g. ``median(angle_error_mean_deg[ok])``. Nothing else can be named in one, so that a
-declaration reads a run and does nothing else.
+declaration reads a run and does nothing else; a paper adds the functions of its own folder.
 """
 
 from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cembench.core.errors import ParameterError
+from cembench.results.columns import significant
 from cembench.results.intervals import LEVEL
-from cembench.results.many import geometric
+from cembench.results.many import geometric, sign_test
 
 if TYPE_CHECKING:
     import pandas as pd
 
+_NOTHING: Mapping[str, Any] = MappingProxyType({})
 #: Maximum number of entries that :func:`commonest` names.
 _NAMED = 3
 #: What a value may be asked for: everything else of a column is out of reach.
-_METHODS = frozenset({"isin", "isna", "notna", "str", "startswith", "endswith", "contains", "abs"})
+_METHODS = frozenset(
+    {"isin", "isna", "notna", "str", "startswith", "endswith", "contains", "abs", "len"}
+)
 
 
 def share_interval(successes: int, n: int) -> tuple[float, float]:
@@ -61,6 +65,16 @@ def commonest(of: pd.Series) -> str:
     return named or "none"
 
 
+def listed(before: str, texts: Iterable[object], after: str = "", between: str = "; ") -> str:
+    """Return texts in a row between two others, or nothing if there are none.
+
+    >>> listed("; not on ", ["a", "b"], between=", ")
+    '; not on a, b'
+    """
+    found = between.join(map(str, texts))
+    return f"{before}{found}{after}" if found else ""
+
+
 def _percentile(known: Any, q: float) -> float:
     return float(np.percentile(known, q))
 
@@ -85,14 +99,23 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "largest": _figure(np.max),
         "geometric": _figure(geometric),
         "at_largest": _at_largest,
-        "first": lambda of: of.iloc[0],
+        "first": lambda of: of.iloc[0] if len(of) else None,
         "commonest": commonest,
+        "total": lambda of: of.sum(),
+        "setting": lambda of, name: of.map(lambda parameters: parameters.get(name)),
+        "listed": listed,
+        "significant": significant,
+        "sign_test": sign_test,
+        "len": len,
+        "min": min,
+        "max": max,
+        "abs": abs,
     }
 )
 
 
-def evaluate(expression: str, frame: pd.DataFrame) -> Any:
-    """Return the value of an expression over a frame.
+def evaluate(expression: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> Any:
+    """Return the value of an expression over a frame; `more` names what else is known in it.
 
     Raises
     ------
@@ -100,16 +123,19 @@ def evaluate(expression: str, frame: pd.DataFrame) -> Any:
         The expression cannot be read, names something unknown, or fails on this frame.
 
     """
-    known = {**FUNCTIONS, **{str(name): frame[name] for name in frame}}
+    known = {**FUNCTIONS, **more}
+    columns = {str(name) for name in frame} - more.keys()
     try:
         tree = ast.parse(expression, mode="eval")
     except SyntaxError as error:
         raise ParameterError(f"{expression!r} is no expression: {error.msg}.") from error
     for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id not in known:
+        if isinstance(node, ast.Name) and node.id in columns:
+            known[node.id] = frame[node.id]
+        elif isinstance(node, ast.Name) and node.id not in known:
             raise ParameterError(
                 f"{expression!r} names {node.id!r}; known are the functions "
-                f"{', '.join(FUNCTIONS)} and the columns {', '.join(sorted(map(str, frame)))}."
+                f"{', '.join((*FUNCTIONS, *more))} and the columns {', '.join(sorted(columns))}."
             )
         if isinstance(node, ast.Attribute) and node.attr not in _METHODS:
             raise ParameterError(
@@ -121,3 +147,16 @@ def evaluate(expression: str, frame: pd.DataFrame) -> Any:
         return eval(compile(tree, "<declaration>", "eval"), {"__builtins__": {}}, known)
     except Exception as error:
         raise ParameterError(f"{expression!r} fails on this run: {error}.") from error
+
+
+def filled(text: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> str:
+    """Return a text with expressions in braces replaced by their values, as in an f-string.
+
+    Raises
+    ------
+    ParameterError
+        As for :func:`evaluate`.
+
+    """
+    # The space keeps a quotation mark at the end apart from those around.
+    return str(evaluate(f'f"""{text} """', frame, more))[:-1]

@@ -1,7 +1,7 @@
 """Papers: folders of data with printed tables, misprints, claims and how the paper was run.
 
 A folder holds `paper.toml`, `tables.toml` with the CSV files that it names and, if wanted,
-`runs.toml`, `claims.toml` and the Python modules that test claims. `papers/cem` is an example.
+`runs.toml`, `claims.toml` and `checks.py`, the numerics of claims. `papers/cem` is an example.
 Installed papers are found by the entry points of the group ``cembench.papers``, each of which names
 the package that is the folder.
 """
@@ -13,58 +13,71 @@ import importlib
 import importlib.util
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from functools import lru_cache
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from cembench.core.errors import RegistryError, describe_error
 from cembench.core.names import digest
+from cembench.results.intervals import DEFAULT_ROUNDS
+from cembench.results.profiles import Profile
 
 if TYPE_CHECKING:
     from cembench.registry import Algorithm
 
 #: Group of the entry points of papers.
 GROUP = "cembench.papers"
+#: Files that a paper need not have.
+_OPTIONAL = ("runs.toml", "claims.toml")
+#: Fields in which names in braces stand for words and numbers.
+_PROSE = frozenset({"title", "caption", "quote", "place", "test", "remark"})
 REMEDY = "Repair it; papers/cem is an example."
 #: The file that a part of a paper is in; others are in paper.toml.
-_FILES = {"runs": "runs.toml", "claims": "claims.toml"} | dict.fromkeys(
-    ("tables", "printed", "errata"), "tables.toml"
-)
+_ELSEWHERE = {
+    **dict.fromkeys(("folder", "package"), ""),
+    **dict.fromkeys(("tables", "printed", "errata"), "tables.toml"),
+    **dict.fromkeys(("claims", "numbers"), "claims.toml"),
+    "runs": "runs.toml",
+}
 
+#: The plots of the report that can be a figure of a paper.
+PlotName = Literal[
+    "energy_by_iteration",
+    "angle_histograms",
+    "cost_by_faces",
+    "energy_over_models",
+    "angles_over_models",
+]
 #: Printed figures of a model by column; None where the paper has a dash.
 Row = Mapping[str, float | None]
-
-
-@dataclass(frozen=True)
-class Citation:
-    """Where a paper was published; `place` is the journal with volume, year and pages."""
-
-    title: str
-    authors: str
-    place: str
-    doi: str
-
-    @property
-    def address(self) -> str:
-        """The address that the doi resolves to."""
-        return f"https://doi.org/{self.doi}"
 
 
 class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, given: Any) -> Any:
+        for name in given if isinstance(given, dict) else ():
+            if name not in cls.model_fields:
+                raise ValueError(_unknown(name, cls.model_fields))
+        return given
+
 
 class ProfileLimits(_Part):
-    """The number of smallest models in `quick`, and the most triangles of one in `standard`."""
+    """The number of smallest models in `quick`, and the most triangles of one in `standard`.
+
+    `budgets` are the seconds after which cells get no more rounds, by profile.
+    """
 
     quick: int = 8
     standard: int = 210_000
+    budgets: Mapping[Profile, float] = {}
 
 
 class Picture(_Part):
@@ -88,11 +101,16 @@ class PlottedFigure(_Part):
 
 
 class ExpectedExhibit(_Part):
-    """A figure that a command of cembench adds to a run."""
+    """A figure that a command of cembench adds to a run, as an exhibit of this kind.
+
+    With `models` it is one only for surfaces that are, or stand in for, these, in this order.
+    """
 
     figure: str
     shows: str
     command: str
+    exhibit: str
+    models: tuple[str, ...] = ()
 
 
 class PrintedFigure(_Part):
@@ -146,19 +164,57 @@ class HowRun(_Part):
 
 
 class StatedClaim(_Part):
-    """A sentence of the paper with its test.
+    """A sentence of the paper with its test on a run.
 
-    That is an expression (:mod:`cembench.results.frame`), which `holds` for the maps of a surface
-    by `algorithms`, or a `check`, which is ``module:function`` of the folder.
+    The test is made of expressions (:mod:`cembench.results.frame`), in which the numbers of the
+    file and the public functions of the folder's `checks.py` are known too. Some of the frame's
+    rows are grouped to cases, a surface each as a rule, and each case is decided. Fields that
+    several claims share may be in the file's ``[cases.NAME]``: a claim with ``cases = "NAME"`` has
+    them unless it has its own.
+
+    Parameters
+    ----------
+    name, quote, place, test, remark : str
+        Its name, the paper's words, their place, the test in words, and what is to be said of it.
+    rows : str
+        Which rows of the frame it is about.
+    algorithms : tuple of str
+        Only rows of these, and only cases that have them all.
+    per : tuple of str
+        Columns that make a case; they are single values in the expressions below. Without any, all
+        rows are one case.
+    each : mapping of str to str
+        Values of a case by name, for the further expressions; a case is left out if one is None.
+    holds, of : str
+        Whether it holds for a case, or in how many of how many tests.
+    lacking : str
+        How many tests of a case lack rounds: they decide nothing.
+    figures, none, further : str
+        The result in words, what is said instead without any case, and what follows the remark:
+        texts with expressions in braces, in which the values of the cases are columns, and `held`
+        and `tested` are numbers.
+    over : str
+        Rows of the surfaces that the remark counts, by default those tested; None: no such remark.
+
     """
 
     name: str
     quote: str
     place: str
     test: str
-    check: str = ""
-    holds: str = ""
+    rows: str = "ok & main & chosen & model"
     algorithms: tuple[str, ...] = ()
+    per: tuple[str, ...] = ("place", "surface")
+    each: Mapping[str, str] = {}
+    holds: str
+    of: str = "1"
+    lacking: str = "0"
+    figures: str = (
+        "true on {held} of {tested} surfaces{listed('; not on ', surface[~holds], between=', ')}"
+    )
+    none: str = ""
+    further: str = ""
+    over: str = ""
     remark: str = ""
 
 
@@ -170,6 +226,7 @@ class Paper(_Part):
     package: str = ""
     title: str
     authors: str
+    #: The journal with volume, year and pages.
     place: str
     doi: str
     #: Under their names in cembench, in the order of the columns.
@@ -179,10 +236,12 @@ class Paper(_Part):
     #: What it was measured on.
     machine: str = ""
     profiles: ProfileLimits = ProfileLimits()
+    #: What its rate of speedup is.
+    rate: str = "the rate of speedup, t / t_reference - 1"
     #: Averages in its text, by what is averaged and by algorithm.
-    stated: Mapping[str, Mapping[str, float]] = {}
+    stated: Mapping[Literal["rate", "saving"], Mapping[str, float]] = {}
     pictures: tuple[Picture, ...] = ()
-    plots: Mapping[str, PlottedFigure] = {}
+    plots: Mapping[PlotName, PlottedFigure] = {}
     exhibits: tuple[ExpectedExhibit, ...] = ()
     #: The printed tables with their misprints, by number, model and column.
     tables: Mapping[int, Mapping[str, Row]] = {}
@@ -190,11 +249,13 @@ class Paper(_Part):
     errata: tuple[Erratum, ...] = ()
     runs: tuple[HowRun, ...] = ()
     claims: tuple[StatedClaim, ...] = ()
+    #: Numbers that the claims name.
+    numbers: Mapping[str, Any] = {}
 
     @property
-    def citation(self) -> Citation:
-        """Where it was published."""
-        return Citation(self.title, self.authors, self.place, self.doi)
+    def address(self) -> str:
+        """The address that the doi resolves to."""
+        return f"https://doi.org/{self.doi}"
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -227,9 +288,20 @@ class Paper(_Part):
         """Return the number of triangles of a model."""
         return self.count(model, "faces")
 
-    def plotted(self, plot: str) -> PlottedFigure:
+    def plotted(self, plot: PlotName) -> PlottedFigure:
         """Return the figure that is plotted in this way; an empty one if there is none."""
         return self.plots.get(plot, PlottedFigure())
+
+    def exhibited(self, exhibit: str, models: Sequence[str] = ()) -> str:
+        """Return the figure that an exhibit of this kind on these models is; "" if none."""
+        return next(
+            (
+                one.figure
+                for one in self.exhibits
+                if one.exhibit == exhibit and one.models in ((), tuple(models))
+            ),
+            "",
+        )
 
     def as_printed(self, model: str, algorithms: Iterable[Algorithm]) -> dict[str, Any]:
         """Return the parameters with which the paper ran algorithms on this model of its own.
@@ -253,33 +325,38 @@ class Paper(_Part):
             for name, value in parameters.items()
         }
 
-    def check(self, claim: StatedClaim) -> Callable[..., Any]:
-        """Return the function that tests a claim.
+    def printed_figure(self, column: str, algorithm: str, model: str) -> float | None:
+        """Return what a table prints of a model's map for this column of the frame, if anything."""
+        number = self.table_of(column)
+        if number is None or model not in self.tables[number]:
+            return None
+        figure = next(one for one in self.printed[number].figures if one.column == column)
+        return self.tables[number][model].get(figure.printed.format(algorithm))
+
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """Return the public functions of the folder's `checks.py`, by name.
 
         Raises
         ------
         RegistryError
-            There is no such function, or its module cannot be imported.
+            It cannot be imported.
 
         """
-        module, _, name = claim.check.partition(":")
-        where = f"{self.folder / 'claims.toml'}: claim {claim.name!r}: check {claim.check!r}"
+        file = self.folder / "checks.py"
+        if not file.is_file():
+            return {}
+        package = self.package or _package_of(self.folder)
         try:
-            package = self.package or _package_of(self.folder)
-            loaded = importlib.import_module(f"{package}.{module}")
+            loaded = importlib.import_module(f"{package}.checks")
         except Exception as error:
-            raise RegistryError(
-                f"{where}: module {module!r} cannot be imported: {describe_error(error)}. Repair "
-                f"{self.folder / module}.py, or name another."
-            ) from error
-        found = getattr(loaded, name, None)
-        if not callable(found):
-            raise RegistryError(
-                f"{where}: {module}.py has no function {name!r}; a check is module:function. "
-                "Define it, or name another."
-            )
-        call: Callable[..., Any] = found
-        return call
+            raise _wrong(file, "cannot be imported", describe_error(error)) from error
+        return {
+            name: value
+            for name, value in vars(loaded).items()
+            if isinstance(value, FunctionType)
+            and value.__module__.startswith(f"{package}.")
+            and not name.startswith("_")
+        }
 
 
 #: What a report without any paper has instead.
@@ -310,10 +387,11 @@ def read_paper(folder: Path, package: str = "") -> Paper:
 
     """
     folder = folder.absolute()
-    about = _read_toml(folder / "paper.toml")
-    listed = _read_toml(folder / "tables.toml")
-    claimed = _read_toml(folder / "claims.toml", optional=True)
-    words = {"machine": about.get("machine", "")}
+    of_paper = [name for name in Paper.model_fields if name not in _ELSEWHERE]
+    about = _read_toml(folder / "paper.toml", of_paper)
+    listed = _read_toml(folder / "tables.toml", ("tables", "errata"))
+    claimed = _read_toml(folder / "claims.toml", ("numbers", "words", "cases", "claims"))
+    words = {"machine": about.get("machine", ""), "fewest_rounds": DEFAULT_ROUNDS}
     printed, tables = {}, {}
     for entry in _spelled_out(folder / "tables.toml", listed, "tables", words):
         number, file = entry.pop("number", None), entry.pop("file", None)
@@ -327,20 +405,20 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         "tables": tables,
         "printed": printed,
         "errata": listed.get("errata", ()),
-        "runs": _read_toml(folder / "runs.toml", optional=True).get("runs", ()),
+        "runs": _read_toml(folder / "runs.toml", ("runs",)).get("runs", ()),
         "claims": _spelled_out(folder / "claims.toml", claimed, "claims", words),
+        "numbers": claimed.get("numbers", {}),
         "folder": folder,
         "package": package,
     }
     try:
         paper = Paper.model_validate(parts)
     except ValidationError as error:
-        first, *place = error.errors()[0]["loc"]
-        file = folder / _FILES.get(str(first), "paper.toml")
-        what = error.errors()[0]["msg"].lower()
-        known = [name for name in Paper.model_fields if name not in ("folder", "package", *_FILES)]
-        allowed = "" if place or first in _FILES else f"; allowed are {', '.join(known)}"
-        raise _wrong(file, ".".join(map(str, (first, *place))), what + allowed) from error
+        first = error.errors()[0]
+        file = folder / _ELSEWHERE.get(str(first["loc"][0]), "paper.toml")
+        what = first["msg"].removeprefix("Value error, ")
+        what = what[0].lower() + what[1:]
+        raise _wrong(file, ".".join(map(str, first["loc"])), what) from error
     _check(paper)
     return paper
 
@@ -358,6 +436,7 @@ def _check(paper: Paper) -> None:
     named = [picture.model for picture in paper.pictures]
     named += [model for one in paper.plots.values() for model in one.models]
     named += [model for one in paper.runs for model in one.models]
+    named += [model for one in paper.exhibits for model in one.models]
     for model in named:
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"
@@ -367,16 +446,9 @@ def _check(paper: Paper) -> None:
             what = f"no table has the column 'faces' for {model!r}"
             raise _wrong(paper.folder / "tables.toml", "tables", what)
     names = [claim.name for claim in paper.claims]
-    for claim in paper.claims:
-        where = f"claim {claim.name!r}"
-        if names.count(claim.name) > 1:
-            raise _wrong(paper.folder / "claims.toml", where, "occurs twice")
-        if bool(claim.holds) == bool(claim.check) or bool(claim.holds) != bool(claim.algorithms):
-            what = 'it needs either "check", or "holds" and "algorithms"'
-            raise _wrong(paper.folder / "claims.toml", where, what)
-        if claim.check and not all(claim.check.partition(":")):
-            what = f"check {claim.check!r} is not module:function"
-            raise _wrong(paper.folder / "claims.toml", where, what)
+    for name in names:
+        if names.count(name) > 1:
+            raise _wrong(paper.folder / "claims.toml", f"claim {name!r}", "occurs twice")
 
 
 def _wrong(file: Path, where: str, what: str) -> RegistryError:
@@ -391,13 +463,22 @@ def _read_text(file: Path) -> str:
         raise RegistryError(f"{file} of a paper cannot be read: {why}. {REMEDY}") from error
 
 
-def _read_toml(file: Path, *, optional: bool = False) -> dict[str, Any]:
-    if optional and not file.exists():
+def _read_toml(file: Path, allowed: Collection[str]) -> dict[str, Any]:
+    """Return what a file holds under these names; nothing if it is left out and may be."""
+    if file.name in _OPTIONAL and not file.exists():
         return {}
     try:
-        return tomllib.loads(_read_text(file))
+        read = tomllib.loads(_read_text(file))
     except tomllib.TOMLDecodeError as error:
         raise RegistryError(f"{file} is not TOML: {error}. {REMEDY}") from error
+    for name in read:
+        if name not in allowed:
+            raise _wrong(file, "at the top", _unknown(name, allowed))
+    return read
+
+
+def _unknown(name: str, allowed: Iterable[str]) -> str:
+    return f"{name!r} is not known here; allowed are {', '.join(allowed)}"
 
 
 def _entries(file: Path, read: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
@@ -424,23 +505,37 @@ def _read_table(file: Path) -> dict[str, dict[str, str | None]]:
 
 
 def _spelled_out(
-    file: Path, read: Mapping[str, Any], name: str, words: Mapping[str, str]
+    file: Path, read: Mapping[str, Any], name: str, known: Mapping[str, Any]
 ) -> list[dict[str, Any]]:
-    """Return the tables ``[[name]]`` of a file with words in place of their names in braces.
+    """Return the tables ``[[name]]`` of a file, what names in braces stand for in their prose.
 
-    The words are those given, and the file's ``[words]``.
+    They are those given, the file's ``[numbers]``, and its ``[words]``, which may hold the others.
+    A table with `cases` has also what ``[cases]`` has under that name.
     """
-    words = {**words, **read.get("words", {})}
     try:
+        known = {**known, **read.get("numbers", {})}
+        known |= {key: str(text).format_map(known) for key, text in read.get("words", {}).items()}
         return [
-            {key: text.format_map(words) if isinstance(text, str) else text
-             for key, text in one.items()}
-            for one in _entries(file, read, name)
-        ]  # fmt: skip
+            {
+                key: text.format_map(known) if key in _PROSE and isinstance(text, str) else text
+                for key, text in one.items()
+            }
+            for one in map(partial(_with_cases, file, read), _entries(file, read, name))
+        ]
     except (LookupError, ValueError) as error:
-        known = ", ".join(words) or "none"
-        what = f"{{{error}}} is no word of [words]; known: {known}"
+        what = f"{{{error}}} is no word of [words]; known: {', '.join(known) or 'none'}"
         raise _wrong(file, name, what) from error
+
+
+def _with_cases(file: Path, read: Mapping[str, Any], claim: dict[str, Any]) -> dict[str, Any]:
+    """Return a claim with the fields of its `cases`, and what they and it have under `each`."""
+    shared, name = read.get("cases", {}), claim.pop("cases", None)
+    if name is None:
+        return claim
+    if name not in shared:
+        what = f"there is no [cases.{name}]; known: {', '.join(shared) or 'none'}"
+        raise _wrong(file, f"claim {claim.get('name')!r}", what)
+    return {**shared[name], **claim, "each": shared[name].get("each", {}) | claim.get("each", {})}
 
 
 @lru_cache(maxsize=1)

@@ -17,7 +17,7 @@ from cembench.results.comparison import (
 from cembench.results.many import corrected
 from cembench.results.records import Record
 
-#: Default reference algorithm for speedups, as in the paper's Table 2.
+#: The algorithm that others are compared with where neither a paper nor an option names one.
 REFERENCE = "cem"
 _METRICS = frozenset(metric.name for metric in FIGURES)
 
@@ -58,7 +58,7 @@ def _compared(
     together: Comparison | None,
     cpu: Comparison | None,
 ) -> dict[str, Any]:
-    """Return the columns of the speedup of the reference (Eq. 33) and its verdicts."""
+    """Return the columns of the speedup of the reference and its verdicts."""
     interval = found.speedup_interval if found else None
     cpu_interval = cpu.interval if cpu else None
     return {

@@ -195,7 +195,7 @@ class MeshFacts(BaseModel):
     boundary_vertices: Count
     non_delaunay_share: Annotated[float, Field(ge=0, le=1)]
     notices: tuple[KeptNotice, ...] = ()
-    #: The model of the paper's Table 1 that the surface is or stands in for, if any.
+    #: The model of a paper that the surface is or stands in for, if any.
     paper_row: str = ""
     origin: MeshOrigin = "surface"
 

@@ -38,7 +38,7 @@ class Task:
 
 @dataclass(frozen=True)
 class PaperRole:
-    """A surface's row in the paper's Table 1, and whether it is that model or a stand-in."""
+    """A surface's model of a paper, and whether it is that model or a stand-in."""
 
     paper_row: str = ""
     origin: MeshOrigin = "surface"

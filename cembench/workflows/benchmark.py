@@ -83,7 +83,7 @@ class Run:
         Parameters
         ----------
         reference : str
-            The algorithm whose speedup over the others (Eq. 33) is included.
+            The algorithm whose speedup over the others is included.
 
         Returns
         -------
@@ -107,7 +107,7 @@ class Run:
         Parameters
         ----------
         reference : str
-            The algorithm whose speedup over the others (Eq. 33) is included.
+            The algorithm whose speedup over the others is included.
 
         Returns
         -------
@@ -120,7 +120,7 @@ class Run:
         return rows(self.records(), reference)
 
     def speedups(self, reference: str = "cem") -> pd.DataFrame:
-        """Return the speedup of the reference over each other algorithm, t / t_ref - 1 (Eq. 33).
+        """Return the speedup of the reference over each other algorithm, t / t_ref - 1.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Exhibits of Koebe's method on surfaces with holes (Figures 1 and 7)."""
+"""Exhibits of Koebe's method on surfaces with holes."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ from cembench.results.exhibits import (
     exhibit_folder,
     write_exhibit,
 )
+from cembench.results.papers import usual_paper
 from cembench.results.records import MeshOrigin, Record
 from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 
-#: The surface of the paper's Figures 1 and 7.
+#: A stand-in for a model of which no mesh is public.
 STAND_IN = "ho-face-with-holes"
 #: Maximum number of steps in a picture; further steps are left out.
 MOST_STEPS = 4
@@ -123,7 +124,7 @@ def _write_figure_exhibits(
     run: Path,
     command: str,
 ) -> None:
-    """Write the exhibits for Figure 1, the steps of the first sweep, and Figure 7, the map."""
+    """Write the exhibits of the steps of the first sweep, and of the map."""
     metrics = record.outcome.metrics
     origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
     figures = {
@@ -150,7 +151,7 @@ def _write_figure_exhibits(
             text=f"The result of one sweep of Koebe's method. {caption}.",
             command=command,
             origin=origin,
-            figure="Figure 7",
+            figure=usual_paper().exhibited("koebe-map"),
             pictures=(ExhibitPicture(file="map.png", caption=caption, alternative=alternative),),
             facts=figures,
         ),
@@ -176,7 +177,7 @@ def _write_figure_exhibits(
             text=words,
             command=command,
             origin=origin,
-            figure="Figure 1",
+            figure=usual_paper().exhibited("koebe-steps"),
             pictures=(ExhibitPicture(file="steps.png", caption=words, alternative=alternative),),
             tables=(table,),
             facts={"iterations": [len(step.energies) - 1 for step in first]},

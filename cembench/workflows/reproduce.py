@@ -19,14 +19,14 @@ from cembench.running.surfaces import generate_surface
 
 #: Seconds for fetching the paper's models, in all.
 FETCH_SECONDS = 20.0
-#: Bytes that making a stand-in needs; the largest of the eight smallest takes a third of it.
+#: Bytes that making a stand-in needs; the largest of the profile `quick` takes a third of it.
 STAND_IN_BYTES = 2**30
 #: The group of datasets that are models of the paper.
 GROUP = "paper"
 
 
 def public_models(registry: Registry, rows: Sequence[str]) -> list[Dataset]:
-    """Return the public models of these rows of the paper's Table 1."""
+    """Return the public models among these of the paper."""
     datasets = registry.datasets.values()
     return [one for one in datasets if one.group == GROUP and one.paper_row in rows]
 

@@ -176,7 +176,7 @@ class Gathered:
     refused : tuple of Provided
         The other surfaces, each with the reason.
     roles : mapping
-        The role in the paper's Table 1, by surface name, of those that are its models.
+        The role in a paper, by surface name, of those that are its models.
 
     """
 

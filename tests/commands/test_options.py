@@ -7,6 +7,8 @@ import pytest
 import typer
 
 from cembench.commands.cli import app
+from cembench.commands.options import budget_seconds
+from cembench.results.profiles import Profile
 
 SMALL = ("--surfaces", "flat-disk", "--faces", 100, "-a", "cem", "--dry-run")
 
@@ -66,6 +68,12 @@ def test_what_is_out_of_range_is_refused(cli, option):
     assert (code, out) == (2, "")
     assert str(option[1]).partition("=")[0] in err or option[0] in err
     assert not list(cli.folder.iterdir())
+
+
+def test_a_profile_has_the_time_that_its_paper_gives_it():
+    given = [budget_seconds(None, profile) for profile in (*Profile, None)]
+    assert given == [105, 3600, 14_400, 1800]
+    assert budget_seconds("2m", Profile.quick) == 120
 
 
 def test_rounds_are_fixed_or_until_precise_but_not_both(cli):

@@ -10,10 +10,11 @@ from dataclasses import replace
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 import pytest
-from cembench.surfaces.datasets import ICT_FACE, REAL_MESHES
+from cembench.surfaces.datasets import ICT_FACE, OWN, REAL_MESHES, read_datasets
 from cembench.surfaces.ict_model import read_small
 
 from cembench import registry
+from cembench.core.errors import RegistryError
 from cembench.mesh import datasets as wholeness
 from cembench.mesh.datasets import Dataset, fetch, fetch_all, is_fetched, surface_file
 from cembench.mesh.files import read_mesh
@@ -274,3 +275,16 @@ def test_files_of_the_face_model_are_kept_as_small_arrays(monkeypatch, tmp_path)
     path.write_bytes(path.read_bytes()[:-50])
     assert not is_fetched(dataset)
     assert len(ICT_FACE) == 154
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [("sha256", "sha", "KeyError: 'sha256'"), ("19974", "many", "invalid literal for int")],
+)
+def test_a_table_of_meshes_with_a_fault_is_named(tmp_path, old, new, told):
+    file = tmp_path / "models.tsv"
+    file.write_text(OWN.read_text().replace(old, new))
+    with pytest.raises(
+        RegistryError, match=rf"models.tsv is no table of meshes: .*{told}.*Give it"
+    ):
+        read_datasets(file)

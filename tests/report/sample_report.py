@@ -24,7 +24,7 @@ from cembench.report.document import (
 )
 from cembench.results.papers import find_paper
 
-CITATION = find_paper("cem").citation
+CITATION = find_paper("cem")
 ALGORITHMS = ("cem", "qiem", "fdm", "ldm")
 SURFACES = ("Foot", "Chinese Lion", "Bourbon Bottle")
 #: A name that would be code in a page that does not escape it.

@@ -26,7 +26,7 @@ def test_a_paper_costs_few_lines():
 
 def test_its_title_tables_and_misprints_are_there(report):
     assert report.title == "Maps onto Circles: its claims, tables and figures, measured"
-    assert report.paper == PAPER.citation
+    assert report.paper == PAPER
     tables = {table.name: table for table in tables_of(report)}
     assert {"table-1", "table-3"} <= tables.keys()
     assert not {"table-2", "table-4", "averages"} & tables.keys()

@@ -2,14 +2,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cembench.papers.cem import accuracy, efficiency, iteration, premises, start
+from cembench.papers.cem import checks
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.spherical_cap import spherical_cap
 
-from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.conformal.metrics import all_metrics, dilatations
+from cembench.core.errors import ParameterError
 from cembench.registry import load_registry
-from cembench.report.content.claims import Found, claims
+from cembench.report.content.claims import claims, verdict_of
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
 from cembench.results.records import Cell, Outcome, Record, Round
@@ -33,10 +33,18 @@ def found(evidence, inspections):
     return {claim.name: claim for claim in claims(evidence, inspections)}
 
 
+def claim_of(evidence, name):
+    """One claim of the paper on a run."""
+    one = next(claim for claim in evidence.paper.claims if claim.name == name)
+    paper = evidence.paper.model_copy(update={"claims": (one,)})
+    (claim,) = claims(replace(evidence, asked=paper), {})
+    return claim
+
+
 def test_a_verdict_follows_from_how_often_a_claim_held():
-    verdicts = [Found(*counts, "").verdict for counts in ((3, 3), (2, 3), (0, 3), (0, 0))]
+    verdicts = [verdict_of(*counts) for counts in ((3, 3), (2, 3), (0, 3), (0, 0))]
     assert verdicts == ["holds", "holds in part", "does not hold here", "not tested here"]
-    assert Found(0, 0, "", lacking=1).verdict == "too few rounds"
+    assert verdict_of(0, 0, lacking=1) == "too few rounds"
 
 
 def test_every_claim_has_a_verdict_of_its_own_figures(found, evidence):
@@ -65,7 +73,7 @@ def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
         return record.model_copy(update={"outcome": outcome})
 
     records = tuple(map(with_folds, evidence.records))
-    claim = accuracy.no_folding(replace(evidence, records=records), {})
+    claim = claim_of(replace(evidence, records=records), "no-folding")
     told = f"119 triangles are folded on 1 of 3 surfaces ({vase.title}: 119)"
     assert claim.figures == (
         f"Before the repair, {told}; in the maps that are compared, 0 triangles are folded on 0 of "
@@ -74,16 +82,28 @@ def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
     assert claim.verdict == "holds in part"
 
 
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"holds": "sekonds < 1"}, "claim 'delaunay': 'sekonds < 1' names 'sekonds'; known are"),
+        ({"figures": "{held.real}"}, "claim 'delaunay': .*asks for 'real'; allowed are"),
+        ({"figures": "{held"}, r"claim 'delaunay': .* is no expression: f-string: expecting '}'"),
+    ],
+)
+def test_an_expression_that_fails_is_said_with_its_claim_and_file(evidence, changed, told):
+    one = next(claim for claim in evidence.paper.claims if claim.name == "delaunay")
+    paper = evidence.paper.model_copy(update={"claims": (one.model_copy(update=changed),)})
+    with pytest.raises(ParameterError, match=f"papers/cem/claims.toml: {told}"):
+        claims(replace(evidence, asked=paper), {})
+
+
 def test_where_cem_is_always_faster_the_claim_holds(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     for record in store.records():
         if record.cell.algorithm == "ldm":
             (tmp_path / "run" / "records" / f"{record.cell.label}.json").unlink()
     evidence = Evidence.of(store.folder)
-    assert efficiency.always_faster(evidence, {}).verdict == "holds"
-    one = next(claim for claim in evidence.paper.claims if claim.name == "always-faster")
-    paper = evidence.paper.model_copy(update={"claims": (one,)})
-    (claim,) = claims(replace(evidence, asked=paper), {})
+    claim = claim_of(evidence, "always-faster")
     assert claim.verdict == "holds"
     assert "None is a model of the paper itself" in claim.remark
     assert "this project's implementations" in claim.remark
@@ -112,15 +132,15 @@ def test_a_claim_on_speed_is_decided_on_the_surfaces_that_have_the_rounds(eviden
         of = FASTER.get(record.cell.algorithm, 1.0)
         return [of] * few.get(record.mesh.paper_row, 6)
 
-    claim = efficiency.always_faster(with_seconds(evidence, seconds_of), {})
+    claim = claim_of(with_seconds(evidence, seconds_of), "always-faster")
     assert claim.verdict == "holds"
     assert "FDM: 1 of 1, lowest rate 17.00, sign test over surfaces p = 1" in claim.figures
     assert claim.figures.count("; too few rounds on 1 more") == 2  # QIEM failed there
-    average = efficiency.average_rates(with_seconds(evidence, seconds_of), {})
+    average = claim_of(with_seconds(evidence, seconds_of), "average-rates")
     assert average.verdict == "holds in part"  # 7 for QIEM, where 8.5 is stated
     assert "FDM: mean 17.0, geometric 17.0 (n = 1; too few rounds on 1 more)" in average.figures
     few["Liu's Neutral Face"] = 5
-    none = efficiency.always_faster(with_seconds(evidence, seconds_of), {})
+    none = claim_of(with_seconds(evidence, seconds_of), "always-faster")
     assert none.verdict == "too few rounds"
     assert "FDM: 0 of 0; too few rounds on 2" in none.figures
 
@@ -131,7 +151,7 @@ def test_a_surface_on_which_the_interval_holds_equal_times_does_not_support_the_
         shaky = record.cell.algorithm == "ldm" and record.mesh.paper_row == "Chinese Vase"
         return [1.1, 1.2, 0.5, 1.3, 0.6, 1.4, 1.2] if shaky else [of] * 7
 
-    claim = efficiency.always_faster(with_seconds(evidence, seconds_of), {})
+    claim = claim_of(with_seconds(evidence, seconds_of), "always-faster")
     assert claim.verdict == "holds in part"
     assert "LDM: 1 of 2, lowest rate 0.20" in claim.figures
     assert "too few rounds" not in claim.figures
@@ -145,7 +165,7 @@ def test_seconds_on_large_surfaces_need_rounds_too(evidence):
         few = with_seconds(evidence, seconds_of)
         grown = [r.model_copy(update={"mesh": r.mesh.model_copy(update={"faces": 200_000})})
                  for r in few.records]  # fmt: skip
-        return efficiency.less_than_one_second(replace(few, records=tuple(grown)), {})
+        return claim_of(replace(few, records=tuple(grown)), "less-than-one-second")
 
     some = large({"Chinese Vase": 1, "Liu's Neutral Face": 6, "": 1})
     assert some.verdict == "holds"
@@ -165,11 +185,11 @@ def test_seconds_on_large_surfaces_need_rounds_too(evidence):
     ],
 )
 def test_becoming_monotonically_decreasing_allows_a_rise_at_first_alone(history, becomes):
-    assert iteration.becomes_decreasing(history) is becomes
+    assert checks.becomes_decreasing(history) is becomes
 
 
 def test_the_printed_tables_agree_but_for_the_misprint(evidence):
-    claim = efficiency.table_2_follows(evidence, {})
+    claim = claim_of(evidence, "table-2-follows")
     assert claim.verdict == "holds in part"
     assert claim.figures.startswith("57 of 58 cells agree; not: Knit Cap Man / FDM: 29.07")
 
@@ -183,12 +203,12 @@ def test_the_four_faces_are_judged_from_the_stored_maps(found, inspections, evid
 
 
 def test_a_rise_of_the_energy_is_counted_but_not_rounding():
-    assert iteration.rises([3.0, 2.0, 2.0 + 1e-15, 1.0]) == 0
-    assert iteration.rises([3.0, 2.0, 2.1, 1.0]) == 1
+    assert checks.rises([3.0, 2.0, 2.0 + 1e-15, 1.0]) == 0
+    assert checks.rises([3.0, 2.0, 2.1, 1.0]) == 1
 
 
 def test_the_iteration_matrix_of_a_delaunay_cap_is_as_the_theorem_says():
-    smallest, first, second = premises.spectrum_of_iteration(spherical_cap(300))
+    smallest, first, second = checks.spectrum(checks.iteration_matrix(spherical_cap(300)))
     assert smallest > 0
     assert first == pytest.approx(1, abs=1e-10)
     assert second < 1 - 1e-3
@@ -209,28 +229,28 @@ def test_the_claims_on_the_start_hold_and_say_with_what_figures(found):
 def test_the_schur_complement_and_any_pin_give_the_least_squares_solution(k):
     """Against the dense pseudo-inverse of the singular L (Eq. 13)."""
     mesh = spherical_cap(300)
-    L, rhs, corners = start.start_system(mesh)
+    L, rhs, corners = checks.start_system(mesh)
     exact = np.linalg.pinv(L.toarray(), hermitian=True) @ rhs
-    f = start.pinned(start.Solved(), L, rhs, k % mesh.n)
-    g = start.condensed(start.Solved(), L, rhs, corners, k % mesh.n)
+    f = checks.pinned(checks.Solved(), L, rhs, k % mesh.n)
+    g = checks.condensed(checks.Solved(), L, rhs, corners, k % mesh.n)
     assert (f[k], g[k]) == (0, 0)
-    assert start.apart(exact, f) < 1e-10
-    assert start.apart(exact, g) < 1e-10
-    assert start.apart(exact, exact + 0.1 * exact.real) > 0.01  # a difference is seen
+    assert checks.apart(exact, f) < 1e-10
+    assert checks.apart(exact, g) < 1e-10
+    assert checks.apart(exact, exact + 0.1 * exact.real) > 0.01  # a difference is seen
 
 
 def test_on_a_flat_disk_the_map_with_a_pole_has_mu_z_squared():
     """1 / z + conj(z) solves Eq. 11 there: conformal at the pole, a fold at the boundary."""
     off, near, rim = [], [], []
     for mesh in map(flat_disk, (600, 2400, 9600)):
-        L, rhs, _ = start.start_system(mesh)
-        f = start.pinned(start.Solved(), L, rhs, 0)
+        L, rhs, _ = checks.start_system(mesh)
+        f = checks.pinned(checks.Solved(), L, rhs, 0)
         z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
         K = dilatations(mesh, f)
         middle = np.abs(z[mesh.F].mean(axis=1))
         between = (middle > 0.4) & (middle < 0.9)
         off.append(np.abs((K - 1) / (K + 1) - middle**2)[between].mean())
-        figures = start.distortion_near_pole_and_boundary(mesh)
+        figures = checks.distortion_near_pole_and_boundary(mesh, 0.01, 10)
         near, rim = [*near, figures[0]], [*rim, figures[1]]
     np.testing.assert_allclose(np.log2(np.array(off[:-1]) / off[1:]), 1, atol=0.15)
     assert near[0] > 1.3 * near[1] > 1.3**2 * near[2]  # what is left there is the mesh's
@@ -239,12 +259,12 @@ def test_on_a_flat_disk_the_map_with_a_pole_has_mu_z_squared():
 
 def test_points_leave_their_convex_hull_where_a_weight_is_negative():
     mesh = spherical_cap(300)
-    K = premises.iteration_matrix_of(mesh, cotangent_laplacian(mesh.V, mesh.F))
-    assert premises.largest_escape(K) <= 0
+    K = checks.iteration_matrix(mesh)
+    assert checks.largest_escape(K) <= 0
     K[0, :2] += [-0.5, 0.5]
     assert K.min() < 0
     np.testing.assert_allclose(K.sum(axis=1), 1)
-    assert premises.largest_escape(K - 2 * (K - np.eye(len(K)))) > 0.01
+    assert checks.largest_escape(K - 2 * (K - np.eye(len(K)))) > 0.01
 
 
 def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
@@ -257,9 +277,9 @@ def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
     pulled[hole] += 1j * (uv[hole] - uv[hole].mean()).imag
     koebe = load_registry().algorithm("koebe-cem")
     records = []
-    for z in (uv, pulled):
+    for code, z in (("c", uv), ("d", pulled)):
         cell = Cell(
-            algorithm="koebe-cem", code_hash="c", mesh="holes", mesh_hash=mesh.hash, solves="reuse"
+            algorithm="koebe-cem", code_hash=code, mesh="holes", mesh_hash=mesh.hash, solves="reuse"
         )
         facts = evidence.records[0].mesh
         records.append(
@@ -278,6 +298,6 @@ def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
         (records[1:], "does not hold here"),
         (records, "holds in part"),
     ):
-        claim = premises.circular_holes(replace(evidence, records=tuple(chosen)), {})
+        claim = claim_of(replace(evidence, records=tuple(chosen)), "circular-holes")
         assert claim.verdict == verdict
         assert "holes / " in claim.figures

@@ -1,6 +1,6 @@
 """Averages of speedup rates, in two readings of the paper's means.
 
-A rate is Eq. 33, t / t_CEM - 1. The paper averages rates arithmetically (8.5, 17.2, 4.1), where one
+A rate is t / t_CEM - 1. The paper averages rates arithmetically, where one
 large ratio counts as much as many small ones, and converts that mean to a saving. The geometric
 mean of the ratios and the mean of the savings weight every model equally.
 """
@@ -55,12 +55,9 @@ READINGS = (
 
 def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = None) -> list[float]:
     """Return the printed rates for these models (default: all), misprints from the seconds."""
-    rates = []
-    for model in paper.models if models is None else models:
-        rate = corrected_rate(paper, model, algorithm)
-        if rate is not None:
-            rates.append(rate)
-    return rates
+    chosen = paper.models if models is None else models
+    rates = (corrected_rate(paper, model, algorithm) for model in chosen)
+    return [rate for rate in rates if rate is not None]
 
 
 def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:

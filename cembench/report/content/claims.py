@@ -1,127 +1,186 @@
 """The claims of a paper with their verdicts on a run.
 
-The paper's folder holds what does not depend on a run: its words, their place, the test in words,
-and its test: an expression, or a check, a function (evidence, inspections) -> :class:`Found`.
+The paper's folder holds all of a claim: its words, their place, and its test, in words and as
+expressions (:class:`cembench.results.papers.StatedClaim`). They are evaluated here.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
+from cembench.core.errors import ParameterError
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim, Verdict
-from cembench.results.frame import evaluate
+from cembench.results.comparison import compare
+from cembench.results.frame import evaluate, filled
 from cembench.results.papers import StatedClaim
+from cembench.results.records import MeshOrigin
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: The surfaces' inspections by the hash of the mesh.
 Inspections = Mapping[str, Inspection]
-
-
-@dataclass(frozen=True)
-class Found:
-    """What a check found: in how many of the cases tested a claim held, and the figures in words.
-
-    Parameters
-    ----------
-    held, tested : int
-        Number of cases, surfaces as a rule.
-    figures : str
-        Result of the test, with n.
-    surfaces : sequence of MeasuredSurface or None
-        The surfaces behind the verdict; None if they are not to be told.
-    lacking : int
-        Number of cases that were timed in too few rounds: they decide nothing.
-    remark : str
-        What follows the claim's own remark.
-
-    """
-
-    held: int
-    tested: int
-    figures: str
-    surfaces: Sequence[MeasuredSurface] | None = None
-    lacking: int = 0
-    remark: str = ""
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict: holds everywhere, in part, nowhere, or was not tested.
-
-        A single round does not show how much the next one would differ.
-        """
-        if self.tested == 0:
-            return "too few rounds" if self.lacking else "not tested here"
-        if self.held == self.tested:
-            return "holds"
-        return "holds in part" if self.held else "does not hold here"
+#: Words for surfaces by origin.
+_KINDS: Mapping[MeshOrigin, str] = {
+    "model": "the paper's own models",
+    "stand-in": "stand-ins for the paper's models",
+    "surface": "surfaces that are not in the paper",
+}
 
 
 def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
-    """Return all claims of the run's paper with their verdicts, in the order of its text."""
-    told = []
-    for one in evidence.paper.claims:
-        found: Found = (
-            by_expression(evidence, one)
-            if one.holds
-            else evidence.paper.check(one)(evidence, inspections)
-        )
-        where = None if found.surfaces is None else tested_on(found.surfaces)
-        remark = " ".join(filter(None, (where, one.remark, found.remark)))
-        told.append(
-            Claim(one.name, one.quote, one.place, one.test, found.figures, found.verdict, remark)
-        )
-    return told
+    """Return all claims of the run's paper with their verdicts, in the order of its text.
 
+    Raises
+    ------
+    ParameterError
+        An expression of a claim fails on this run; the message names the claim and its file.
 
-def by_expression(evidence: Evidence, claim: StatedClaim) -> Found:
-    """Return on how many of the paper's models an expression holds for maps by its algorithms.
-
-    Surfaces where one of them has no valid map are left out; the policy is the run's first.
     """
-    frame = evidence.frame
-    chosen = frame["ok"] & frame["main"] & (frame["solves"] == evidence.policies[0])
-    chosen &= frame["paper_row"].isin(evidence.paper.models)
-    frame = frame[chosen & frame["algorithm"].isin(claim.algorithms)]
-    held, failed, surfaces = 0, [], []
-    for place, group in frame.groupby("place"):
-        if set(group["algorithm"]) != set(claim.algorithms):
-            continue
-        surfaces.append(evidence.surfaces[int(str(place))])
-        if bool(evaluate(claim.holds, group)):
-            held += 1
-        else:
-            failed.append(surfaces[-1].title)
-    told = f"true on {held} of {len(surfaces)} surfaces"
-    told += f"; not on {', '.join(failed)}" if failed else ""
-    return Found(held, len(surfaces), told, surfaces)
+    frame, known = claims_frame(evidence, inspections), known_names(evidence)
+    tested = []
+    for claim in evidence.paper.claims:
+        try:
+            tested.append(_tested(evidence, frame, known, claim))
+        except ParameterError as error:
+            file = evidence.paper.folder / "claims.toml"
+            raise ParameterError(f"{file}: claim {claim.name!r}: {error}") from error
+    return tested
 
 
-def lacking_words(lacking: int, tested: int) -> str:
-    """Return on how many surfaces there are too few rounds for an interval; "" if on none.
+def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
+    """Return the run's frame with what claims need besides.
 
-    >>> lacking_words(2, 6)
-    '; too few rounds on 2 more'
+    `policy` is the number of the linear-algebra policy. `chosen` are the records that stand for
+    their algorithm on a surface, whatever the policy; `model` those of the paper's models and
+    `counted` those of one surface for each. `speedup`, `speedup_low` and `verdict` compare with the
+    main parameters of the reference. `below_one` is the share of the corners whose angles change by
+    less than a degree.
     """
-    return f"; too few rounds on {lacking}{' more' * bool(tested)}" if lacking else ""
+    import pandas as pd
+
+    frame, rows = evidence.frame, []
+    for key, k, place in zip(frame["key"], frame["series"], frame["place"], strict=True):
+        record, series, surface = evidence.by_key[key], evidence.series[k], evidence.surfaces[place]
+        base, seen = evidence.base(record), inspections.get(surface.mesh_hash)
+        found = compare(record, base) if base is not None else None
+        interval = found.speedup_interval if found else None
+        angles = seen.angles.get(series.label) if seen else None
+        chosen = evidence.find(surface, series) is record
+        rows.append(
+            {
+                "policy": evidence.policies.index(record.cell.solves),
+                "chosen": chosen,
+                "model": bool(surface.paper_row),
+                "counted": surface in evidence.one_per_model,
+                "speedup": found.speedup if found else None,
+                "speedup_low": interval.low if interval else None,
+                "verdict": found.verdict if found else None,
+                "below_one": angles.below_one if angles and chosen else None,
+            }
+        )
+    return frame.assign(**pd.DataFrame(rows, index=frame.index))
+
+
+def known_names(evidence: Evidence) -> dict[str, Any]:
+    """Return what claims know besides the frame: the paper, its functions, and stored meshes."""
+    paper = evidence.paper
+
+    def disk(key: str) -> TriangleMesh | None:
+        place = evidence.by_key[key].cell.mesh_hash
+        mesh = evidence.mesh(next(s for s in evidence.surfaces if s.mesh_hash == place))
+        return mesh if mesh is not None and len(mesh.loops) == 1 else None
+
+    return {
+        "disk": disk,
+        "under": lambda policy: under(policy, evidence),
+        "printed": paper.printed_figure,
+        "stated": lambda what, algorithm: paper.stated[what][algorithm],
+        "models_of": lambda plot: paper.plotted(plot).models,
+        "exhibits_of": lambda *of: [e.title for e in evidence.exhibits if e.figure in of],
+        "tables": paper.tables,
+        "compared": paper.compared,
+        "reference": evidence.reference,
+        **paper.numbers,
+        **paper.functions(),
+    }
+
+
+def _tested(
+    evidence: Evidence, frame: pd.DataFrame, known: Mapping[str, Any], claim: StatedClaim
+) -> Claim:
+    """Return a claim with its verdict."""
+    import pandas as pd
+
+    rows = frame[evaluate(claim.rows, frame, known)]
+    if claim.algorithms:
+        rows = rows[rows["algorithm"].isin(claim.algorithms)]
+    groups = rows.groupby(list(claim.per), dropna=False) if claim.per else [((), rows)]
+    cases: list[dict[str, Any]] = []
+    places: set[int] = set()
+    for values, group in groups:
+        case = _case(claim, group, known, dict(zip(claim.per, values, strict=True)))
+        if case is not None:
+            cases.append(case)
+            places |= set(group["place"]) if case["of"] else set()
+    names = (*claim.per, *claim.each, "of", "lacking", "holds")
+    columns = {name: pd.Series([case[name] for case in cases]) for name in names}
+    held, tested, lacking = (int(columns[name].sum()) for name in ("holds", "of", "lacking"))
+    values = {**known, **columns, "held": held, "tested": tested}
+    over = evaluate(claim.over, frame, values) if claim.over else frame["place"].isin(places)
+    surfaces = None if over is None else sorted(set(frame["place"][over]))
+    where = None if surfaces is None else tested_on([evidence.surfaces[k] for k in surfaces])
+    figures = filled(claim.none if claim.none and not cases else claim.figures, frame, values)
+    remark = " ".join(filter(None, (where, claim.remark, filled(claim.further, frame, values))))
+    verdict = verdict_of(held, tested, lacking)
+    return Claim(claim.name, claim.quote, claim.place, claim.test, figures, verdict, remark)
+
+
+def _case(
+    claim: StatedClaim, group: pd.DataFrame, known: Mapping[str, Any], case: dict[str, Any]
+) -> dict[str, Any] | None:
+    """Return the values of a case; None if it is not tested."""
+    if group.empty or not set(claim.algorithms) <= set(group["algorithm"]):
+        return None
+    wanted = {**claim.each, "of": claim.of, "lacking": claim.lacking, "holds": claim.holds}
+    for name, expression in wanted.items():
+        case[name] = evaluate(expression, group, {**known, **case})
+        if case[name] is None:
+            return None
+    return case
+
+
+def verdict_of(held: int, tested: int, lacking: int = 0) -> Verdict:
+    """Return the verdict: holds everywhere, in part, nowhere, or was not tested.
+
+    `lacking` is the number of tests that lack rounds. A single round does not show how much the
+    next one would differ, so they decide nothing.
+
+    >>> [verdict_of(*counts) for counts in ((3, 3), (2, 3), (0, 3), (0, 0))]
+    ['holds', 'holds in part', 'does not hold here', 'not tested here']
+    >>> verdict_of(0, 0, lacking=1)
+    'too few rounds'
+    """
+    if tested == 0:
+        return "too few rounds" if lacking else "not tested here"
+    if held == tested:
+        return "holds"
+    return "holds in part" if held else "does not hold here"
 
 
 def tested_on(surfaces: Sequence[MeasuredSurface]) -> str:
     """Return a sentence on the kinds of surfaces behind a verdict."""
-    kinds = {
-        "model": "the paper's own models",
-        "stand-in": "stand-ins for the paper's models",
-        "surface": "surfaces that are not in the paper",
-    }
-    counts = {kind: sum(s.origin == kind for s in surfaces) for kind in kinds}
-    said = [f"{count} on {kinds[kind]}" for kind, count in counts.items() if count]
-    if not said:
+    counts = Counter(surface.origin for surface in surfaces)
+    kinds = [f"{counts[kind]} on {words}" for kind, words in _KINDS.items() if counts[kind]]
+    if not kinds:
         return "Nothing in this run to test it on."
-    words = f"Surfaces tested: {', '.join(said)}."
-    if not counts["model"]:
-        words += " None is a model of the paper itself: the verdict is about the algorithms here."
-    return words
+    own = " None is a model of the paper itself: the verdict is about the algorithms here."
+    return f"Surfaces tested: {', '.join(kinds)}.{own * (not counts['model'])}"
 
 
 def under(policy: str, evidence: Evidence) -> str:

@@ -30,7 +30,6 @@ from cembench.results.store import Store
 if TYPE_CHECKING:
     import pandas as pd
 
-REFERENCE = frame.REFERENCE
 DISK = "disk"
 #: The metric by which maps of all targets are compared: mean angle error in degrees.
 ANGLE = "angle_error_mean_deg"
@@ -135,10 +134,15 @@ class Evidence:
 
         return self.asked or max(papers().values(), key=rows, default=NO_PAPER)
 
+    @property
+    def reference(self) -> str:
+        """The algorithm that the others are compared with: the paper's, or the usual one."""
+        return self.paper.reference or frame.REFERENCE
+
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
-        return {row["key"]: row for row in frame.rows(self.records)}
+        return {row["key"]: row for row in frame.rows(self.records, self.reference)}
 
     @cached_property
     def frame(self) -> pd.DataFrame:
@@ -328,20 +332,20 @@ class Evidence:
         return self.rows[record.cell.key]
 
     def rate(self, record: Record) -> float | None:
-        """Return the speedup of CEM over a record's algorithm (Eq. 33); None without both times.
+        """Return t / t_reference - 1 for a record's time t; None without both times.
 
-        It is the median ratio within rounds, for CEM with its main parameters on the same surface
-        and with the same policy.
+        It is the median ratio within rounds, for the reference with its main parameters on the same
+        surface and with the same policy.
         """
         base = self.base(record)
         found = None if base is None else compare(record, base)
         return None if found is None else found.speedup
 
     def base(self, record: Record) -> Record | None:
-        """Return CEM's record for comparing times; None for CEM itself."""
-        reference = self.series_of(REFERENCE)
+        """Return the reference's record for comparing times; None for that record itself."""
+        reference = self.series_of(self.reference)
         base = reference and self._index.get(
-            (record.cell.mesh_hash, REFERENCE, reference.variant, record.cell.solves)
+            (record.cell.mesh_hash, self.reference, reference.variant, record.cell.solves)
         )
         return None if not base or base.cell.key == record.cell.key else base
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from cembench.report.content.as_good import AS_GOOD, DEGREES
 from cembench.report.content.by_surface import own_table
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
 from cembench.report.content.standings import (
@@ -45,7 +45,7 @@ def findings(
         told[0] = _beside_the_paper(evidence.paper.algorithms, field, told[0])
     told += [stability_words(evidence.records), scatter_words(evidence.records)]
     sentences += [(words,) for words in told if words]
-    best = field.standings[0].label if field else REFERENCE
+    best = field.standings[0].label if field else evidence.reference
     return Findings(
         tuple(sentences),
         tuple(outlier_lines(evidence.records)),
@@ -177,7 +177,7 @@ def _picture(
     evidence: Evidence, inspections: Mapping[str, Inspection], label: str
 ) -> Figure | None:
     """Return a picture by the algorithm with the best angles, of the largest surface with one."""
-    reference = evidence.series_of(REFERENCE)
+    reference = evidence.series_of(evidence.reference)
     for wanted in (label, reference.label if reference else label):
         for surface in sorted(evidence.surfaces, key=lambda s: -s.faces):
             found = inspections.get(surface.mesh_hash)

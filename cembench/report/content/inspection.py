@@ -24,7 +24,6 @@ from cembench.drawing.view_scene import (
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import (
     DISK,
-    REFERENCE,
     AlgorithmSeries,
     Evidence,
     MeasuredSurface,
@@ -109,7 +108,7 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
         checkerboards[series.label] = drawer.checkerboard(series, record, panel, uv)
         if series.target == DISK:
             angles[series.label] = _angles(mesh, uv, record)
-        if shown is None or (series.algorithm == REFERENCE and series.main):
+        if shown is None or (series.algorithm == evidence.reference and series.main):
             shown = (series, panel)
     curved, meshed = drawer.curvature_and_mesh(*shown) if shown else (None, None)
     most = triangles_per_surface([s.faces for s in evidence.surfaces])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cembench.report.content.both_policies import BOTH, seconds_under
-from cembench.report.content.evidence import REFERENCE, AlgorithmSeries, Evidence, MeasuredSurface
+from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import (
     POLICIES,
     Footer,
@@ -48,7 +48,7 @@ def work_of(
 
 
 def _table(evidence: Evidence, policy: str) -> Table:
-    reference = evidence.series_of(REFERENCE)
+    reference = evidence.series_of(evidence.reference)
     notes = [own_order(evidence)] if policy == "reuse" and reference else []
     if evidence.series_of("qiem"):
         notes.append(
@@ -57,11 +57,11 @@ def _table(evidence: Evidence, policy: str) -> Table:
         )
     columns = [COLUMNS[name] for name in _COUNTS]
     ratios = Footer(
-        f"over {REFERENCE.upper()}, geometric mean",
+        f"over {evidence.reference.upper()}, geometric mean",
         geometric_mean,
         lambda mean: f"{mean:.2f}",
         tuple(column.heading for column in columns[:2]),
-        reference.label if reference else REFERENCE,
+        reference.label if reference else evidence.reference,
     )
     return table_beside(
         evidence,
@@ -86,7 +86,7 @@ def own_order(evidence: Evidence) -> str:
     Under "backslash" CEM is Algorithm 1 as printed, with whole solves. So records of both policies
     tell; those of one do not.
     """
-    reference = evidence.series_of(REFERENCE)
+    reference = evidence.series_of(evidence.reference)
     factored, solved, seconds = [], [], []
     for surface in evidence.surfaces if reference else ():
         assert reference is not None

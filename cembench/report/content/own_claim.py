@@ -31,19 +31,16 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
     origins = Counter(surface.origin for surface in evidence.one_per_model)
     models, others = origins["model"], origins["stand-in"]
-    over = [
-        *([f"{models} of its models"] if models else []),
-        *([f"{others} stand-in{'s' if others > 1 else ''}"] if others else []),
-    ]
+    over = [f"{models} of its models"] if models else []
+    over += [f"{others} stand-in{'s' if others > 1 else ''}"] if others else []
     intervals = (
         "with 95 % intervals over models and rounds"
         if any(sure for _, (_, sure) in told)
         else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_SURFACES} models)"
     )
     return (
-        f"CEM against {names}: printed {printed}; here {here}. This is the rate of speedup "
-        "(Eq. 33: 0 for equal times, 1 if CEM takes half the time), averaged over the models; "
-        f"here over {' and '.join(over)}, {intervals}."
+        f"{paper.reference.upper()} against {names}: printed {printed}; here {here}. This is "
+        f"{paper.rate}, averaged over the models; here over {' and '.join(over)}, {intervals}."
     )
 
 
@@ -51,16 +48,14 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     """Return the measured averages as text, and whether one of them has an interval."""
     told, sure = [], False
     for algorithm in evidence.paper.compared:
-        rates, _ = measured_rates(evidence, algorithm, policy)
-        series = evidence.series_of(algorithm)
-        if not rates or series is None:
-            told.append("not measured")
-            continue
-        rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
-        interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
-        sure = sure or interval is not None
+        rates = list(measured_rates(evidence, algorithm, policy).values())
+        series, interval = evidence.series_of(algorithm), None
+        if rates and series is not None:
+            rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
+            interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
         between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
-        told.append(f"{mean_rate(rates):.1f}{between}")
+        told.append(f"{mean_rate(rates):.1f}{between}" if rates else "not measured")
+        sure = sure or interval is not None
     return ", ".join(told), sure
 
 
@@ -69,11 +64,9 @@ def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
     parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
     for verdict, (one, several) in VERDICTS.items():
         found = [claim for claim in claims if claim.verdict == verdict]
-        if not found:
-            continue
-        parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
-        parts.append(one if len(found) == 1 else several)
-        if verdict in _NAMED:
-            for k, claim in enumerate(found):
-                parts += [", " if k else ": ", claim]
+        if found:
+            parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
+            parts.append(one if len(found) == 1 else several)
+        for k, claim in enumerate(found if verdict in _NAMED else ()):
+            parts += [", " if k else ": ", claim]
     return (*parts, ".")

@@ -1,4 +1,4 @@
-"""Printed and measured figures side by side, the common form of Tables 1 to 4."""
+"""Printed and measured figures side by side, the common form of a paper's tables."""
 
 from __future__ import annotations
 

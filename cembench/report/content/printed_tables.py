@@ -1,4 +1,4 @@
-"""Tables 1 to 4: the paper's figures beside measured ones, and tables of what is not in the paper.
+"""A paper's tables: printed figures beside measured ones, and tables of what is not in the paper.
 
 The paper's four algorithms on its models are shown with the printed figures. Other algorithms that
 map to the disk, and other surfaces, have separate tables.

@@ -1,9 +1,9 @@
-"""The rates of speedup of CEM over the others (Eq. 33) in a paper's table, and their averages."""
+"""The rates of speedup over the others in a paper's table, and their averages."""
 
 from __future__ import annotations
 
-from cembench.report.content.averages import READINGS, corrected_rate, percent, printed_rates
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.averages import READINGS, corrected_rate, printed_rates
+from cembench.report.content.evidence import Evidence
 from cembench.report.content.linear_algebra_work import work_of
 from cembench.report.content.printed_beside_measured import (
     absent_models,
@@ -42,19 +42,18 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
         cells = [words(reading.label)]
         for algorithm in evidence.paper.compared:
             claim = stated.get(k, {}).get(algorithm)
-            show = _stated if k == 0 else percent
             cells.append(
                 missing("the paper does not state it")
                 if claim is None
-                else Value(show(claim), claim, "printed")
+                else Value(reading.show(claim), claim, "printed")
             )
-            for rates in sets[algorithm]:
-                if rates:
-                    cells.append(
-                        Value(reading.show(reading.of(rates)), reading.of(rates), "derived")
-                    )
-                else:
-                    cells.append(missing("no rate to average"))
+            means = [reading.of(rates) if rates else None for rates in sets[algorithm]]
+            cells += [
+                missing("no rate to average")
+                if mean is None
+                else Value(reading.show(mean), mean, "derived")
+                for mean in means
+            ]
         rows.append(tuple(cells))
     if any(work_ratios(evidence, a, policy) for a in evidence.paper.compared):
         rows.append(_work_row(evidence, policy))
@@ -108,42 +107,29 @@ def _work_row(evidence: Evidence, policy: str) -> tuple[Value, ...]:
 
 def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:
     """Return an algorithm's numeric factorisations over CEM's, of the models that count."""
-    series, base = evidence.series_of(algorithm), evidence.series_of(REFERENCE)
-    ratios = []
-    for surface in evidence.one_per_model if series and base else ():
-        assert series is not None
-        assert base is not None
-        ours = work_of(evidence, surface, series, policy)
-        reference = work_of(evidence, surface, base, policy)
-        if ours is not None and reference is not None:
-            ratios.append(ours.numeric / reference.numeric)
-    return ratios
-
-
-def _stated(number: float) -> str:
-    return f"{number:.1f}"
+    series, base = evidence.series_of(algorithm), evidence.series_of(evidence.reference)
+    if series is None or base is None:
+        return []
+    work = [
+        (work_of(evidence, surface, series, policy), work_of(evidence, surface, base, policy))
+        for surface in evidence.one_per_model
+    ]
+    return [ours.numeric / theirs.numeric for ours, theirs in work if ours and theirs]
 
 
 def _rate_sets(evidence: Evidence, algorithm: str, policy: str) -> tuple[list[float], ...]:
     """Return the rates printed for all models, printed for those measured, and measured."""
-    measured, there = measured_rates(evidence, algorithm, policy)
-    paper = evidence.paper
-    return printed_rates(paper, algorithm), printed_rates(paper, algorithm, there), measured
+    measured, paper = measured_rates(evidence, algorithm, policy), evidence.paper
+    these = printed_rates(paper, algorithm, list(measured))
+    return printed_rates(paper, algorithm), these, list(measured.values())
 
 
-def measured_rates(
-    evidence: Evidence, algorithm: str, policy: str
-) -> tuple[list[float], list[str]]:
-    """Return the rates of speedup of CEM over an algorithm by model, and the models."""
-    rates, models = [], []
+def measured_rates(evidence: Evidence, algorithm: str, policy: str) -> dict[str, float]:
+    """Return the rates of speedup over an algorithm by model, those of one surface for each."""
     series = evidence.series_of(algorithm)
-    for surface in evidence.one_per_model if series else ():
-        assert series is not None
-        record = evidence.find(surface, series, policy)
-        rate = None
-        if record is not None:
-            rate = evidence.rate(record)
-        if rate is not None:
-            rates.append(float(rate))
-            models.append(surface.paper_row)
-    return rates, models
+    records = {
+        surface.paper_row: evidence.find(surface, series, policy) if series else None
+        for surface in evidence.one_per_model
+    }
+    rates = {model: evidence.rate(record) if record else None for model, record in records.items()}
+    return {model: rate for model, rate in rates.items() if rate is not None}

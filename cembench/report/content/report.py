@@ -12,7 +12,7 @@ from cembench import __version__
 from cembench.report.content import policies
 from cembench.report.content.both_policies import has_both_policies
 from cembench.report.content.claims import claims
-from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
+from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
 from cembench.report.content.failures import not_ok
 from cembench.report.content.figures.accuracy_against_time import accuracy_against_time
@@ -106,7 +106,7 @@ def build_report(
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
         records=evidence.rows,
-        paper=evidence.paper.citation if of_paper else None,
+        paper=evidence.paper if of_paper else None,
     )
 
 
@@ -246,7 +246,7 @@ def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> 
     """Return CEM's pictures of a model, as in the paper."""
     figure, model = wanted.figure, wanted.model
     surface = evidence.surface_for_model(model)
-    series = evidence.series_of(REFERENCE)
+    series = evidence.series_of(evidence.reference)
     if surface is None or series is None:
         return []
     seen = inspections[surface.mesh_hash]
@@ -275,7 +275,7 @@ def _beyond_the_paper(
     # Over many surfaces, the profile of the time stands beside those of accuracy.
     profiles = [performance_profile(evidence)] if by_surface else []
     items = _drawn([*profiles, accuracy_against_time(evidence), time_by_phase(evidence)], folder)
-    if not of_paper:  # otherwise it is below Table 2
+    if not of_paper:  # otherwise it is below its table
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
     if has_both_policies(evidence):

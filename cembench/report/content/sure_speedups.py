@@ -1,19 +1,14 @@
-"""Statistical certainty of the speedups in Table 2: singly, together, and over surfaces."""
+"""Statistical certainty of the speedups: singly, together, and over surfaces."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
-from cembench.report.content.evidence import (
-    REFERENCE,
-    AlgorithmSeries,
-    Evidence,
-    MeasuredSurface,
-)
+from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
@@ -28,39 +23,37 @@ from cembench.results.many import (
 CAPTION = (
     "'One by one': the number of surfaces on which the 95 % interval of the ratio within rounds "
     "excludes 1. 'Together': the number when all of the {n} verdicts of this table must be right "
-    "with 95 % (Holm). 'Over surfaces': whether CEM wins on more surfaces than by chance "
-    "(two-sided sign test), and the geometric mean of t / t_CEM with a 95 % interval over surfaces "
-    "and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
+    "with 95 % (Holm). 'Over surfaces': whether {cem} wins on more surfaces than by chance "
+    "(two-sided sign test), and the geometric mean of t / t_{cem} with a 95 % interval over "
+    "surfaces and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
     f"{NOT_DETECTED}"
 )
-ONCE = " Each model counts once, and is preferred over its stand-in."
+_ONCE = " Each model counts once, and is preferred over its stand-in."
 
 
-@dataclass(frozen=True)
-class _Compared:
-    """An algorithm compared with CEM: a comparison and the rounds' ratios for each surface."""
-
-    series: AlgorithmSeries
-    found: Sequence[Comparison]
-    ratios: Sequence[Sequence[float]]
+#: The comparisons of an algorithm with the reference, and the rounds' ratios, of each surface.
+_Compared = list[tuple[Comparison, list[float]]]
 
 
 def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
-    """Return tables on the certainty of speedups over CEM; empty without comparable rounds."""
-    compared = [c for series in evidence.disk_series if (c := _compared(evidence, series, policy))]
+    """Return tables on the certainty of the speedups; empty without comparable rounds."""
+    surfaces = (*evidence.one_per_model, *evidence.others)
+    compared = {
+        series.label: found
+        for series in evidence.disk_series
+        if series.main and series.algorithm != evidence.reference
+        if (found := paired_rounds(evidence, series, policy, surfaces))
+    }
     if not compared:
         return []
-    together = iter(corrected([one for c in compared for one in c.found]))
-    rows = []
-    for c in compared:
-        both = [next(together) for _ in c.found]
-        rows.append(_row(c, both))
-    number = sum(len(c.found) for c in compared)
+    together = corrected([one for found in compared.values() for one, _ in found])
+    number, cem, left = len(together), evidence.reference.upper(), iter(together)
+    verdicts = (f"{cem} faster", f"{cem} slower", "undecided")
     columns = (
         Column("algorithm", numeric=False),
         Column("surfaces"),
-        *(Column(name, "one by one") for name in ("CEM faster", "CEM slower", "undecided")),
-        *(Column(name, "together") for name in ("CEM faster", "CEM slower", "undecided")),
+        *(Column(name, "one by one") for name in verdicts),
+        *(Column(name, "together") for name in verdicts),
         *(Column(name, "over surfaces") for name in ("wins", "sign test", "mean", "95 % interval")),
     )
     return [
@@ -68,8 +61,11 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
             name=f"sure-speedups{policy_suffix(policy, evidence)}",
             title=f"Certainty of the speedups{in_policy(evidence, policy)}",
             columns=columns,
-            rows=tuple(rows),
-            caption=CAPTION.format(n=number) + (ONCE if evidence.stand_ins_left_out else ""),
+            rows=tuple(
+                _row(label, found, list(islice(left, len(found))))
+                for label, found in compared.items()
+            ),
+            caption=CAPTION.format(n=number, cem=cem) + _ONCE * bool(evidence.stand_ins_left_out),
         )
     ]
 
@@ -79,8 +75,8 @@ def paired_rounds(
     series: AlgorithmSeries,
     policy: str,
     surfaces: Sequence[MeasuredSurface],
-) -> list[tuple[Comparison, list[float]]]:
-    """Return the comparison with CEM and the ratios of the rounds, for surfaces that have both."""
+) -> _Compared:
+    """Return the comparison with the reference and the rounds' ratios on surfaces with both."""
     found = []
     for surface in surfaces:
         record = evidence.find(surface, series, policy)
@@ -91,23 +87,15 @@ def paired_rounds(
     return found
 
 
-def _compared(evidence: Evidence, series: AlgorithmSeries, policy: str) -> _Compared | None:
-    if series.algorithm == REFERENCE or not series.main:
-        return None
-    surfaces = (*evidence.one_per_model, *evidence.others)
-    found = paired_rounds(evidence, series, policy, surfaces)
-    return _Compared(series, *zip(*found, strict=True)) if found else None
-
-
-def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
-    figures = [one.ratio for one in compared.found]
+def _row(label: str, compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
+    figures = [one.ratio for one, _ in compared]
     wins, losses = sum(r > 1 for r in figures), sum(r < 1 for r in figures)
     p, mean = sign_test(wins, losses), float(geometric(np.array(figures)))
-    interval = average_interval(compared.ratios, geometric)
+    interval = average_interval([ratios for _, ratios in compared], geometric)
     return (
-        words(compared.series.label),
+        words(label),
         count(len(figures)),
-        *_verdicts(compared.found),
+        *_verdicts([one for one, _ in compared]),
         *_verdicts(together),
         Value(f"{wins} of {wins + losses}", wins, "derived"),
         Value(f"p = {p:.2g}", p, "derived"),
@@ -119,7 +107,7 @@ def _row(compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ..
 
 
 def _verdicts(found: Sequence[Comparison]) -> list[Value]:
-    """Return the numbers of surfaces on which CEM is faster, slower, or undecided."""
+    """Return the numbers of surfaces on which the reference is faster, slower, or undecided."""
     counts = Counter(one.verdict for one in found)
     faster, slower = counts["slower"], counts["faster"]  # the verdict is about the other algorithm
     return [count(faster), count(slower), count(len(found) - faster - slower)]

@@ -131,7 +131,7 @@ def _remarks(records: Sequence[Record]) -> list[Text]:
 
 
 def speedups_table(records: Sequence[Record], reference: str) -> RenderableType | None:
-    """Return the speedups of the reference over the others (Eq. 33), with their intervals.
+    """Return the speedups of the reference over the others, with their intervals.
 
     If no cell has enough rounds for an interval, a remark says so, and each surface has one row.
     None if there is nothing to compare.
@@ -147,9 +147,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> RenderableType 
             compared.append((record, found))
     if not compared:
         return None
-    heading = Text(
-        f"\nSpeedup of {reference} over the others: t / t_{reference} - 1 (Eq. 33)", style="bold"
-    )
+    heading = Text(f"\nSpeedup of {reference} over the others: t / t_{reference} - 1", style="bold")
     if all(found.verdict == "too few rounds" for _, found in compared):
         told = (
             f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
@@ -338,9 +336,10 @@ def _printed(record: Record) -> str:
     """Return the paper's printed figures for this surface and algorithm, as text."""
     row, name = record.mesh.paper_row, record.cell.algorithm
     what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
-    tables = paper_of(row).tables
-    printed = {**tables.get(3, {}).get(row, {}), **tables.get(4, {}).get(row, {})}
-    energy, mean, sd = (printed.get(name + end) for end in ("", "_mean", "_sd"))
+    energy, mean, sd = (
+        paper_of(row).printed_figure(column, name, row)
+        for column in ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
+    )
     if energy is None or mean is None or sd is None:
         return what
     return f"{what}; printed: E_C {energy:.4f}, mean angle error {mean:.2f}, SD {sd:.2f}"
@@ -352,7 +351,7 @@ def _given(record: Record) -> str:
 
 
 def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
-    """Return counts of surfaces, their agreement with Table 2, and their conformal-factor span."""
+    """Return counts of surfaces, whether these are the paper's, and conformal-factor spans."""
     rows: list[list[str | Text]] = []
     for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
         mesh, check = facts.mesh, row_check(facts.mesh)
@@ -369,7 +368,7 @@ def facts_table(known: Mapping[str, SurfaceFacts]) -> RenderableType:
             ]
         )
     heads = figures("vertices", "faces", "boundary", "not Delaunay", "span")
-    table = grid([names("surface"), *heads, names("Table 2")], rows)
+    table = grid([names("surface"), *heads, names("in print")], rows)
     folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
     span = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
     return Group(table, Text(f"{span}\nthumbnails: {', '.join(folders)}", style="dim"))

@@ -1,4 +1,4 @@
-"""Exhibits of a morph: its strip (Figure 13) and its registrations (Figure 14)."""
+"""Exhibits of a morph: its strip and its registrations."""
 
 from __future__ import annotations
 
@@ -14,12 +14,10 @@ from cembench.results.exhibits import (
     exhibit_folder,
     write_exhibit,
 )
+from cembench.results.papers import usual_paper
 from cembench.results.records import MeshOrigin
 from cembench.workflows.morphing.morph import Morph
 from cembench.workflows.morphing.pages import registration_page, strip_page
-
-#: The models of the paper in Figures 13 and 14, in their order.
-IN_THE_FIGURES = ("Liu's Wry Face", "Liu's Neutral Face", "Liu's Smile Face")
 
 
 def write_morph_exhibits(
@@ -36,7 +34,7 @@ def write_morph_exhibits(
     `figures` are the morph's metrics; `rows_of_paper` are the paper's models that the surfaces
     stand in for, "" for none; `sides` are the pixels of a picture on each page.
     """
-    in_paper = rows_of_paper == IN_THE_FIGURES
+    paper = usual_paper()
     origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
     names = [mesh.name for mesh in morph.meshes]
     stem = "-".join(names)
@@ -64,7 +62,7 @@ def write_morph_exhibits(
             title="Morph: " + ", ".join(names),
             text=f"The vertices of {names[0]} are carried onto the other surfaces, and {spline} in "
             "time leads through their places.",
-            figure="Figure 13" if in_paper else "",
+            figure=paper.exhibited("morph", rows_of_paper),
             pictures=(strip,),
             tables=(_path_table(figures),),
             **shared,
@@ -74,7 +72,7 @@ def write_morph_exhibits(
             title="Registration: " + ", ".join(names),
             text="Conformal maps f of the surfaces to the disk; a Moebius map m1 that takes the "
             "first landmark to the centre; registration maps r that minimise (34).",
-            figure="Figure 14" if in_paper else "",
+            figure=paper.exhibited("registration", rows_of_paper),
             pictures=(board,),
             tables=(registration_table(figures),),
             **shared,

@@ -108,6 +108,6 @@ def _frame_of(frames: int, tell: Tell) -> Callable[[int], object]:
 
 
 def rows_of_paper(registry: Registry, surfaces: Sequence[str]) -> tuple[str, ...]:
-    """Return the model of the paper's Table 1 that each surface stands in for; "" for none."""
+    """Return the model of the paper that each surface stands in for; "" for none."""
     roles = paper_roles(registry, [name for name in surfaces if name in registry.surfaces])
     return tuple(roles[name].paper_row if name in roles else "" for name in surfaces)

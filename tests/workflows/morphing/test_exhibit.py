@@ -3,9 +3,12 @@ import pytest
 from PIL import Image
 
 from cembench.results.exhibits import read_exhibits
-from cembench.workflows.morphing.exhibit import IN_THE_FIGURES, write_morph_exhibits
+from cembench.results.papers import find_paper
+from cembench.workflows.morphing.exhibit import write_morph_exhibits
 from cembench.workflows.morphing.morph import morph
 from tests.workflows.morphing.reliefs import three
+
+FACES = find_paper("cem").exhibits[-1].models
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +30,12 @@ def run(found, tmp_path):
 
 
 def test_the_papers_three_faces_are_figures_13_and_14(run):
-    _, exhibits = run(IN_THE_FIGURES)
+    _, exhibits = run(FACES)
     assert [exhibit.figure for exhibit in exhibits] == ["Figure 13", "Figure 14"]
     assert {exhibit.origin for exhibit in exhibits} == {"stand-in"}
 
 
-@pytest.mark.parametrize("rows", [("", "", ""), (*IN_THE_FIGURES[:2], "")])
+@pytest.mark.parametrize("rows", [("", "", ""), (*FACES[:2], "")])
 def test_other_surfaces_are_no_figure_of_the_paper(run, rows):
     _, exhibits = run(rows)
     assert [exhibit.figure for exhibit in exhibits] == ["", ""]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import Evidence
 from cembench.report.content.figures.energy_by_iteration import model_gap
 from cembench.report.content.inspection import BIN, LAST, Angles, Inspection
 from cembench.report.document import Gap
@@ -21,7 +21,7 @@ def angle_histograms(
     evidence: Evidence, inspections: Mapping[str, Inspection]
 ) -> tuple[Plot | None, list[Gap]]:
     """Return the plot of the paper's models in the run, and a gap for each missing one."""
-    series = evidence.series_of(REFERENCE)
+    series = evidence.series_of(evidence.reference)
     panels, gaps = [], []
     wanted = evidence.paper.plotted("angle_histograms")
     for model in wanted.models:
@@ -29,7 +29,7 @@ def angle_histograms(
         seen = inspections[surface.mesh_hash] if surface else None
         angles = seen.angles.get(series.label) if seen and series else None
         if angles and surface:
-            panels.append(_panel(f"{model} ({surface.origin})", angles))
+            panels.append(_panel(f"{model} ({surface.origin})", angles, evidence.reference))
         elif seen and not seen.kept:
             gaps.append(Gap(f"{wanted.figure}: {model}", seen.missing_reason))
         else:
@@ -48,8 +48,8 @@ def angle_histograms(
     return plot, gaps
 
 
-def _panel(title: str, angles: Angles) -> PlotPanel:
-    bars = histogram("CEM", angles, series_styles([REFERENCE])[REFERENCE], SHOWN)
+def _panel(title: str, angles: Angles, name: str) -> PlotPanel:
+    bars = histogram(name.upper(), angles, series_styles([name])[name], SHOWN)
     heading = f"{title}: {angles.below_one:.1%} below 1°"
     return PlotPanel(
         Axis("angular distortion (degrees)", low=0, high=SHOWN),

@@ -51,10 +51,10 @@ def measured_points(evidence: Evidence, label: str, policy: str) -> list[Point]:
 
 
 def printed_points(paper: Paper, algorithm: str) -> list[Point]:
-    """Return (faces, seconds, model) from the paper's Table 1."""
+    """Return (faces, seconds, model) as printed in the paper."""
     return [
         Point(paper.faces(model), seconds, model)
-        for model, row in paper.tables.get(1, {}).items()
+        for model, row in paper.tables.get(paper.table_of("seconds") or 0, {}).items()
         if (seconds := row.get(algorithm)) is not None
     ]
 
@@ -71,7 +71,8 @@ def cost_by_faces(evidence: Evidence) -> Plot:
     paper, figure = evidence.paper, evidence.paper.plotted("cost_by_faces")
     usual = series_styles(paper.algorithms)
     groups = [(a.upper(), usual[a], printed_points(paper, a)) for a in paper.algorithms]
-    panels.append(_panel(groups, "printed in the paper (Table 1)"))
+    number = paper.table_of("seconds")
+    panels.append(_panel(groups, "printed in the paper" + f" (Table {number})" * bool(number)))
     return Plot(
         figure.anchor or "cost-by-faces",
         "Computational cost against number of triangles",

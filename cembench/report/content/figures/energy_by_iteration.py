@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface, model_surface
+from cembench.report.content.evidence import Evidence, MeasuredSurface, model_surface
 from cembench.report.document import Gap
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries
 
@@ -45,7 +45,7 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
         record = evidence.find(surface, series)
         if not record or not record.outcome.energy_history:
             continue
-        is_cem = series.algorithm == REFERENCE
+        is_cem = series.algorithm == evidence.reference
         if not is_cem and (
             series.algorithm in evidence.paper.algorithms or "energy_of" in record.outcome.extras
         ):
@@ -55,7 +55,7 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
         shown.append(PlotSeries(series.label, list(range(len(history))), history, "both", look))
         if is_cem and series.main:
             shown.insert(0, shown.pop())
-    main = evidence.series_of(REFERENCE)
+    main = evidence.series_of(evidence.reference)
     if not main or not any(s.name == main.label for s in shown):
         return None
     return PlotPanel(Axis("iteration"), Axis("conformal energy E_C"), tuple(shown), title)
@@ -64,7 +64,7 @@ def history_panel(evidence: Evidence, surface: MeasuredSurface, title: str) -> P
 def model_gap(evidence: Evidence, model: str, figure: str) -> Gap:
     """Return the gap for a model without a map by CEM in the run."""
     surface = evidence.surface_for_model(model)
-    series = evidence.series_of(REFERENCE)
+    series = evidence.series_of(evidence.reference)
     record = evidence.find(surface, series) if surface and series else None
     why = (
         evidence.missing_reason(record)
