@@ -42,6 +42,10 @@ class ExhibitTable(BaseModel):
     columns: tuple[str, ...]
     rows: tuple[tuple[str | float | int | None, ...], ...]
     notes: tuple[str, ...] = ()
+    #: Formats of the columns' numbers, by title; default: six digits that count.
+    forms: dict[str, str] = {}
+    #: Columns that a terminal leaves out where it is too narrow.
+    details: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _rows_fit(self) -> Self:

@@ -87,7 +87,7 @@ def here(
         return missing(evidence.missing_reason(record))
     if record.outcome.status != "ok":
         text = record.outcome.status.replace("out_of_memory", "memory")
-        return Value(text, None, "", record.cell.key, evidence.missing_reason(record))
+        return Value(text, None, "", record.cell.key, evidence.missing_reason(record), "bad")
     return figure_entry(evidence, record, quantity.figure)
 
 

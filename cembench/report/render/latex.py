@@ -26,6 +26,7 @@ from cembench.report.document import (
     Sentence,
     Table,
     Text,
+    is_prose,
     marked,
     tables_of,
     tex_of,
@@ -49,8 +50,6 @@ _CHARACTERS = {
 ROWS = 38
 #: Maximum columns of a table on a page; wider ones are continued after a group of columns.
 COLUMNS = 18
-#: Characters above which a column of text is wrapped, and its share of the line width.
-LONG = 36
 
 PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
 \usepackage[T1]{fontenc}
@@ -275,12 +274,10 @@ def _by_columns(table: Table) -> list[Table]:
 
 
 def _alignment(table: Table) -> str:
-    letters = []
-    for k, column in enumerate(table.columns):
-        longest = max((len(row[k].text) for row in table.rows), default=0)
-        words = r"p{0.3\linewidth}" if longest > LONG else "l"
-        letters.append("r" if column.numeric else words)
-    return "".join(letters)
+    return "".join(
+        "r" if column.numeric else r"p{0.3\linewidth}" if is_prose(table, k) else "l"
+        for k, column in enumerate(table.columns)
+    )
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:

@@ -21,9 +21,9 @@ from cembench.report.document import (
     Text,
     Value,
     csv_of,
+    heading,
     marked,
 )
-from cembench.report.render.tables_csv import heading
 
 #: Number of digits of a record's key in links.
 KEY = 12
