@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -38,6 +38,7 @@ from cembench.report.document import (
     Table,
     Text,
     Value,
+    entry,
     of_status,
     words,
 )
@@ -338,9 +339,7 @@ def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     key = str(evaluate(one.record, group) or "") if one.record else ""
     if isinstance(found, str):
         return Value(found, None, "derived")
-    if found is None:
-        return Value("-", None, "", key, "no figure")
-    return Value(worded(found, one.form), found, "derived", key)
+    return entry(found, partial(worded, form=one.form), "no figure", record=key)
 
 
 def _notes(evidence: Evidence, spec: DeclaredTable, chosen: Rows) -> Iterable[str]:

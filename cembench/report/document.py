@@ -9,7 +9,7 @@ holds its own paths, and ``records.csv`` has every record as a row.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -328,12 +328,18 @@ def words(text: str, tone: Tone = "") -> Value:
 
 
 def entry(
-    number: float | None, form: str, why: str, *, origin: Origin = "derived", record: str = ""
+    number: float | None,
+    form: str | Callable[[float], str],
+    why: str,
+    *,
+    origin: Origin = "derived",
+    record: str = "",
 ) -> Value:
     """Return a number in a format, or a gap; `why` says why there is no number."""
     if number is None:
         return Value("-", record=record, why=why)
-    return Value(format(number, form), number, origin, record)
+    text = format(number, form) if isinstance(form, str) else form(number)
+    return Value(text, number, origin, record)
 
 
 def of_status(status: str, text: str = "", record: str = "", why: str = "") -> Value:

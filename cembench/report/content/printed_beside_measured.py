@@ -9,7 +9,7 @@ import numpy as np
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.declared import figure_entry
-from cembench.report.document import Column, Table, Value, count, missing, words
+from cembench.report.document import Column, Table, Value, count, entry, missing, words
 from cembench.results.columns import FrameColumn
 from cembench.results.many import geometric
 from cembench.results.papers import Paper
@@ -164,9 +164,7 @@ def _footer_rows(
             found = _numbers(rows, columns, k, footer.over)
             value = footer.of(found) if found else None
             nothing = "nothing to compare" if footer.over else "no figure in this column"
-            cells.append(
-                missing(nothing) if value is None else Value(footer.show(value), value, "derived")
-            )
+            cells.append(entry(value, footer.show, nothing))
             counts += [] if number else [count(len(found))]
         lines.append(tuple(cells))
     return [*lines, tuple(counts)]

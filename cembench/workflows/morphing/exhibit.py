@@ -66,7 +66,7 @@ def write_morph_exhibits(
             "time leads through their places.",
             figure="Figure 13" if in_paper else "",
             pictures=(strip,),
-            tables=(_path_table(figures),),
+            tables=(path_table(figures),),
             **shared,
         ),
         Exhibit(
@@ -88,34 +88,43 @@ def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> E
     return ExhibitPicture(file=file, caption=caption, alternative=caption)
 
 
+#: The figures of a registration: the heading and the format of each.
+_REGISTRATION = {
+    "surface": ("surface", ""),
+    "steps": ("steps to lambda", "d"),
+    "landmark_error_share": ("landmark error / size", ".2e"),
+    "dirichlet_energy": ("E_D", ".4f"),
+    "dilatation_mean": ("mean dilatation", ".2f"),
+    "dilatation_max": ("maximum dilatation", ".1f"),
+    "flipped_triangles": ("folds", "d"),
+    "distance_mean_edges": ("mean distance / edge", ".3f"),
+    "hausdorff_edges": ("Hausdorff / edge", ".2f"),
+}
+
+
 def registration_table(figures: dict[str, Any]) -> ExhibitTable:
     """Return a table of the registration metrics, one row per surface."""
-    keys = {
-        "surface": "surface",
-        "landmark_error_share": "landmark error / size",
-        "dirichlet_energy": "E_D",
-        "dilatation_mean": "mean dilatation",
-        "dilatation_max": "maximum dilatation",
-        "flipped_triangles": "folds",
-        "distance_mean_edges": "mean distance / edge",
-        "hausdorff_edges": "Hausdorff / edge",
-    }
-    rows = tuple(tuple(row[key] for key in keys) for row in figures["registrations"])
+    rows = [{**row, "steps": len(row["lambdas"])} for row in figures["registrations"]]
     return ExhibitTable(
         title="Registrations",
-        columns=tuple(keys.values()),
-        rows=rows,
+        columns=tuple(title for title, _ in _REGISTRATION.values()),
+        rows=tuple(tuple(row[key] for key in _REGISTRATION) for row in rows),
+        forms={title: form for title, form in _REGISTRATION.values() if form},
         notes=(
             "Distances between the carried surface and its target, the larger of both ways, over "
-            "all vertices and 50,000 random points each, in mean edges of the target.",
+            "all vertices and 50,000 random points each, in mean edges of the target. A dash: no "
+            "landmarks, or a triangle of almost no area, whose dilatation is not finite.",
         ),
     )
 
 
-def _path_table(figures: dict[str, Any]) -> ExhibitTable:
+def path_table(figures: dict[str, Any]) -> ExhibitTable:
+    """Return a table of how smoothly the vertices move."""
+    columns = ("largest acceleration of a vertex", "largest step between frames")
     return ExhibitTable(
         title="Smoothness of the path",
-        columns=("largest acceleration of a vertex", "largest step between frames"),
+        columns=columns,
         rows=((figures["largest_acceleration_share"], figures["largest_step_share"]),),
+        forms=dict(zip(columns, (".3f", ".4f"), strict=True)),
         notes=("In sizes of the first surface; the time from the first to the last is 1.",),
     )
