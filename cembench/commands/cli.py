@@ -443,7 +443,7 @@ def _present(records: list[Record], *, as_json: bool, where: Path, reference: st
         out.print(results_table(evidence))
         speedups = speedups_table(records, reference)
         if speedups is not None:
-            out.print(speedups)
+            out.print("", speedups, sep="\n")
         for words in suspects:
             out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)

@@ -217,11 +217,11 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
     from cembench.report.content.exhibits import exhibit_table
-    from cembench.workflows.morphing.exhibit import path_table, registration_table
+    from cembench.workflows.morphing.exhibit import morph_tables
 
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
-    print_pair("lambda", f"{figures['lambda']:g}")
-    for table in (registration_table(figures), path_table(figures)):
+    print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")
+    for table in morph_tables(figures):
         out.print(exhibit_table(table, "", "surface"))
 
 

@@ -37,6 +37,7 @@ from cembench.report.document import (
     Section,
     Table,
     Text,
+    Tone,
     Value,
     entry,
     of_status,
@@ -321,7 +322,8 @@ def figure_entry(evidence: Evidence, record: Record, column: FrameColumn) -> Val
     text, why = column.text(number), ""
     if column.timed:
         text, why = timed(evidence, record, text)
-    return Value(text, float(number), evidence.origin_of(record), key, why)
+    tone: Tone = "doubtful" if why else ""
+    return Value(text, float(number), evidence.origin_of(record), key, why, tone)
 
 
 def timed(evidence: Evidence, record: Record, text: str) -> tuple[str, str]:

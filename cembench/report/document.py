@@ -150,6 +150,12 @@ class Table(OnTerminal):
         )
         return cls(name, title, tuple(columns), made, **more)
 
+    def only(self, places: Sequence[int]) -> Table:
+        """Return the table with these columns alone."""
+        columns = tuple(self.columns[k] for k in places)
+        rows = tuple(tuple(row[k] for k in places) for row in self.rows)
+        return replace(self, columns=columns, rows=rows)
+
 
 @dataclass(frozen=True)
 class Figure:
@@ -181,6 +187,11 @@ class Figure:
     alternative: str = ""
     paper: str = ""
     record: str = ""
+
+    @property
+    def full_title(self) -> str:
+        """The title, after the paper's figure that it reproduces."""
+        return f"{self.paper}: {self.title}" if self.paper else self.title
 
 
 @dataclass(frozen=True)

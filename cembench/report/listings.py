@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cembench.mesh.datasets import Dataset
 from cembench.registry import Algorithm, Surface
-from cembench.report.document import Column, Section, Table, Text, entry
+from cembench.report.document import Column, Plain, Section, Table, Text
 
 
 def _columns(*titles: str) -> list[Column]:
@@ -40,16 +40,13 @@ def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> Table:
 
 def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> Table:
     """Return the datasets, with those already fetched marked."""
-    sizes = [Column("faces", lacking="not known"), Column("size")]
-    rows = [
-        [
-            *(d.name, d.group or "-", d.faces),
-            entry(None, "", "not known") if d.size is None else bytes_text(d.size),
-            *(d.licence, "yes" if fetched else "no"),
-        ]
-        for d, fetched in datasets
-    ]
-    columns = [*_columns("dataset", "group"), *sizes, *_columns("licence", "here")]
+    rows: list[list[Plain]] = []
+    for d, fetched in datasets:
+        faces = "-" if d.faces is None else d.faces
+        size = "-" if d.size is None else bytes_text(d.size)
+        rows.append([d.name, d.group or "-", faces, size, d.licence, "yes" if fetched else "no"])
+    columns = [*_columns("dataset", "group"), Column("faces"), Column("size")]
+    columns += _columns("licence", "here")
     return Table.of("datasets", "", columns, rows)
 
 

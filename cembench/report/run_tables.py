@@ -12,6 +12,7 @@ from cembench.report.declared import declared_table
 from cembench.report.document import (
     Column,
     Item,
+    Plain,
     Section,
     Table,
     Text,
@@ -182,22 +183,16 @@ def _drift_words(changes: Sequence[Change]) -> str:
 
 def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table:
     """Return the plan: cells, triangles, what is recorded already, and the estimated cost."""
-    nothing = [entry(None, "", "recorded already")] * 3
-    return Table.of(
-        "plan",
-        "",
-        [
-            *(SURFACE, ALGORITHM, Column("solves", numeric=False), Column("faces")),
-            *(Column("a call"), Column("in all"), Column("memory"), Column("from", numeric=False)),
-        ],
-        [
-            [cell.mesh, cell.algorithm, cell.solves, faces, *(nothing if cost is None else [
-                f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s",
-                f"{cost.memory_bytes / 2**30:.1f} GiB",
-            ]), state]
-            for cell, faces, state, cost in lines
-        ],
-    )  # fmt: skip
+    rows: list[list[Plain]] = []
+    for cell, faces, state, cost in lines:
+        costs = ("-", "-", "-")
+        if cost is not None:
+            gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
+            costs = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
+        rows.append([cell.mesh, cell.algorithm, cell.solves, faces, *costs, state])
+    costs_columns = [Column(title) for title in ("faces", "a call", "in all", "memory")]
+    solves, basis = Column("solves", numeric=False), Column("from", numeric=False)
+    return Table.of("plan", "", [SURFACE, ALGORITHM, solves, *costs_columns, basis], rows)
 
 
 def figures_table(record: Record) -> Table:

@@ -215,18 +215,18 @@ def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Ex
     )
 
 
-#: The columns of the table: the key of each in the rows, and the format of its numbers.
+#: The columns of the table: the heading of each key in the rows, and the format of its numbers.
 _TABLE = {
-    "surface": ("mesh", ""),
+    "mesh": ("surface", ""),
     "holes": ("holes", "d"),
     "algorithm": ("algorithm", ""),
     "sweeps": ("sweeps", "d"),
-    "E_C": ("conformal_energy", ".4f"),
-    "angle°": ("angle_error_mean_deg", ".2f"),
-    "SD°": ("angle_error_sd_deg", ".2f"),
-    "circ.": ("boundary_circularity", ".0e"),
-    "before rounding": ("circularity_before_rounding", ".0e"),
-    "folds": ("flipped_triangles", "d"),
+    "conformal_energy": ("E_C", ".4f"),
+    "angle_error_mean_deg": ("angle°", ".2f"),
+    "angle_error_sd_deg": ("SD°", ".2f"),
+    "boundary_circularity": ("circ.", ".0e"),
+    "circularity_before_rounding": ("before rounding", ".0e"),
+    "flipped_triangles": ("folds", "d"),
     "iterations": ("iterations", "d"),
     "seconds": ("seconds", ".2f"),
     "status": ("status", ""),
@@ -235,11 +235,10 @@ _TABLE = {
 
 def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -> Exhibit:
     """Add a table of the figures of all surfaces to a run; return its exhibit."""
-    table = ExhibitTable(
-        title="Surfaces with holes",
-        columns=tuple(_TABLE),
-        rows=tuple(tuple(row.get(key) for key, _ in _TABLE.values()) for row in rows),
-        forms={title: form for title, (_, form) in _TABLE.items() if form},
+    table = ExhibitTable.of(
+        "Surfaces with holes",
+        _TABLE,
+        rows,
         details=("holes", "before rounding", "iterations"),
         notes=(
             "angle° and SD° are the mean and the standard deviation of the angle errors in "

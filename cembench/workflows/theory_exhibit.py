@@ -94,18 +94,13 @@ def _tables(
             details=("meaning",),
         )
 
-    columns = ("iteration", *(f"after {k}" for k in LOOKS), "last", "iterations")
-    keys = ("name", *(f"after_{k}" for k in LOOKS), "last", "iterations")
-    rows = tuple(tuple(row[key] for key in keys) for row in facts["energies"])
+    looks = {f"after_{k}": (f"after {k}", ".6f") for k in LOOKS} | {"last": ("last", ".6f")}
+    energies = {"name": ("iteration", ""), **looks, "iterations": ("iterations", "d")}
     return (
         of("Premises", given),
         of("Statements", said),
-        ExhibitTable(
-            title="Conformal energy E_C",
-            columns=columns,
-            rows=rows,
-            forms=dict.fromkeys(columns[1:-1], ".6f"),
-            details=columns[-1:],
+        ExhibitTable.of(
+            "Conformal energy E_C", energies, facts["energies"], details=("iterations",)
         ),
         _certificate_table(facts["certificate"]),
     )

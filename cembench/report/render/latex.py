@@ -26,6 +26,7 @@ from cembench.report.document import (
     Sentence,
     Table,
     Text,
+    Value,
     is_prose,
     marked,
     tables_of,
@@ -157,17 +158,13 @@ def _item(item: Item) -> list[str]:
     if isinstance(item, Table):
         return [rf"\input{{{tex_of(item).with_suffix('')}}}"]
     if isinstance(item, Figure):
-        return _figures((item,), _title(item), item.caption, f"fig:{item.name}")
+        return _figures((item,), item.full_title, item.caption, f"fig:{item.name}")
     if isinstance(item, Gallery):
         return _figures(item.figures, item.title, item.caption, f"fig:{item.name}")
     if isinstance(item, Gap):
         how = rf" Made by: \texttt{{{escape(item.command)}}}." if item.command else ""
         return [rf"\textbf{{Missing: {escape(item.title)}.}} {escape(item.why)}{how}"]
     return _claim(item)
-
-
-def _title(figure: Figure) -> str:
-    return f"{figure.paper}: {figure.title}" if figure.paper else figure.title
 
 
 def _claim(claim: Claim) -> list[str]:
@@ -262,15 +259,7 @@ def _by_columns(table: Table) -> list[Table]:
         if portions[-1] and len(common) + len(portions[-1]) + len(places) > COLUMNS:
             portions.append([])
         portions[-1] += places
-    chosen = [sorted([*common, *places]) for places in portions]
-    return [
-        replace(
-            table,
-            columns=tuple(table.columns[k] for k in places),
-            rows=tuple(tuple(row[k] for k in places) for row in table.rows),
-        )
-        for places in chosen
-    ]
+    return [table.only(sorted([*common, *places])) for places in portions]
 
 
 def _alignment(table: Table) -> str:
@@ -298,11 +287,9 @@ def _heads(columns: Sequence[Column]) -> list[str]:
     return [*lines, " & ".join(titles) + r" \\"]
 
 
-def _row(table: Table, row: Sequence[object]) -> str:
-    cells = [
-        escape(marked(value, column))  # type: ignore[arg-type]
-        for column, value in zip(table.columns, row, strict=True)
-    ]
+def _row(table: Table, row: Sequence[Value]) -> str:
+    pairs = zip(row, table.columns, strict=True)
+    cells = [escape(marked(value, column)) for value, column in pairs]
     return " & ".join(cells) + r" \\"
 
 

@@ -13,6 +13,7 @@ from textwrap import wrap
 
 from rich.cells import cell_len
 from rich.console import Console, ConsoleOptions, Group, RenderableType
+from rich.padding import Padding
 from rich.table import Table as Grid
 from rich.text import Text as Line
 
@@ -68,7 +69,9 @@ def _parts(item: object) -> Iterator[RenderableType]:
         for number, part in enumerate((*item.items, *item.sections)):
             if number and not isinstance(part, Text) and part.title:
                 yield Line()
-            yield from _parts(part)
+            for shown in _parts(part):
+                indented = bool(item.title) and isinstance(part, Text)
+                yield Padding(shown, (0, 0, 0, 2), expand=False) if indented else shown
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def _fitted(table: Table, width: int) -> tuple[Table, list[int], int]:
     """Return a table, perhaps without details, with the widths of its columns and their gap."""
     short = [k for k, column in enumerate(table.columns) if not column.detail]
     for shown, (broken, gap) in product((range(len(table.columns)), short), _WAYS):
-        chosen = _only(table, shown)
+        chosen = table.only(shown)
         widths = _widths(chosen, gap, broken=broken)
         excess = sum(widths) + gap * (len(widths) - 1) - width
         if excess <= 0:
@@ -122,14 +125,6 @@ def _fitted(table: Table, width: int) -> tuple[Table, list[int], int]:
         while excess > 0 and some and widths[k := max(some, key=widths.__getitem__)] > least:
             widths[k], excess = widths[k] - 1, excess - 1
     return chosen, widths, gap
-
-
-def _only(table: Table, places: Sequence[int]) -> Table:
-    """Return a table with these columns alone."""
-    columns = tuple(table.columns[k] for k in places)
-    return replace(
-        table, columns=columns, rows=tuple(tuple(row[k] for k in places) for row in table.rows)
-    )
 
 
 def _widths(table: Table, gap: int, *, broken: bool) -> list[int]:
@@ -171,10 +166,11 @@ def _grid(table: Table, widths: Sequence[int], gap: int) -> Grid:
     grid = Grid(
         box=None, pad_edge=False, padding=(0, gap, 0, 0), header_style="bold", show_header=headed
     )
+    has_prose = any(is_prose(table, k) for k in range(len(widths)))
     for k, (column, width) in enumerate(zip(table.columns, widths, strict=True)):
-        name = not (column.numeric or is_prose(table, k))
+        cut = not (column.numeric or has_prose)
         grid.add_column(
-            _title(column), width=width, no_wrap=name, overflow="ellipsis" if name else "fold",
+            _title(column), width=width, no_wrap=cut, overflow="ellipsis" if cut else "fold",
             justify="right" if column.numeric else "left",
             style="" if headed or k else "bold", vertical="top",
         )  # fmt: skip

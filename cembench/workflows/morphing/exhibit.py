@@ -40,6 +40,7 @@ def write_morph_exhibits(
     origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
     names = [mesh.name for mesh in morph.meshes]
     stem = "-".join(names)
+    registrations, path = morph_tables(figures)
     shared: dict[str, Any] = {"command": command, "origin": origin, "facts": figures}
     tell("drawing the strip")
     strip = _picture(
@@ -66,7 +67,7 @@ def write_morph_exhibits(
             "time leads through their places.",
             figure="Figure 13" if in_paper else "",
             pictures=(strip,),
-            tables=(path_table(figures),),
+            tables=(path,),
             **shared,
         ),
         Exhibit(
@@ -76,7 +77,7 @@ def write_morph_exhibits(
             "first landmark to the centre; registration maps r that minimise (34).",
             figure="Figure 14" if in_paper else "",
             pictures=(board,),
-            tables=(registration_table(figures),),
+            tables=(registrations,),
             **shared,
         ),
     ]
@@ -102,29 +103,25 @@ _REGISTRATION = {
 }
 
 
-def registration_table(figures: dict[str, Any]) -> ExhibitTable:
-    """Return a table of the registration metrics, one row per surface."""
+#: What is said of the path: the heading and the format of each.
+_PATH = {
+    "largest_acceleration_share": ("largest acceleration of a vertex", ".3f"),
+    "largest_step_share": ("largest step between frames", ".4f"),
+}
+
+
+def morph_tables(figures: dict[str, Any]) -> tuple[ExhibitTable, ExhibitTable]:
+    """Return the metrics of the registrations, one row per surface, and those of the path."""
     rows = [{**row, "steps": len(row["lambdas"])} for row in figures["registrations"]]
-    return ExhibitTable(
-        title="Registrations",
-        columns=tuple(title for title, _ in _REGISTRATION.values()),
-        rows=tuple(tuple(row[key] for key in _REGISTRATION) for row in rows),
-        forms={title: form for title, form in _REGISTRATION.values() if form},
+    registrations = ExhibitTable.of(
+        "Registrations",
+        _REGISTRATION,
+        rows,
         notes=(
             "Distances between the carried surface and its target, the larger of both ways, over "
             "all vertices and 50,000 random points each, in mean edges of the target. A dash: no "
             "landmarks, or a triangle of almost no area, whose dilatation is not finite.",
         ),
     )
-
-
-def path_table(figures: dict[str, Any]) -> ExhibitTable:
-    """Return a table of how smoothly the vertices move."""
-    columns = ("largest acceleration of a vertex", "largest step between frames")
-    return ExhibitTable(
-        title="Smoothness of the path",
-        columns=columns,
-        rows=((figures["largest_acceleration_share"], figures["largest_step_share"]),),
-        forms=dict(zip(columns, (".3f", ".4f"), strict=True)),
-        notes=("In sizes of the first surface; the time from the first to the last is 1.",),
-    )
+    note = "In sizes of the first surface; the time from the first to the last is 1."
+    return registrations, ExhibitTable.of("Smoothness of the path", _PATH, [figures], notes=(note,))
