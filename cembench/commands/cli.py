@@ -144,7 +144,7 @@ def list_(
     them, and where their thumbnails are. Only stand-ins that were measured are
     shown; --measure measures the others.
     """
-    from cembench.report.render.terminal_lists import algorithms_table, surfaces_table
+    from cembench.report.listings import algorithms_table, surfaces_table
 
     registry = registry_with(plugin)
     if measure and kind is not Kind.surfaces:
@@ -163,7 +163,7 @@ def list_(
     if kind in (None, Kind.surfaces):
         out.print(surfaces_table(list(registry.surfaces.values()), verbose=verbose))
     if facts:
-        from cembench.report.render.terminal import facts_table
+        from cembench.report.surface_facts import facts_table
 
         known = {name: found for name, found in facts.items() if found}
         if known:
@@ -416,29 +416,34 @@ def _check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None
 
 
 def _present(records: list[Record], *, as_json: bool, where: Path, reference: str | None) -> None:
+    from cembench.report.content.evidence import Evidence
     from cembench.report.content.many import MANY
-    from cembench.report.render.terminal import results_table, speedups_table
-    from cembench.report.render.terminal_many import machine_lines, many_table
+    from cembench.report.run_tables import (
+        machine_lines,
+        many_table,
+        results_table,
+        speedups_table,
+    )
     from cembench.results.outliers import outlier_lines
     from cembench.results.record_rows import REFERENCE, rows
     from cembench.results.store import Store
 
     reference = reference or REFERENCE
     suspects = [Text(f"! {line}", style="yellow") for line in outlier_lines(records)]
-    environments = Store(where).environments()
+    evidence = Evidence(Store(where), tuple(records), ())
     if as_json:
         print_json(rows(records, reference))
     elif len({record.cell.mesh_hash for record in records}) > MANY:
         out.print(many_table(records))
-        for words in (*machine_lines(records, environments), *suspects):
+        for words in (*machine_lines(evidence.machines), *suspects):
             out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
         out.print(f"Pictures and profiles: cembench report {where}", soft_wrap=True)
     else:
-        out.print(results_table(records, environments))
+        out.print(results_table(evidence))
         speedups = speedups_table(records, reference)
         if speedups is not None:
-            out.print(speedups)
+            out.print("", speedups, sep="\n")
         for words in suspects:
             out.print(words)
         out.print(f"\nRecords and maps: {where.resolve()}", soft_wrap=True)
@@ -456,7 +461,7 @@ def _present_plan(
 ) -> None:
     """Print which cells would be measured, and their estimated cost."""
     from cembench.commands.progress import duration
-    from cembench.report.render.terminal import plan_table
+    from cembench.report.run_tables import plan_table
     from cembench.running.estimate import estimate, planned_seconds
 
     records = store.records() if (store.folder / "records").is_dir() else []

@@ -59,7 +59,7 @@ def fetch(
     what they need.
     """
     from cembench.registry import load_registry
-    from cembench.report.render.terminal_lists import datasets_table
+    from cembench.report.listings import datasets_table
 
     registry = load_registry()
     if not names and not group:
@@ -119,7 +119,7 @@ def _fetch_all(
 
 def _intent(count: int, missing: list[Dataset]) -> str:
     """Return a line with the number of files and the bytes still to fetch."""
-    from cembench.report.render.terminal_lists import bytes_text
+    from cembench.report.listings import bytes_text
 
     total = bytes_text(sum(d.size or 0 for d in missing))
     unknown = sum(d.size is None for d in missing)

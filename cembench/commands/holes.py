@@ -48,6 +48,7 @@ def holes(
     """
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
+    from cembench.report.content.exhibits import tables_shown
     from cembench.results import run_folder
     from cembench.running.surfaces import load_surface
     from cembench.workflows.holes_exhibits import examine_holes, write_holes_table
@@ -71,47 +72,17 @@ def holes(
                 mesh, algorithms, outer, sweeps, run, command, complain, status.update
             )
     files = " ".join(Path(name).name for name in meshes)
-    write_holes_table(rows, run, f"cembench holes {files}{options}")
+    exhibit = write_holes_table(rows, run, f"cembench holes {files}{options}")
     if as_json:
         print_json(rows)
     else:
-        _show(rows, run)
+        out.print(tables_shown(exhibit))
+        out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
     bad = [row for row in rows if row["status"] != "ok"]
     for row in bad:
         complain(f"{row['mesh']} / {row['algorithm']}: {row['status']}: {row['cause']}")
     if bad:
         raise typer.Exit(1)
-
-
-def _show(rows: list[dict[str, Any]], run: Path) -> None:
-    from cembench.report.render.grid import figures, grid, names
-
-    forms = {
-        "conformal_energy": ".4f",
-        "angle_error_mean_deg": ".2f",
-        "angle_error_sd_deg": ".2f",
-        "boundary_circularity": ".0e",
-        "flipped_triangles": "d",
-        "seconds": ".2f",
-    }
-    lines = []
-    for before, row in zip([None, *(row["mesh"] for row in rows)], rows, strict=False):
-        measured = (
-            "-" if row.get(key) is None else format(row[key], form) for key, form in forms.items()
-        )
-        lines.append(
-            [
-                "" if row["mesh"] == before else row["mesh"],
-                row["algorithm"],
-                "-" if row["sweeps"] is None else str(row["sweeps"]),
-                *measured,
-                row["status"],
-            ]
-        )
-    heads = figures("sweeps", "E_C", "angle°", "SD°", "circ.", "folds", "sec")
-    columns = [names("surface", 14), names("algorithm"), *heads, names("status")]
-    out.print(grid(columns, lines))
-    out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
 
 
 #: Each command with the examples in its help.

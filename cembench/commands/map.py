@@ -270,7 +270,7 @@ def _repair_of(mapped: Mapped) -> dict[str, Any]:
 
 def _show_all(mapped: Mapped, *, keep_invalid: bool) -> None:
     """Print all figures of a single mapped surface, and the files written."""
-    from cembench.report.render.terminal import figures_table
+    from cembench.report.run_tables import figures_table
 
     out.print(figures_table(mapped.record))
     for what, where in mapped.written.items():

@@ -216,34 +216,13 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
+    from cembench.report.content.exhibits import exhibit_table
+    from cembench.workflows.morphing.exhibit import morph_tables
+
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
-    for row in figures["registrations"]:
-        out.print(f"\n{row['surface']}", style="bold")
-        steps = len(row["lambdas"])
-        lines = {
-            "lambda": f"{figures['lambda']:g}"
-            + (f", reached in {steps} steps without folds" if steps > 1 else "")
-            if steps
-            else "-",
-            "landmark error": "-"
-            if row["landmark_error_share"] is None
-            else f"{row['landmark_error_share']:.2e} of the surface's size",
-            "Dirichlet energy": f"{row['dirichlet_energy']:.4f}",
-            "dilatation": "not finite: a triangle has almost no area"
-            if row["dilatation_max"] is None
-            else f"mean {row['dilatation_mean']:.2f}, maximum {row['dilatation_max']:.1f}",
-            "folded triangles": f"{row['flipped_triangles']}",
-            "distance": f"{row['distance_mean_edges']:.3f} mean edges on average, "
-            f"{row['hausdorff_edges']:.2f} at most",
-        }
-        for name, words in lines.items():
-            out.print(f"  {name:<17} {words}", markup=False)
-    out.print("\npath", style="bold")
-    out.print(f"  acceleration      {figures['largest_acceleration_share']:.3f} sizes at most")
-    out.print(
-        f"  step              {figures['largest_step_share']:.4f} sizes at most "
-        f"between two of {figures['frames']} frames\n"
-    )
+    print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")
+    for table in morph_tables(figures):
+        out.print(exhibit_table(table, "", "surface"))
 
 
 #: The command with the examples in its help.

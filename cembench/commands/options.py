@@ -205,11 +205,9 @@ def budget_seconds(given: str | None, profile: Profile | None) -> float:
         The text is not a time, or is outside the range.
 
     """
-    from cembench.running.options import USUAL_BUDGET
-
     if given is None:
         from cembench.results.papers import usual_paper
-        from cembench.running.local import USUAL_BUDGET
+        from cembench.running.options import USUAL_BUDGET
 
         budgets = usual_paper().profiles.budgets
         return budgets.get(profile, USUAL_BUDGET) if profile else USUAL_BUDGET

@@ -121,7 +121,7 @@ def _usual(registry: Registry) -> list[Algorithm]:
 
 def _show(output: Path, records: Sequence[Record], lacking: dict[str, str]) -> None:
     from cembench.report.content.evidence import Evidence
-    from cembench.report.render.terminal_peers import peers_tables
+    from cembench.report.run_tables import peers_tables
     from cembench.results.store import Store
 
     out.print(peers_tables(Evidence(Store(output), tuple(records), ())))

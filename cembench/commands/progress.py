@@ -14,7 +14,6 @@ from rich.text import Text
 
 from cembench.commands.console import err
 from cembench.commands.ending import resumable
-from cembench.report.render.grid import GridColumn, grid
 from cembench.report.render.terminal import status_style
 from cembench.results.records import Record
 from cembench.results.store import Store
@@ -197,7 +196,9 @@ class LiveProgress(PlainProgress):
 
     def _picture(self) -> RenderableType:
         lines = [self._lines[label] for label in self._recent]
-        table = grid([GridColumn(wraps=True)] * 3, lines, gap=2)
+        table = Table.grid(padding=(0, 2))
+        for line in lines:
+            table.add_row(*line)
         bar = Table.grid(padding=(0, 1))
         left = self.remaining.seconds
         bar.add_row(

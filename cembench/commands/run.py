@@ -167,7 +167,7 @@ def show(
 
 
 def _show_records(found: list[Record]) -> None:
-    from cembench.report.render.terminal import figures_table
+    from cembench.report.run_tables import figures_table
 
     for record in found:
         outcome = record.outcome
@@ -191,7 +191,7 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
     """
     from dataclasses import asdict
 
-    from cembench.report.render.terminal import changes_table
+    from cembench.report.run_tables import changes_table
     from cembench.results.machines import COMPARED, differences
     from cembench.results.many import corrected
     from cembench.results.runs_compared import compare_runs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -69,49 +69,15 @@ def theory(
 
 
 def _show(exhibit: Exhibit, run: Path) -> None:
-    from rich.text import Text
-
-    from cembench.report.render.grid import figures, grid, names, words
+    from cembench.report.content.exhibits import tables_shown
     from cembench.results.exhibits import place_of
-    from cembench.workflows.theory_facts import LOOKS
 
     facts = exhibit.facts
     vertices = f"{facts['vertices']:,} vertices, {facts['boundary_vertices']} on the boundary"
     out.print(f"{facts['mesh']}: {vertices}", style="bold", markup=False)
-    for part in ("premises", "statements"):
-        rows: list[list[str | Text]] = []
-        for check in facts[part]:
-            mark = Text("ok", style="green") if check["holds"] else Text("NO", style="bold red")
-            figure = check["figure"]
-            told = str(figure) if isinstance(figure, int) else f"{figure:.3g}"
-            rows.append([Text.assemble(check["name"], "  ", (check["source"], "dim")), mark, told])
-        out.print(grid([*words(part), names(""), *figures("figure")], rows, gap=2))
-    energies: list[list[str]] = []
-    for row in facts["energies"]:
-        cells = [row[f"after_{k}"] for k in LOOKS] + [row["last"]]
-        energies.append([row["name"], *("-" if c is None else f"{c:.6f}" for c in cells)])
-    heads = figures(*(f"after {k}" for k in LOOKS), "last")
-    out.print(grid([*words("E_C"), *heads], energies, gap=2))
-    _show_certificate(facts["certificate"])
+    out.print(tables_shown(exhibit))
     out.print(exhibit.text, markup=False)
     out.print(f"picture  {place_of(run, exhibit.name, 'theory.png')}", soft_wrap=True, markup=False)
-
-
-def _show_certificate(found: dict[str, Any]) -> None:
-    from cembench.report.render.grid import figures, grid, words
-
-    if "missing" in found:
-        out.print(f"no modulus: {found['missing']}", markup=False)
-        return
-    rows = [
-        ["surface, at least", f"{found['lower']:.5f}", ""],
-        ["surface, at most", f"{found['upper']:.5f}", ""],
-        ["middle of both", f"{found['modulus']:.5f}", f"{found['reciprocal_error']:.1e}"],
-    ]
-    for name, off in found["off"].items():
-        image = "-" if off is None else f"{found['modulus'] * (1 + off):.5f}"
-        rows.append([name, image, "-" if off is None else f"{off:+.1e}"])
-    out.print(grid([*words("four boundary points"), *figures("modulus", "off by")], rows, gap=2))
 
 
 #: Each command with the examples in its help.

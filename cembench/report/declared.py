@@ -21,17 +21,28 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cembench.core.errors import ParameterError
 from cembench.core.names import slug
 from cembench.report.content.evidence import DISK, Evidence
-from cembench.report.document import Column, Item, Section, Table, Text, Value, words
+from cembench.report.document import (
+    Column,
+    Item,
+    Section,
+    Table,
+    Text,
+    Tone,
+    Value,
+    entry,
+    of_status,
+    words,
+)
 from cembench.results.columns import COLUMNS, FrameColumn, worded
 from cembench.results.comparison import UNSTABLE_WIDTH
 from cembench.results.external_words import mark_of, marks_explained, seconds_words
@@ -41,9 +52,15 @@ from cembench.results.records import Record
 if TYPE_CHECKING:
     import pandas as pd
 
+Rows: TypeAlias = "list[dict[str, Any]]"
+
 
 def _with_mark(name: str, record: Record) -> str:
     return f"{name} {mark_of(record)}".rstrip()
+
+
+def _star(record: Record) -> str:
+    return "" if record.target == DISK else " *"
 
 
 def _ending(record: Record) -> str:
@@ -53,19 +70,20 @@ def _ending(record: Record) -> str:
 
 #: Columns of a table of records that say which it is, and how it ended: the text of each, from its
 #: row of the frame and the record.
-_NAMES: Mapping[str, Callable[[Mapping[Any, Any], Record], str]] = {
+_NAMES: Mapping[str, Callable[[Mapping[str, Any], Record], str]] = {
     "surface": lambda row, _: row["surface"],
     "algorithm": lambda row, _: row["label"],
-    "starred": lambda row, record: row["label"] + ("" if record.target == DISK else " *"),
+    "starred": lambda row, record: row["label"] + _star(record),
     "marked": lambda row, record: _with_mark(row["label"], record),
     "called": lambda _, record: _with_mark(record.cell.algorithm, record),
+    "named": lambda _, record: _with_mark(record.cell.algorithm + _star(record), record),
     "target": lambda _, record: record.target,
     "solves": lambda _, record: record.cell.solves,
     "status": lambda _, record: record.outcome.status,
     "ending": lambda _, record: _ending(record),
     "cause": lambda _, record: record.outcome.cause or "",
 }
-_HEADINGS = dict.fromkeys(("starred", "marked", "called"), "algorithm") | {"ending": ""}
+_HEADINGS = dict.fromkeys(("starred", "marked", "called", "named"), "algorithm") | {"ending": ""}
 
 
 class DeclaredColumn(BaseModel):
@@ -81,7 +99,7 @@ class DeclaredColumn(BaseModel):
     form: str = "significant"
     #: Whether its entries are texts.
     words: bool = False
-    #: Left out where it is zero in every row.
+    #: Left out where it is zero or missing in every row.
     optional: bool = False
     #: An expression for the key of the record behind the entry.
     record: str = ""
@@ -207,29 +225,39 @@ def declared_table(
 
     """
     spec = declared or own_tables()[name]
-    frame = evidence.frame
     policy = evidence.policies[0]
-    if spec.policy == "first":
-        frame = frame[frame["solves"] == policy]
+    chosen = [row for row in evidence.frame_rows if spec.policy == "all" or row["solves"] == policy]
     if keys is not None:
-        frame = frame[frame["key"].isin(list(keys))]
-    if spec.where:
-        frame = frame[evaluate(spec.where, frame).astype(bool)]
-    if spec.sort:
-        frame = frame.sort_values(["place", *spec.sort], kind="stable", na_position="last")
-    if frame.empty:
+        wanted = set(keys)
+        chosen = [row for row in chosen if row["key"] in wanted]
+    if chosen and (spec.where or spec.sort):
+        chosen = _selected(evidence, spec, chosen)
+    if not chosen:
         return None
-    make = _of_records if spec.rows == "record" else _of_algorithms
-    columns, rows = make(evidence, spec, frame)
-    told = {"policy": policy, "n": str(len(frame)), **texts}
+    columns, entries = zip(*_columns(evidence, spec, chosen), strict=True)
+    told = {"policy": policy, "n": str(len(chosen)), **texts}
     return Table(
         called or name,
         spec.title.format_map(told),
         columns,
-        rows,
+        tuple(zip(*entries, strict=True)),
         spec.caption.format_map(told),
-        tuple(dict.fromkeys(_notes(evidence, spec, frame))),
+        tuple(dict.fromkeys(_notes(evidence, spec, chosen))),
     )
+
+
+def _frame_of(evidence: Evidence, rows: Rows) -> pd.DataFrame:
+    return evidence.frame[evidence.frame["key"].isin([row["key"] for row in rows])]
+
+
+def _selected(evidence: Evidence, spec: DeclaredTable, rows: Rows) -> Rows:
+    frame = _frame_of(evidence, rows)
+    if spec.where:
+        frame = frame[evaluate(spec.where, frame).astype(bool)]
+    if spec.sort:
+        frame = frame.sort_values(["place", *spec.sort], kind="stable", na_position="last")
+    by_key = {row["key"]: row for row in rows}
+    return [by_key[key] for key in frame["key"]]
 
 
 def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
@@ -252,21 +280,30 @@ def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
     return sections
 
 
-def _of_records(
-    evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame
-) -> tuple[tuple[Column, ...], tuple[tuple[Value, ...], ...]]:
-    columns = tuple(one.heading for one in spec.columns)
-    rows = tuple(
-        tuple(_entry(evidence, row, one) for one in spec.columns)
-        for row in frame.to_dict("records")
-    )
-    return columns, rows
+def _columns(
+    evidence: Evidence, spec: DeclaredTable, chosen: Rows
+) -> list[tuple[Column, list[Value]]]:
+    """Return the columns with their entries, those that are optional only if they hold some."""
+    first: list[tuple[Column, list[Value]]] = []
+    if spec.rows == "record":
+        made = [[_entry(evidence, row, one) for row in chosen] for one in spec.columns]
+    else:
+        frame = _frame_of(evidence, chosen).sort_values("series", kind="stable")
+        groups = list(frame.groupby("label", sort=False))
+        first = [(Column("algorithm", numeric=False), [words(str(label)) for label, _ in groups])]
+        made = [[_aggregate(one, group) for _, group in groups] for one in spec.columns]
+    return first + [
+        (one.heading, values)
+        for one, values in zip(spec.columns, made, strict=True)
+        if not one.optional or any(value.number for value in values)
+    ]
 
 
-def _entry(evidence: Evidence, row: Mapping[Any, Any], one: DeclaredColumn) -> Value:
+def _entry(evidence: Evidence, row: Mapping[str, Any], one: DeclaredColumn) -> Value:
     record, name = evidence.by_key[row["key"]], one.column
-    if name == "status":
-        return Value(record.outcome.status, None, "", row["key"], record.outcome.cause or "")
+    if name in ("status", "ending"):
+        cause = record.outcome.cause or ""
+        return of_status(_NAMES[name](row, record), record=row["key"], why=cause)
     if name in _NAMES:
         return words(_NAMES[name](row, record))
     if one.words:
@@ -285,7 +322,8 @@ def figure_entry(evidence: Evidence, record: Record, column: FrameColumn) -> Val
     text, why = column.text(number), ""
     if column.timed:
         text, why = timed(evidence, record, text)
-    return Value(text, float(number), evidence.origin_of(record), key, why)
+    tone: Tone = "doubtful" if why else ""
+    return Value(text, float(number), evidence.origin_of(record), key, why, tone)
 
 
 def timed(evidence: Evidence, record: Record, text: str) -> tuple[str, str]:
@@ -296,24 +334,6 @@ def timed(evidence: Evidence, record: Record, text: str) -> tuple[str, str]:
     return f"{text}{'!' if why else ''} {evidence.machines.of(record)}".rstrip(), why
 
 
-def _of_algorithms(
-    evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame
-) -> tuple[tuple[Column, ...], tuple[tuple[Value, ...], ...]]:
-    groups = list(frame.sort_values("series", kind="stable").groupby("label", sort=False))
-    made = [(one.heading, [_aggregate(one, group) for _, group in groups]) for one in spec.columns]
-    kept = [
-        (heading, values)
-        for one, (heading, values) in zip(spec.columns, made, strict=True)
-        if not one.optional or any(value.number for value in values)
-    ]
-    columns = (Column("algorithm", numeric=False), *(heading for heading, _ in kept))
-    rows = [
-        (words(str(label)), *(values[k] for _, values in kept))
-        for k, (label, _) in enumerate(groups)
-    ]
-    return columns, tuple(rows)
-
-
 def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     found = evaluate(one.value, group)
     if one.words:
@@ -321,25 +341,24 @@ def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     key = str(evaluate(one.record, group) or "") if one.record else ""
     if isinstance(found, str):
         return Value(found, None, "derived")
-    if found is None:
-        return Value("-", None, "", key, "no figure")
-    return Value(worded(found, one.form), found, "derived", key)
+    return entry(found, partial(worded, form=one.form), "no figure", record=key)
 
 
-def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iterable[str]:
-    records = [evidence.by_key[key] for key in frame["key"]]
+def _notes(evidence: Evidence, spec: DeclaredTable, chosen: Rows) -> Iterable[str]:
+    records = [evidence.by_key[row["key"]] for row in chosen]
     if "marks" in spec.notes:
         yield from marks_explained(records)
-    several = frame["place"].nunique() > 1
-    for label, surface, record in zip(frame["label"], frame["surface"], records, strict=True):
-        where = f"{f'{surface}, ' if several else ''}{label} ({record.cell.solves})"
+    several = len({row["place"] for row in chosen}) > 1
+    for row, record in zip(chosen, records, strict=True):
+        surface = f"{row['surface']}, " if several else ""
+        where = f"{surface}{row['label']} ({record.cell.solves})"
         if "causes" in spec.notes and record.outcome.status != "ok":
             yield f"{where}: {evidence.missing_reason(record)}"
         if "notices" in spec.notes:
             if told := seconds_words(record):
                 yield f"{where}: {told}"
             yield from (f"{where}: {note}" for note in record.outcome.notes)
-    others = sorted(set(frame["target"]) - {DISK})
+    others = sorted({record.target for record in records} - {DISK})
     if "targets" in spec.notes and others:
         yield (
             f"* not a map to the disk ({', '.join(others)}): its E_C is not comparable with those "

@@ -9,12 +9,15 @@ holds its own paths, and ``records.csv`` has every record as a row.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from cembench.results.papers import Paper
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from cembench.results.papers import Paper
 
 #: Origin of a number; a table never mixes two origins in a column without a mark.
 Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
@@ -27,6 +30,9 @@ ORIGINS: Mapping[Origin, tuple[str, str]] = {
     "surface": ("measured here on a surface that is not in the paper", ""),
     "derived": ("computed from other figures of this report", ""),
 }
+
+#: How a terminal shows an entry.
+Tone = Literal["", "good", "doubtful", "bad", "faint"]
 
 #: Verdict on a claim of the paper.
 Verdict = Literal[
@@ -41,6 +47,8 @@ VERDICTS: Mapping[Verdict, tuple[str, str]] = {
     "not tested here": ("is not tested here", "are not tested here"),
 }
 
+#: Texts of a column longer than this many characters are broken into lines.
+LONG = 36
 #: Heading of the suspect maps at the head of a report.
 SUSPECTS = "Mean angle errors over three times those of the other algorithms"
 
@@ -61,6 +69,8 @@ class Value:
         Key of its record; empty for printed and derived numbers.
     why : str
         Why there is no number, or a remark on it (a misprint, an unstable time).
+    tone : Tone
+        How a terminal shows it.
 
     """
 
@@ -69,6 +79,11 @@ class Value:
     origin: Origin = ""
     record: str = ""
     why: str = ""
+    tone: Tone = ""
+
+
+#: An entry of a table as :meth:`Table.of` takes it.
+Plain: TypeAlias = "Value | str | float | None"
 
 
 @dataclass(frozen=True)
@@ -82,10 +97,25 @@ class Column:
     group: str = ""
     unit: str = ""
     numeric: bool = True
+    #: Format of the numbers that :meth:`Table.of` is given, and why one may be missing.
+    form: str = ""
+    lacking: str = "no figure"
+    #: Whether a terminal that is too narrow leaves it out.
+    detail: bool = False
+
+
+class OnTerminal:
+    """What a console of rich prints as :mod:`cembench.report.render.terminal` lays it out."""
+
+    def __rich__(self) -> RenderableType:
+        """Return it for a terminal."""
+        from cembench.report.render.terminal import on_terminal
+
+        return on_terminal(self)
 
 
 @dataclass(frozen=True)
-class Table:
+class Table(OnTerminal):
     """A table; `name` is its file name and anchor, and each row has an entry per column."""
 
     name: str
@@ -101,6 +131,30 @@ class Table:
     places: Mapping[str, str] = field(default_factory=dict)
     #: Number of aggregate rows at the end, which are not sorted.
     footer_rows: int = 0
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        title: str,
+        columns: Sequence[Column],
+        rows: Iterable[Sequence[Plain]],
+        *,
+        origin: Origin = "derived",
+        **more: Any,
+    ) -> Table:
+        """Return a table of plain entries: texts, numbers, and None for a gap."""
+        made = tuple(
+            tuple(_of_column(one, column, origin) for one, column in zip(row, columns, strict=True))
+            for row in rows
+        )
+        return cls(name, title, tuple(columns), made, **more)
+
+    def only(self, places: Sequence[int]) -> Table:
+        """Return the table with these columns alone."""
+        columns = tuple(self.columns[k] for k in places)
+        rows = tuple(tuple(row[k] for k in places) for row in self.rows)
+        return replace(self, columns=columns, rows=rows)
 
 
 @dataclass(frozen=True)
@@ -133,6 +187,11 @@ class Figure:
     alternative: str = ""
     paper: str = ""
     record: str = ""
+
+    @property
+    def full_title(self) -> str:
+        """The title, after the paper's figure that it reproduces."""
+        return f"{self.paper}: {self.title}" if self.paper else self.title
 
 
 @dataclass(frozen=True)
@@ -202,7 +261,7 @@ Item: TypeAlias = "Table | Figure | Gallery | Claim | Gap | Text"
 
 
 @dataclass(frozen=True)
-class Section:
+class Section(OnTerminal):
     """A part of the report; with `page`, it has its own page in forms with pages."""
 
     name: str
@@ -274,9 +333,52 @@ def missing(why: str, text: str = "-") -> Value:
     return Value(text, why=why)
 
 
-def words(text: str) -> Value:
+def words(text: str, tone: Tone = "") -> Value:
     """Return an entry that is not a number."""
-    return Value(text)
+    return Value(text, tone=tone)
+
+
+def entry(
+    number: float | None,
+    form: str | Callable[[float], str],
+    why: str,
+    *,
+    origin: Origin = "derived",
+    record: str = "",
+) -> Value:
+    """Return a number in a format, or a gap; `why` says why there is no number."""
+    if number is None:
+        return Value("-", record=record, why=why)
+    text = format(number, form) if isinstance(form, str) else form(number)
+    return Value(text, number, origin, record)
+
+
+def of_status(status: str, text: str = "", record: str = "", why: str = "") -> Value:
+    """Return how a cell ended as an entry; default text: the status."""
+    tones: Mapping[str, Tone] = {"ok": "good", "skipped": "doubtful"}
+    return Value(text or status, None, "", record, why, tones.get(status, "bad"))
+
+
+def _of_column(one: Plain, column: Column, origin: Origin) -> Value:
+    if isinstance(one, Value):
+        return one
+    if isinstance(one, str):
+        return words(one)
+    form = column.form or ("," if isinstance(one, int) else ".6g")
+    made = entry(one, form, column.lacking, origin=origin)
+    return made if one is None else replace(made, number=float(one))
+
+
+def heading(column: Column) -> str:
+    """Return group, title and unit as one heading."""
+    named = " ".join(part for part in (column.group, column.title) if part)
+    return f"{named} [{column.unit}]" if column.unit else named
+
+
+def is_prose(table: Table, place: int) -> bool:
+    """Whether a column holds texts that are too long for one line."""
+    longest = max((len(row[place].text) for row in table.rows), default=0)
+    return longest > LONG and not table.columns[place].numeric
 
 
 def plain(sentence: Sentence) -> str:

@@ -7,6 +7,7 @@ so that they are available at once the next time.
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ from cembench.core.notices import NoticeKind, of_kind
 from cembench.mesh.datasets import CACHE_VARIABLE
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
+from cembench.report.document import Column, Plain, Table, missing, words
 from cembench.results.papers import paper_of
 from cembench.results.records import MeshFacts
 from cembench.running.plan import mesh_facts, paper_roles
@@ -145,6 +147,30 @@ def row_check(mesh: MeshFacts) -> dict[str, Any] | None:
         and abs(boundary_off) <= BOUNDARY_OFF
         and not of_kind(NoticeKind.DEFINITION_1, mesh.notices),
     }
+
+
+def facts_table(known: Mapping[str, SurfaceFacts]) -> Table:
+    """Return counts of surfaces, whether these are the paper's, and conformal-factor spans."""
+    tones = {"ok": words("ok"), "off": words("off", "bad")}
+    rows: list[list[Plain]] = []
+    for name, facts in sorted(known.items(), key=lambda item: item[1].mesh.faces):
+        mesh, check = facts.mesh, row_check(facts.mesh)
+        verdict = missing("no row") if check is None else tones["ok" if check["ok"] else "off"]
+        counts = mesh.vertices, mesh.faces, mesh.boundary_vertices, mesh.non_delaunay_share
+        rows.append([name, *counts, facts.conformal_factor_span, verdict])
+    folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
+    columns = [Column(title) for title in ("vertices", "faces", "boundary")]
+    columns += [Column("not Delaunay", form=".1%"), Column("span", form=".2g")]
+    return Table.of(
+        "surface-facts",
+        "",
+        [Column("surface", numeric=False), *columns, Column("in print", numeric=False)],
+        rows,
+        notes=(
+            "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM",
+            f"thumbnails: {', '.join(folders)}",
+        ),
+    )
 
 
 def _place(surface: Surface) -> Path:

@@ -179,6 +179,7 @@ def _memory(record: Record) -> float | None:
 
 
 _SECONDS: Mapping[str, Any] = {"unit": "s", "form": "significant"}
+_PROGRAM = "only external programs have it, if they are measured"
 _C = FrameColumn
 
 #: What rows and exports have, in this order, the metrics among it.
@@ -211,12 +212,12 @@ EXPORTED = (
     _C("ended", _at("outcome.ended")),
     _C("cpu_seconds", _at("outcome.cpu_seconds"), "CPU", **_SECONDS),
     _C("busy_rounds", lambda r: _busy(r.outcome)),
-    _C("start_seconds", _at("outcome.start_seconds"), "start", lacking="none", **_SECONDS),
+    _C("start_seconds", _at("outcome.start_seconds"), "start", lacking=_PROGRAM, **_SECONDS),
     _C("own_seconds", _at("outcome.own_seconds")),
     _C(
         "solve_seconds",
         lambda r: r.outcome.solve_seconds if r.is_program else None,
-        "solve", lacking="none", **_SECONDS,
+        "solve", lacking=_PROGRAM, **_SECONDS,
     ),
     _C("input_bytes", _at("outcome.program.input_bytes")),
     _C("output_bytes", _at("outcome.program.output_bytes")),
@@ -254,8 +255,11 @@ DERIVED = (
     _C("relative_energy", _at("outcome.relative_energy"), "E_C / A", form=".4f"),
     _C("half_width", half_width, "±%", form=".0f", lacking="fewer than six rounds"),
     _C("memory_mib", _memory, "memory", "MiB", ",.0f"),
-    _C("call_seconds", _call, "call", lacking="none", **_SECONDS),
-    _C("wall_seconds", _wall, "wall", lacking="none", **_SECONDS),
+    _C(
+        "call_seconds", _call, "call",
+        lacking="an external program is a process, not a call", **_SECONDS,
+    ),
+    _C("wall_seconds", _wall, "wall", lacking=_PROGRAM, **_SECONDS),
     _C(
         "counted_factorisations", _in(1, "numeric"), "factored",
         form=".0f", lacking="not counted",

@@ -6,6 +6,7 @@ Examples are the steps of Koebe's method, a morph, or a test of the theory. A co
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Self
 
@@ -42,6 +43,27 @@ class ExhibitTable(BaseModel):
     columns: tuple[str, ...]
     rows: tuple[tuple[str | float | int | None, ...], ...]
     notes: tuple[str, ...] = ()
+    #: Formats of the columns' numbers, by title; default: six digits that count.
+    forms: dict[str, str] = {}
+    #: Columns that a terminal leaves out where it is too narrow.
+    details: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        title: str,
+        columns: Mapping[str, tuple[str, str]],
+        rows: Iterable[Mapping[str, Any]],
+        **more: Any,
+    ) -> Self:
+        """Return a table of rows by key; `columns` are the heading and format of each key."""
+        return cls(
+            title=title,
+            columns=tuple(heading for heading, _ in columns.values()),
+            rows=tuple(tuple(row.get(key) for key in columns) for row in rows),
+            forms={heading: form for heading, form in columns.values() if form},
+            **more,
+        )
 
     @model_validator(mode="after")
     def _rows_fit(self) -> Self:

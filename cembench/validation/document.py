@@ -1,8 +1,9 @@
-"""A validation as a report document: the verdict, the findings and their figures."""
+"""A validation as a report: the verdict, the findings and their figures, for a page or terminal."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cembench.report.document import (
@@ -10,12 +11,13 @@ from cembench.report.document import (
     Gap,
     Item,
     Origin,
+    Plain,
     Report,
     Section,
     Table,
     Text,
     Value,
-    missing,
+    entry,
     words,
 )
 from cembench.report.palette import series_styles
@@ -25,7 +27,7 @@ from cembench.results.record_rows import row
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison
+from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed
 from cembench.validation.scaling import Growth, GrowthComparison
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -39,20 +41,22 @@ _TITLES = {
     "quality": "Is it better, is it faster?",
     "scaling": "How do its seconds grow?",
 }
+#: The ends of an interval, and why it may have none.
+_TOO_FEW = "too few surfaces or rounds"
+_ENDS = tuple(Column(end, "95 % interval", form=".3f", lacking=_TOO_FEW) for end in ("low", "high"))
 
 
 def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
     """Return the report; records are read from `runs`, and plots are written to `folder`."""
-    sections = [
-        Section("verdict", "Verdict", (Text(f"{validation.title}: {sentence(validation)}."),))
-    ]
     records: dict[str, Record] = {}
     for stage in STAGES:
         if stage not in validation.skipped and (runs / stage / "records").is_dir():
             records |= {record.cell.key: record for record in Store(runs / stage).records()}
-    for stage in STAGES:
-        items = list(_items(validation, stage, folder, records))
-        sections.append(Section(stage, _TITLES[stage], tuple(items)))
+    verdict = Text(f"{validation.title}: {sentence(validation)}.")
+    sections = [Section("verdict", "Verdict", (verdict,)), *stage_sections(validation, records)]
+    if validation.growth:
+        plot = write_plot(_growth_plot(validation.growth), folder)
+        sections[-1] = replace(sections[-1], items=(*sections[-1].items, plot))
     asked = ", ".join(f"{name}={value}" for name, value in validation.parameters.items())
     facts = (
         ("algorithm", f"{validation.title} ({validation.algorithm})"),
@@ -72,9 +76,15 @@ def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
     )
 
 
-def _items(
-    validation: Validation, stage: str, folder: Path, records: dict[str, Record]
-) -> Iterator[Item]:
+def stage_sections(validation: Validation, records: Mapping[str, Record]) -> list[Section]:
+    """Return a section for each stage; the origins of figures are those of the records."""
+    return [
+        Section(stage, _TITLES[stage], tuple(_items(validation, stage, records)))
+        for stage in STAGES
+    ]
+
+
+def _items(validation: Validation, stage: str, records: Mapping[str, Record]) -> Iterator[Item]:
     for skipped, why in validation.skipped.items():
         if skipped == stage:
             command = "cembench validate PLUGIN.py" if stage in validation.not_asked_for else ""
@@ -88,144 +98,112 @@ def _items(
             yield _pairs_table(against, validation.title, records)
     if stage == "scaling" and validation.growth:
         yield _growth_table(validation.growth)
-        yield write_plot(_growth_plot(validation.growth), folder)
 
 
 def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
-    columns = ("check", "found", "measured", "allowed")
-    return Table(
-        name=f"{stage}-findings",
-        title="Checks",
-        columns=tuple(Column(title, numeric=False) for title in columns),
-        rows=tuple(
-            (
-                words(finding.name),
-                words(_found(finding)),
-                words(finding.measured),
-                words(finding.allowed),
-            )
+    titles = ("check", "found", "measured", "allowed")
+    return Table.of(
+        f"{stage}-findings",
+        "Checks",
+        [Column(title, numeric=False, detail=title == "allowed") for title in titles],
+        [
+            [finding.name, _found(finding), finding.measured, finding.allowed]
             for finding in findings
+        ],
+        notes=tuple(
+            f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in findings if not f.ok
         ),
-        notes=tuple(f"{f.name}: {f.remedy}" for f in findings if not f.ok),
     )
 
 
-def _found(finding: ValidationFinding) -> str:
+def _found(finding: ValidationFinding) -> Value:
     if finding.undecided:
-        return "cannot be told"
-    return "ok" if finding.ok else "fault"
+        return words("cannot be told", "doubtful")
+    return words("ok", "good") if finding.ok else words("fault", "bad")
 
 
 def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
-    rows = []
+    rows: list[list[Plain]] = []
     for against in compared:
-        for what, found in (
+        for name, found in (
             (against.energy_name, against.energy),
             ("mean angle error", against.angle),
+            ("seconds", against.speed),
         ):
-            rows.append(_sides_row(f"{what} / {against.title}", found))
-        speed = against.speed
-        if speed is not None:
-            rows.append(
-                (
-                    words(f"seconds / {against.title}"),
-                    *(missing("of the rounds, not of the surfaces") for _ in range(3)),
-                    _ratio(speed.ratio),
-                    _ratio(speed.low),
-                    _ratio(speed.high),
-                )
-            )
-    return Table(
-        name="summary",
-        title="Beside the baselines",
-        columns=(
+            if found is not None:
+                ends = (found.ratio, found.low, found.high)
+                rows.append([f"{name} / {against.title}", *_counts(found), *ends])
+    whole = "of the rounds, not of the surfaces"
+    timed = any(against.speed is not None for against in compared)
+    return Table.of(
+        "summary",
+        "Beside the baselines",
+        [
             Column("figure", numeric=False),
-            Column("lower", "surfaces"),
-            Column("equal", "surfaces"),
-            Column("higher", "surfaces"),
-            Column("median ratio"),
-            Column("low", "95 % interval"),
-            Column("high", "95 % interval"),
-        ),
-        rows=tuple(rows),
+            *(Column(t, "surfaces", lacking=whole) for t in ("lower", "equal", "higher")),
+            Column("median ratio", form=".3f", lacking=_TOO_FEW),
+            *_ENDS,
+        ],
+        rows,
         caption="Ratios of this algorithm's figure to the baseline's: below 1 is better. Equal "
         "means within 1 %. The interval of E_C and angles is over the surfaces, that of the "
-        f"seconds over the rounds. {NOT_DETECTED}",
+        f"seconds over the rounds. {NOT_DETECTED if timed else ''}".rstrip(),
     )
 
 
-def _sides_row(what: str, found: PairedComparison) -> tuple[Value, ...]:
-    counts = (found.lower, found.equal, found.higher)
-    return (
-        words(what),
-        *(Value(str(count), count, "derived") for count in counts),
-        _ratio(found.ratio),
-        _ratio(found.low),
-        _ratio(found.high),
-    )
+def _counts(found: PairedComparison | Speed) -> tuple[int | None, ...]:
+    if isinstance(found, Speed):
+        return (None, None, None)
+    return (found.lower, found.equal, found.higher)
 
 
-def _ratio(value: float | None) -> Value:
-    if value is None:
-        return missing("too few surfaces or rounds")
-    return Value(f"{value:.3f}", value, "derived")
-
-
-def _pairs_table(against: BaselineComparison, title: str, records: dict[str, Record]) -> Table:
-    groups = (against.energy_name, "mean angle error, °", "seconds")
+def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, Record]) -> Table:
+    program = ("start", "solve") if against.solve_time else ()
     columns = [Column("surface", numeric=False), Column("faces")]
-    for group in groups:
-        columns += [Column(title, group), Column(against.title, group), Column("ratio", group)]
-    return Table(
-        name=f"against-{against.baseline}",
-        title=f"{title} and {against.title}, surface by surface",
-        columns=tuple(columns),
-        rows=tuple(_pair_row(pair, records) for pair in against.pairs),
-        notes=(
-            "a dash: no valid map, or no positive figure to divide by",
-            *_about_solve_time(against),
-        ),
+    for group in (against.energy_name, "mean angle error, °", "seconds"):
+        columns += [Column(title, group), Column(against.title, group, detail=True)]
+        columns += [
+            Column(name, group) for name in (*(program if group == "seconds" else ()), "ratio")
+        ]
+    notes = ["a dash: no valid map, or no positive figure to divide by"]
+    if program:
+        notes.append(
+            "an external program: its seconds are the wall clock of a process, with its start and "
+            "its files; start is the same on a small mesh, and the ratio is of its solve time "
+            f"({against.solve_time})"
+        )
+    return Table.of(
+        f"against-{against.baseline}",
+        f"{title} and {against.title}, surface by surface",
+        columns,
+        [list(_pair_row(pair, records, program=bool(program))) for pair in against.pairs],
+        notes=tuple(notes),
     )
 
 
-def _about_solve_time(against: BaselineComparison) -> tuple[str, ...]:
-    if not against.solve_time:
-        return ()
-    of = (
-        f"{p.surface} {p.solve_seconds:.4f} of {p.seconds:.4f}"
-        for p in against.pairs
-        if p.solve_seconds is not None and p.seconds is not None
-    )
-    return (
-        "an external program: its seconds are the wall clock of a process, with its start and its "
-        f"files; the ratio is of its solve time ({against.solve_time}): {', '.join(of)}",
-    )
-
-
-def _pair_row(pair: Pair, records: dict[str, Record]) -> tuple[Value, ...]:
+def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> Iterator[Plain]:
     ours, theirs = pair.records
     known = records.get(ours)
     origin: Origin = known.mesh.origin if known else "surface"
 
-    def both(mine: float | None, other: float | None, form: str) -> tuple[Value, ...]:
-        return (_measured(mine, form, origin, ours), _measured(other, form, origin, theirs))
+    def measured(value: float | None, form: str, record: str = ours) -> Value:
+        return entry(value, form, "no valid map", origin=origin, record=record)
 
-    return (
-        words(pair.surface),
-        Value(f"{pair.faces:,}", pair.faces),
-        *both(pair.energy, pair.baseline_energy, ".6f"),
-        _ratio(quotient(pair.energy, pair.baseline_energy)),
-        *both(pair.angle, pair.baseline_angle, ".3f"),
-        _ratio(quotient(pair.angle, pair.baseline_angle)),
-        *both(pair.seconds, pair.baseline_seconds, ".4f"),
-        _ratio(pair.seconds_ratio),
-    )
+    def ratio(value: float | None) -> Value:
+        return entry(value, ".3f", _TOO_FEW)
 
-
-def _measured(value: float | None, form: str, origin: Origin, record: str) -> Value:
-    if value is None:
-        return missing("no valid map")
-    return Value(format(value, form), value, origin, record)
+    yield from (pair.surface, words(f"{pair.faces:,}"))
+    yield measured(pair.energy, ".6f")
+    yield measured(pair.baseline_energy, ".6f", theirs)
+    yield ratio(quotient(pair.energy, pair.baseline_energy))
+    yield measured(pair.angle, ".3f")
+    yield measured(pair.baseline_angle, ".3f", theirs)
+    yield ratio(quotient(pair.angle, pair.baseline_angle))
+    yield measured(pair.seconds, ".4f")
+    yield measured(pair.baseline_seconds, ".4f", theirs)
+    if program:
+        yield from (measured(s, ".4f") for s in (pair.start_seconds, pair.solve_seconds))
+    yield ratio(pair.seconds_ratio)
 
 
 def quotient(ours: float | None, theirs: float | None) -> float | None:
@@ -236,38 +214,23 @@ def quotient(ours: float | None, theirs: float | None) -> float | None:
 def _growth_table(found: GrowthComparison) -> Table:
     growths = (found.ours, *found.others)
     sizes = dict.fromkeys(faces for growth in growths for faces in growth.faces)
-    rows = []
+    rows: list[list[Plain]] = []
     for growth in growths:
         at = dict(zip(growth.faces, growth.seconds, strict=True))
-        cells = [
-            Value(f"{at[f]:.4f}", at[f], "surface") if f in at else missing("not timed")
-            for f in sizes
-        ]
-        rows.append(
-            (
-                words(growth.what),
-                *cells,
-                *(_exponent(value) for value in (growth.exponent, growth.low, growth.high)),
-            )
-        )
-    return Table(
-        name="growth",
-        title="Seconds by number of triangles",
-        columns=(
+        cells = [entry(at.get(f), ".4f", "not timed", origin="surface") for f in sizes]
+        rows.append([growth.what, *cells, growth.exponent, growth.low, growth.high])
+    return Table.of(
+        "growth",
+        "Seconds by number of triangles",
+        [
             Column("what", numeric=False),
             *(Column(f"{faces:,}", "faces") for faces in sizes),
-            Column("exponent"),
-            Column("low", "95 % interval"),
-            Column("high", "95 % interval"),
-        ),
-        rows=tuple(rows),
+            *(replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)),
+        ],
+        rows,
         caption="Exponent: of the seconds between the two largest sizes, the median over the "
         f"rounds. {_CLOCKS[found.clock]}",
     )
-
-
-def _exponent(value: float | None) -> Value:
-    return missing("too few rounds") if value is None else Value(f"{value:.2f}", value, "derived")
 
 
 def _growth_plot(found: GrowthComparison) -> Plot:

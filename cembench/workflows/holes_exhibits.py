@@ -217,46 +217,47 @@ def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Ex
     )
 
 
-_TABLE = (
-    ("surface", "mesh"),
-    ("holes", "holes"),
-    ("algorithm", "algorithm"),
-    ("sweeps", "sweeps"),
-    ("E_C", "conformal_energy"),
-    ("angle°", "angle_error_mean_deg"),
-    ("SD°", "angle_error_sd_deg"),
-    ("circularity", "boundary_circularity"),
-    ("before rounding", "circularity_before_rounding"),
-    ("folds", "flipped_triangles"),
-    ("iterations", "iterations"),
-    ("seconds", "seconds"),
-    ("status", "status"),
-)
+#: The columns of the table: the heading of each key in the rows, and the format of its numbers.
+_TABLE = {
+    "mesh": ("surface", ""),
+    "holes": ("holes", "d"),
+    "algorithm": ("algorithm", ""),
+    "sweeps": ("sweeps", "d"),
+    "conformal_energy": ("E_C", ".4f"),
+    "angle_error_mean_deg": ("angle°", ".2f"),
+    "angle_error_sd_deg": ("SD°", ".2f"),
+    "boundary_circularity": ("circ.", ".0e"),
+    "circularity_before_rounding": ("before rounding", ".0e"),
+    "flipped_triangles": ("folds", "d"),
+    "iterations": ("iterations", "d"),
+    "seconds": ("seconds", ".2f"),
+    "status": ("status", ""),
+}
 
 
-def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -> None:
-    """Add a table of the figures of all surfaces to a run."""
-    table = ExhibitTable(
-        title="Surfaces with holes",
-        columns=tuple(title for title, _ in _TABLE),
-        rows=tuple(tuple(row.get(key) for _, key in _TABLE) for row in rows),
+def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -> Exhibit:
+    """Add a table of the figures of all surfaces to a run; return its exhibit."""
+    table = ExhibitTable.of(
+        "Surfaces with holes",
+        _TABLE,
+        rows,
+        details=("holes", "before rounding", "iterations"),
         notes=(
             "angle° and SD° are the mean and the standard deviation of the angle errors in "
-            "degrees; circularity is the largest distance of a boundary's image from its fitted "
-            "circle, relative to the radius; seconds are those of one call.",
+            "degrees; circ. (circularity) is the largest distance of a boundary's image from its "
+            "fitted circle, relative to the radius; seconds are those of one call.",
         ),
     )
     standing = {row["mesh"] for row in rows} <= {STAND_IN}
-    write_exhibit(
-        run,
-        Exhibit(
-            name="holes",
-            title="Surfaces with holes",
-            text="Koebe's method after one sweep and after the best number of sweeps, and the "
-            "other maps to a disk with holes.",
-            command=command,
-            origin="stand-in" if standing else "surface",
-            tables=(table,),
-            facts={"rows": rows},
-        ),
+    exhibit = Exhibit(
+        name="holes",
+        title="Surfaces with holes",
+        text="Koebe's method after one sweep and after the best number of sweeps, and the "
+        "other maps to a disk with holes.",
+        command=command,
+        origin="stand-in" if standing else "surface",
+        tables=(table,),
+        facts={"rows": rows},
     )
+    write_exhibit(run, exhibit)
+    return exhibit

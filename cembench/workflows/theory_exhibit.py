@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -87,25 +87,42 @@ def _tables(
             (c.name, c.source, "yes" if c.holds else "NO", c.figure, c.meaning) for c in checks
         )
         return ExhibitTable(
-            title=title, columns=("what", "where", "holds", "figure", "meaning"), rows=rows
+            title=title,
+            columns=("what", "where", "holds", "figure", "meaning"),
+            rows=rows,
+            forms={"figure": ".3g"},
+            details=("meaning",),
         )
 
-    columns = ("iteration", *(f"after {k}" for k in LOOKS), "last", "iterations")
-    keys = ("name", *(f"after_{k}" for k in LOOKS), "last", "iterations")
-    rows = tuple(tuple(row[key] for key in keys) for row in facts["energies"])
+    looks = {f"after_{k}": (f"after {k}", ".6f") for k in LOOKS} | {"last": ("last", ".6f")}
+    energies = {"name": ("iteration", ""), **looks, "iterations": ("iterations", "d")}
     return (
         of("Premises", given),
         of("Statements", said),
-        ExhibitTable(title="Conformal energy E_C", columns=columns, rows=rows),
-        *_certificate_table(facts["certificate"]),
+        ExhibitTable.of(
+            "Conformal energy E_C", energies, facts["energies"], details=("iterations",)
+        ),
+        _certificate_table(facts["certificate"]),
     )
 
 
-def _certificate_table(found: dict[str, Any]) -> Iterator[ExhibitTable]:
-    if "missing" in found:
-        return
-    keys = ("lower", "upper", "modulus", "reciprocal_error")
-    rows = [(key.replace("_", " "), found[key]) for key in keys]
-    rows += [(f"{name}: off by", value) for name, value in found["off"].items()]
+def _certificate_table(found: dict[str, Any]) -> ExhibitTable:
     title = "Modulus of the surface with four boundary points"
-    yield ExhibitTable(title=title, columns=("what", "figure"), rows=tuple(rows))
+    columns = ("four boundary points", "modulus", "off by")
+    if "missing" in found:
+        return ExhibitTable(title=title, columns=columns, rows=(), notes=(found["missing"],))
+    modulus = found["modulus"]
+    return ExhibitTable(
+        title=title,
+        columns=columns,
+        rows=(
+            ("surface, at least", found["lower"], None),
+            ("surface, at most", found["upper"], None),
+            ("middle of both", modulus, found["reciprocal_error"]),
+            *(
+                (name, None if off is None else modulus * (1 + off), off)
+                for name, off in found["off"].items()
+            ),
+        ),
+        forms={"modulus": ".5f", "off by": "+.1e"},
+    )

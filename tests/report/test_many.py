@@ -15,7 +15,7 @@ from cembench.report.content.many.pairwise_wins import _wins, pairwise_wins
 from cembench.report.content.many.worst import HARDEST, hardest
 from cembench.report.declared import declared_table
 from cembench.report.document import plain
-from cembench.report.render.terminal_many import many_table
+from cembench.report.run_tables import many_table
 from cembench.report.write_report import write_report
 from cembench.results.exhibits import Exhibit, write_exhibit
 from cembench.results.frame import share_interval

@@ -2,8 +2,10 @@ from io import StringIO
 
 from rich.console import Console
 
-from cembench.report.render.terminal import results_table, speedups_table
+from cembench.report.content.evidence import Evidence
+from cembench.report.run_tables import results_table, speedups_table
 from cembench.results.records import Neighbours
+from cembench.results.store import Store
 from tests.results.test_comparison import record_of
 
 
@@ -62,7 +64,10 @@ def test_verdicts_of_a_table_hold_together_and_what_that_costs_is_said():
     assert "Holm" not in printed(cells[:2])
 
 
-def test_a_busy_machine_is_told_once():
+def test_a_busy_machine_is_told_once(tmp_path):
+    def results_of(record):
+        return shown(results_table(Evidence(Store(tmp_path), (record,), ())))
+
     record = record_of([1.0] * 6)
     quiet, busy = Neighbours(other_cores=0.0), Neighbours(other_cores=1.0)
     rounds = [
@@ -70,6 +75,6 @@ def test_a_busy_machine_is_told_once():
         for k, one in enumerate(record.outcome.rounds)
     ]
     outcome = record.outcome.model_copy(update={"rounds": tuple(rounds)})
-    text = shown(results_table([record.model_copy(update={"outcome": outcome})]))
+    text = results_of(record.model_copy(update={"outcome": outcome}))
     assert "busy during 2 of 6 processes" in text
-    assert "busy" not in shown(results_table([record]))
+    assert "busy" not in results_of(record)

@@ -11,8 +11,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.machines import machines_section
 from cembench.report.content.surface_page import figures_table
 from cembench.report.document import Table
-from cembench.report.render.terminal import results_table
-from cembench.report.render.terminal_many import machine_lines
+from cembench.report.run_tables import machine_lines, results_table
 from cembench.results.machines import machine_of, marks, software_differences
 from cembench.results.merging import merge, others_of
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
@@ -104,16 +103,17 @@ def test_tables_of_several_machines_mark_seconds_and_say_so(two_machines, tmp_pa
     into = Store(tmp_path / "all")
     merge(two_machines, into)
     records, environments = into.records(), into.environments()
-    shown = printed(results_table(records, environments))
-    assert "1.000 A" in shown
-    assert "4.000 A" in shown
+    evidence = Evidence.of(into.folder)
+    shown = printed(results_table(evidence))
+    assert "1.00 A" in shown
+    assert "4.00 A" in shown
     assert "0.500 B" in shown
     assert "Seconds of 2 machines (A: node-1, 2 cells; B: node-2, 1 cell)" in shown
     assert max(map(len, shown.splitlines())) <= 80
     alone = [r for r in records if r.environment == "e1"]
-    assert "1.000 A" not in printed(results_table(alone, environments))
-    assert machine_lines(alone, environments) == []
-    assert "which mixes them" in str(machine_lines(records, environments)[0])
+    assert "1.00 A" not in printed(results_table(Evidence(into, tuple(alone), ())))
+    assert machine_lines(marks(alone, environments)) == []
+    assert "which mixes them" in machine_lines(evidence.machines)[0]
     assert marks(alone, environments).explained() == []
     assert software_differences(records, environments) == ["node-2: python: None / 3.13"]
 

@@ -146,14 +146,19 @@ class Evidence:
 
     @cached_property
     def frame(self) -> pd.DataFrame:
-        """The records as a frame, a row each, by surface, series and policy.
+        """The records as a frame, a row each, by surface, series and policy."""
+        import pandas as pd
+
+        return pd.DataFrame(self.frame_rows)
+
+    @cached_property
+    def frame_rows(self) -> list[dict[str, Any]]:
+        """The rows of :attr:`frame`, for what needs no pandas.
 
         Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
         number), `main`, and `ok`.
         """
-        import pandas as pd
-
         series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
         surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
         found = []
@@ -166,7 +171,7 @@ class Evidence:
             more = {"main": own.main, "ok": record.outcome.status == "ok"}
             order = (place, k, self.policies.index(record.cell.solves))
             found.append((order, figures | about | more))
-        return pd.DataFrame([row for _, row in sorted(found, key=lambda pair: pair[0])])
+        return [row for _, row in sorted(found, key=lambda pair: pair[0])]
 
     @cached_property
     def by_key(self) -> dict[str, Record]:

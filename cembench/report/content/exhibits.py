@@ -18,8 +18,6 @@ from cembench.report.document import (
     Section,
     Table,
     Text,
-    Value,
-    missing,
 )
 from cembench.report.pictures import pixel_suffix
 from cembench.results.exhibits import Exhibit, ExhibitTable, place_of
@@ -89,7 +87,7 @@ def _section(evidence: Evidence, exhibit: Exhibit, name: str, folder: Path) -> S
         items.append(Gallery(f"{name}-pictures", exhibit.title, tuple(figures)))
     items += lost
     items += [
-        _table(table, f"{name}-table-{k + 1}", exhibit.origin)
+        exhibit_table(table, f"{name}-table-{k + 1}", exhibit.origin)
         for k, table in enumerate(exhibit.tables)
     ]
     items.append(Text(f"Made by: {exhibit.command}"))
@@ -97,23 +95,22 @@ def _section(evidence: Evidence, exhibit: Exhibit, name: str, folder: Path) -> S
     return Section(name, title, tuple(items))
 
 
-def _table(table: ExhibitTable, name: str, origin: MeshOrigin) -> Table:
-    numeric = [
-        all(isinstance(row[k], int | float) or row[k] is None for row in table.rows)
-        for k in range(len(table.columns))
+def exhibit_table(table: ExhibitTable, name: str, origin: MeshOrigin) -> Table:
+    """Return a table of an exhibit as one of a report; a column is numeric if it has no text."""
+    columns = [
+        Column(
+            title,
+            numeric=not any(isinstance(row[k], str) for row in table.rows),
+            form=table.forms.get(title, ""),
+            lacking="not measured",
+            detail=title in table.details,
+        )
+        for k, title in enumerate(table.columns)
     ]
-    columns = tuple(
-        Column(title, numeric=is_number)
-        for title, is_number in zip(table.columns, numeric, strict=True)
-    )
-    rows = tuple(tuple(_value(entry, origin) for entry in row) for row in table.rows)
-    return Table(name, table.title, columns, rows, notes=table.notes)
+    return Table.of(name, table.title, columns, table.rows, origin=origin, notes=table.notes)
 
 
-def _value(entry: str | float | int | None, origin: MeshOrigin) -> Value:
-    if entry is None:
-        return missing("not measured")
-    if isinstance(entry, str):
-        return Value(entry)
-    text = f"{entry:,}" if isinstance(entry, int) else f"{entry:.6g}"
-    return Value(text, float(entry), origin)
+def tables_shown(exhibit: Exhibit) -> Section:
+    """Return the tables of an exhibit, as a command prints them."""
+    tables = (exhibit_table(table, "", exhibit.origin) for table in exhibit.tables)
+    return Section(exhibit.name, "", tuple(tables))

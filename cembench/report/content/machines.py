@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.document import Column, Item, Section, Table, Text, Value
+from cembench.report.document import Column, Item, Plain, Section, Table, Text
 from cembench.results.machines import machine_of, software_differences
 
 
@@ -31,27 +31,15 @@ def machines_section(evidence: Evidence) -> Section | None:
 
 def _table(evidence: Evidence) -> Table:
     environments = evidence.store.environments()
-    rows = []
+    rows: list[list[Plain]] = []
     for name, letter in evidence.machines.letters.items():
         own = [record for record in evidence.records if evidence.machines.of(record) == letter]
         about = next(
             (e for r in own if machine_of(e := environments.get(r.environment, {})) == name), {}
         )
         surfaces = len({record.cell.mesh_hash for record in own})
-        rows.append(
-            (
-                Value(letter),
-                Value(name or "not named"),
-                Value(str(about.get("cpu") or "-")),
-                Value(str(surfaces), float(surfaces)),
-                Value(str(len(own)), float(len(own))),
-            )
-        )
-    columns = (
-        Column("mark", numeric=False),
-        Column("machine", numeric=False),
-        Column("processor", numeric=False),
-        Column("surfaces"),
-        Column("cells"),
-    )
-    return Table("machines", "Machines of this run", columns, tuple(rows))
+        cpu = str(about.get("cpu") or "-")
+        rows.append([letter, name or "not named", cpu, surfaces, len(own)])
+    columns = [Column(title, numeric=False) for title in ("mark", "machine", "processor")]
+    columns += [Column("surfaces"), Column("cells")]
+    return Table.of("machines", "Machines of this run", columns, rows, origin="")

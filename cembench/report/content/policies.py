@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from cembench.report.content.averages import geometric_rate
+from cembench.report.content.averages import geometric_rate, mean_rate
 from cembench.report.content.both_policies import BOTH, seconds_under
 from cembench.report.content.evidence import (
     AlgorithmSeries,
@@ -18,7 +16,7 @@ from cembench.report.content.printed_beside_measured import (
     table_beside,
 )
 from cembench.report.content.rates import measured_rates
-from cembench.report.document import Column, Gap, Table, Value, count, missing, words
+from cembench.report.document import Column, Gap, Table, count, entry, words
 from cembench.report.plots import Axis, Plot, PlotPanel
 from cembench.report.plots import PlotSeries as Bars
 from cembench.results.columns import COLUMNS, FrameColumn
@@ -82,14 +80,8 @@ def speedups_table(evidence: Evidence) -> Table:
         cells = [words(s.label)]
         for policy in BOTH:
             rates = list(measured_rates(evidence, s.algorithm, policy).values())
-            if not rates:
-                cells += [missing("no rate"), missing("no rate")]
-            else:
-                mean, geometric = float(np.mean(rates)), geometric_rate(rates)
-                cells += [
-                    Value(f"{mean:.2f}", mean, "derived"),
-                    Value(f"{geometric:.2f}", geometric, "derived"),
-                ]
+            for mean in (mean_rate, geometric_rate):
+                cells.append(entry(mean(rates) if rates else None, ".2f", "no rate"))
             cells.append(count(len(rates)))
         rows.append(tuple(cells))
     return Table(

@@ -9,7 +9,7 @@ import numpy as np
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.declared import figure_entry
-from cembench.report.document import Column, Table, Value, count, missing, words
+from cembench.report.document import Column, Table, Value, count, entry, missing, words
 from cembench.results.columns import FrameColumn
 from cembench.results.many import geometric
 from cembench.results.papers import Paper
@@ -87,7 +87,7 @@ def here(
         return missing(evidence.missing_reason(record))
     if record.outcome.status != "ok":
         text = record.outcome.status.replace("out_of_memory", "memory")
-        return Value(text, None, "", record.cell.key, evidence.missing_reason(record))
+        return Value(text, None, "", record.cell.key, evidence.missing_reason(record), "bad")
     return figure_entry(evidence, record, quantity.figure)
 
 
@@ -164,9 +164,7 @@ def _footer_rows(
             found = _numbers(rows, columns, k, footer.over)
             value = footer.of(found) if found else None
             nothing = "nothing to compare" if footer.over else "no figure in this column"
-            cells.append(
-                missing(nothing) if value is None else Value(footer.show(value), value, "derived")
-            )
+            cells.append(entry(value, footer.show, nothing))
             counts += [] if number else [count(len(found))]
         lines.append(tuple(cells))
     return [*lines, tuple(counts)]

@@ -13,7 +13,7 @@ from cembench.report.content.printed_beside_measured import (
 )
 from cembench.report.content.printed_tables import printed_table
 from cembench.report.content.sure_speedups import sure_speedups
-from cembench.report.document import Column, Table, Value, count, missing, words
+from cembench.report.document import Column, Table, Value, count, entry, missing, words
 from cembench.results.papers import Paper
 
 
@@ -43,17 +43,11 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
         for algorithm in evidence.paper.compared:
             claim = stated.get(k, {}).get(algorithm)
             cells.append(
-                missing("the paper does not state it")
-                if claim is None
-                else Value(reading.show(claim), claim, "printed")
+                entry(claim, reading.show, "the paper does not state it", origin="printed")
             )
-            means = [reading.of(rates) if rates else None for rates in sets[algorithm]]
-            cells += [
-                missing("no rate to average")
-                if mean is None
-                else Value(reading.show(mean), mean, "derived")
-                for mean in means
-            ]
+            for rates in sets[algorithm]:
+                mean = reading.of(rates) if rates else None
+                cells.append(entry(mean, reading.show, "no rate to average"))
         rows.append(tuple(cells))
     if any(work_ratios(evidence, a, policy) for a in evidence.paper.compared):
         rows.append(_work_row(evidence, policy))
@@ -99,9 +93,7 @@ def _work_row(evidence: Evidence, policy: str) -> tuple[Value, ...]:
         ratios = work_ratios(evidence, algorithm, policy)
         mean = geometric_mean(ratios) if ratios else None
         cells += [missing("the paper does not count them")] * 3
-        cells.append(
-            missing("not counted") if mean is None else Value(f"{mean:.1f}", mean, "derived")
-        )
+        cells.append(entry(mean, ".1f", "not counted"))
     return tuple(cells)
 
 

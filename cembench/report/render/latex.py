@@ -26,6 +26,8 @@ from cembench.report.document import (
     Sentence,
     Table,
     Text,
+    Value,
+    is_prose,
     marked,
     tables_of,
     tex_of,
@@ -49,8 +51,6 @@ _CHARACTERS = {
 ROWS = 38
 #: Maximum columns of a table on a page; wider ones are continued after a group of columns.
 COLUMNS = 18
-#: Characters above which a column of text is wrapped, and its share of the line width.
-LONG = 36
 
 PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
 \usepackage[T1]{fontenc}
@@ -158,17 +158,13 @@ def _item(item: Item) -> list[str]:
     if isinstance(item, Table):
         return [rf"\input{{{tex_of(item).with_suffix('')}}}"]
     if isinstance(item, Figure):
-        return _figures((item,), _title(item), item.caption, f"fig:{item.name}")
+        return _figures((item,), item.full_title, item.caption, f"fig:{item.name}")
     if isinstance(item, Gallery):
         return _figures(item.figures, item.title, item.caption, f"fig:{item.name}")
     if isinstance(item, Gap):
         how = rf" Made by: \texttt{{{escape(item.command)}}}." if item.command else ""
         return [rf"\textbf{{Missing: {escape(item.title)}.}} {escape(item.why)}{how}"]
     return _claim(item)
-
-
-def _title(figure: Figure) -> str:
-    return f"{figure.paper}: {figure.title}" if figure.paper else figure.title
 
 
 def _claim(claim: Claim) -> list[str]:
@@ -263,24 +259,14 @@ def _by_columns(table: Table) -> list[Table]:
         if portions[-1] and len(common) + len(portions[-1]) + len(places) > COLUMNS:
             portions.append([])
         portions[-1] += places
-    chosen = [sorted([*common, *places]) for places in portions]
-    return [
-        replace(
-            table,
-            columns=tuple(table.columns[k] for k in places),
-            rows=tuple(tuple(row[k] for k in places) for row in table.rows),
-        )
-        for places in chosen
-    ]
+    return [table.only(sorted([*common, *places])) for places in portions]
 
 
 def _alignment(table: Table) -> str:
-    letters = []
-    for k, column in enumerate(table.columns):
-        longest = max((len(row[k].text) for row in table.rows), default=0)
-        words = r"p{0.3\linewidth}" if longest > LONG else "l"
-        letters.append("r" if column.numeric else words)
-    return "".join(letters)
+    return "".join(
+        "r" if column.numeric else r"p{0.3\linewidth}" if is_prose(table, k) else "l"
+        for k, column in enumerate(table.columns)
+    )
 
 
 def _heads(columns: Sequence[Column]) -> list[str]:
@@ -301,11 +287,9 @@ def _heads(columns: Sequence[Column]) -> list[str]:
     return [*lines, " & ".join(titles) + r" \\"]
 
 
-def _row(table: Table, row: Sequence[object]) -> str:
-    cells = [
-        escape(marked(value, column))  # type: ignore[arg-type]
-        for column, value in zip(table.columns, row, strict=True)
-    ]
+def _row(table: Table, row: Sequence[Value]) -> str:
+    pairs = zip(row, table.columns, strict=True)
+    cells = [escape(marked(value, column)) for value, column in pairs]
     return " & ".join(cells) + r" \\"
 
 

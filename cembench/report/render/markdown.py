@@ -21,9 +21,9 @@ from cembench.report.document import (
     Text,
     Value,
     csv_of,
+    heading,
     marked,
 )
-from cembench.report.render.tables_csv import heading
 
 #: Number of digits of a record's key in links.
 KEY = 12
@@ -117,7 +117,7 @@ def _item(item: Item, depth: int, up: PurePosixPath) -> list[str]:
     if isinstance(item, Table):
         return [f"{title} {escape(item.title)}", "", *table_lines(item, up)]
     if isinstance(item, Figure):
-        return [f"{title} {escape(_named(item))}", "", *_figure(item, up)]
+        return [f"{title} {escape(item.full_title)}", "", *_figure(item, up)]
     if isinstance(item, Gallery):
         lines = [f"{title} {escape(item.title)}", ""]
         for figure in item.figures:
@@ -127,10 +127,6 @@ def _item(item: Item, depth: int, up: PurePosixPath) -> list[str]:
         how = f" Made by: `{item.command}`." if item.command else ""
         return [f"> **Missing: {escape(item.title)}.** {escape(item.why)}{how}"]
     return _claim(item, title)
-
-
-def _named(figure: Figure) -> str:
-    return f"{figure.paper}: {figure.title}" if figure.paper else figure.title
 
 
 def _claim(claim: Claim, title: str) -> list[str]:

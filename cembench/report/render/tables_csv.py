@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 
 from cembench.core.atomic import write_text
-from cembench.report.document import Column, Report, Table, csv_of, tables_of
+from cembench.report.document import Report, Table, csv_of, heading, tables_of
 
 
 def write_tables_csv(report: Report, folder: Path) -> list[Path]:
@@ -43,9 +43,3 @@ def table_csv(table: Table) -> str:
                 cells.append(value.text)
         writer.writerow(cells)
     return text.getvalue()
-
-
-def heading(column: Column) -> str:
-    """Return group, title and unit as one heading."""
-    named = " ".join(part for part in (column.group, column.title) if part)
-    return f"{named} [{column.unit}]" if column.unit else named

@@ -1,0 +1,323 @@
+"""The tables of the commands that measure: `run`, `show`, `map`, `compare` and `peers`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from statistics import median, quantiles
+
+from cembench.report.content.evidence import Evidence
+from cembench.report.declared import declared_table
+from cembench.report.document import (
+    Column,
+    Item,
+    Plain,
+    Section,
+    Table,
+    Text,
+    Value,
+    entry,
+    words,
+)
+from cembench.results.columns import FIGURES
+from cembench.results.comparison import (
+    Comparison,
+    circumstances,
+    compare,
+    is_unstable,
+    references,
+    seconds_interval,
+)
+from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.intervals import Interval
+from cembench.results.machines import Marks
+from cembench.results.many import corrected
+from cembench.results.papers import paper_of
+from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
+from cembench.results.runs_compared import Change
+from cembench.running.estimate import Estimate
+
+SURFACE, ALGORITHM = Column("surface", numeric=False), Column("algorithm", numeric=False)
+#: Maximum number of causes listed.
+MOST_CAUSES = 8
+FEW_ROUNDS = "too few rounds"
+
+
+def results_table(evidence: Evidence) -> Section:
+    """Return a table for each policy, a row for each cell, and what disturbed the measurements."""
+    items: list[Item] = []
+    for policy in evidence.policies:
+        keys = [record.cell.key for record in evidence.records if record.cell.solves == policy]
+        table = declared_table(evidence, "results", keys=keys)
+        assert table is not None, "a policy has records"
+        title = f"solves: {policy}" if len(evidence.policies) > 1 else ""
+        items.append(replace(table, title=title))
+    items += map(Text, evidence.machines.explained())
+    noted = [x.neighbours for r in evidence.records for x in r.outcome.rounds if x.neighbours]
+    busy = sum(neighbours.busy for neighbours in noted)
+    if busy:
+        message = f"The machine was busy during {busy} of {len(noted)} processes; close other"
+        items.append(Text(f"{message} programs, or add --repeat-busy."))
+    return Section("results", "", tuple(items))
+
+
+def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
+    """Return the speedups of the reference over the others , with their intervals.
+
+    Without enough rounds for an interval, each surface has one row. None if there is nothing to
+    compare.
+    """
+    known = references(records, reference)
+    bases = [(record, known.get(circumstances(record.cell))) for record in records]
+    compared = [
+        (record, found)
+        for record, base in bases
+        if base is not None and base.cell.algorithm != record.cell.algorithm
+        if (found := compare(record, base)) is not None
+    ]
+    if not compared:
+        return None
+    title = f"Speedup of {reference} over the others: t / t_{reference} - 1"
+    several = len({record.cell.solves for record, _ in compared}) > 1
+    named = [
+        (record.cell.mesh, _named(record), f" ({record.cell.solves})" if several else "", found)
+        for record, found in compared
+    ]
+    if all(found.verdict == FEW_ROUNDS for _, found in compared):
+        names = list(dict.fromkeys(name for _, name, _, _ in named))
+        lines: dict[str, dict[str, float]] = {}
+        for mesh, name, policy, found in named:
+            lines.setdefault(mesh + policy, {})[name] = found.speedup
+        note = (
+            f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
+            f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
+        )
+        columns = [SURFACE, *(Column(n, form=".2f", lacking="not timed") for n in names)]
+        rows = [[mesh, *map(line.get, names)] for mesh, line in lines.items()]
+        return Table.of("speedups", title, columns, rows, notes=(note,))
+    together = corrected([found for _, found in compared])
+    return Table.of(
+        "speedups",
+        title,
+        [
+            *(SURFACE, ALGORITHM, Column("speedup", form=".2f"), Column("95 % interval")),
+            Column(f"than {reference}", numeric=False),
+        ],
+        [
+            [mesh, name + policy, one.speedup, _interval(one.speedup_interval, " to "), one.verdict]
+            for (mesh, name, policy, _), one in zip(named, together, strict=True)
+        ],
+        notes=tuple(_corrected_words([found for _, found in compared])),
+    )
+
+
+def _named(record: Record) -> str:
+    """Return an algorithm's name with marks for another target and for external code."""
+    marks = ("" if record.target == "disk" else "*") + mark_of(record)
+    return f"{record.cell.algorithm} {marks}".rstrip()
+
+
+def _interval(interval: Interval | None, to: str) -> Value:
+    if interval is None:
+        return entry(None, "", FEW_ROUNDS)
+    return words(f"{interval.low:.2f}{to}{interval.high:.2f}")
+
+
+def _corrected_words(found: Sequence[Comparison]) -> Iterator[str]:
+    """Yield a note on the correction of the verdicts, and its effect."""
+    tested = [one for one in found if one.interval is not None]
+    if len(tested) < 2:
+        return
+    lost = sum(
+        one.verdict != alone.verdict for one, alone in zip(corrected(tested), tested, strict=True)
+    )
+    more = f" Taken alone, {lost} more would be called different; more rounds would decide."
+    yield (
+        f"All verdicts together hold with 95 % (Holm, {len(tested)} comparisons); each interval "
+        f"holds by itself.{more if lost else ''}"
+    )
+
+
+def changes_table(changes: Sequence[Change]) -> Table:
+    """Return the changes from one run to another, as ratios of seconds.
+
+    The ratio is corrected for the drift of the reference kernel, if both runs timed it.
+    """
+    found = [change.comparison for change in changes]
+    return Table.of(
+        "changes",
+        "",
+        [
+            *(SURFACE, ALGORITHM, Column("before", form=".3f"), Column("after", form=".3f")),
+            *(Column("ratio", form=".2f"), Column("interval"), Column("verdict", numeric=False)),
+        ],
+        [
+            [
+                *(change.after.cell.mesh, change.after.cell.algorithm),
+                *(one.outcome.median_seconds for one in (change.before, change.after)),
+                *(together.ratio, _interval(together.interval, "-"), together.verdict),
+            ]
+            for change, together in zip(changes, corrected(found), strict=True)
+        ],
+        notes=(_drift_words(changes), *_corrected_words(found)),
+    )
+
+
+def _drift_words(changes: Sequence[Change]) -> str:
+    """Return a note on the machine's drift between two runs, and its correction."""
+    known = [change.drift for change in changes if change.drift is not None]
+    if not known:
+        return (
+            "The machine's drift between the runs is unknown: not both runs timed the reference "
+            "kernel."
+        )
+    least, most = f"{min(known):.2f}", f"{max(known):.2f}"
+    lost = len(changes) - len(known)
+    return (
+        "Seconds are divided by those of the reference kernel (rank-sum test, 5 %), which took "
+        f"{least}{f' to {most}' if most != least else ''} times as long in the later run."
+        f"{f' Not corrected: {lost}.' if lost else ''}"
+    )
+
+
+def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table:
+    """Return the plan: cells, triangles, what is recorded already, and the estimated cost."""
+    rows: list[list[Plain]] = []
+    for cell, faces, state, cost in lines:
+        costs = ("-", "-", "-")
+        if cost is not None:
+            gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
+            costs = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
+        rows.append([cell.mesh, cell.algorithm, cell.solves, faces, *costs, state])
+    costs_columns = [Column(title) for title in ("faces", "a call", "in all", "memory")]
+    solves, basis = Column("solves", numeric=False), Column("from", numeric=False)
+    return Table.of("plan", "", [SURFACE, ALGORITHM, solves, *costs_columns, basis], rows)
+
+
+def figures_table(record: Record) -> Table:
+    """Return all figures of one record, one row each."""
+    columns = [Column("", numeric=False)] * 2
+    return Table.of("record", "", columns, list(_figures(record)))
+
+
+def _figures(record: Record) -> Iterator[tuple[str, str]]:
+    outcome, facts = record.outcome, record.mesh
+    yield (
+        "surface",
+        f"{record.cell.mesh}: {facts.vertices:,} vertices, {facts.faces:,} "
+        f"faces, {facts.boundary_vertices:,} on the boundary, "
+        f"{facts.non_delaunay_share:.1%} of the edges not Delaunay",
+    )
+    if facts.paper_row:
+        yield "in the paper", _printed(record)
+    given = ", ".join(f"{name}={value}" for name, value in record.cell.parameters.items())
+    with_given = f" with {given}" if given else ""
+    yield "algorithm", f"{record.title} ({record.target}){with_given}"
+    if record.external is not None:
+        yield f"external {record.external.kind}", record.external.name
+    for metric in FIGURES:
+        if metric.name in outcome.metrics:
+            text = metric.text(outcome.metrics[metric.name], precise=True)
+            yield metric.title, f"{text} {metric.unit}".rstrip()
+    if outcome.folded_before_repair is not None:
+        yield "folded before repair", str(outcome.folded_before_repair)
+    if outcome.iterations:
+        yield "iterations", str(outcome.iterations)
+    if outcome.seconds:
+        phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
+        yield "seconds", seconds_words(record) or f"{outcome.median_seconds:.3f} ({phases})"
+    interval = seconds_interval(record)
+    if interval is not None:
+        unstable = ", unstable" if is_unstable(record) else ""
+        ends = f"{interval.low:.4f} to {interval.high:.4f} s"
+        yield "95 % interval", f"{ends} over {len(outcome.rounds)} rounds{unstable}"
+        yield "fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s"
+    if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
+        more = f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
+        whose = "of the program's processes" if record.is_program else more
+        yield "memory", f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, {whose}"
+    yield from (("note", str(note)) for note in outcome.notes)
+
+
+def _printed(record: Record) -> str:
+    """Return the paper's printed figures for this surface and algorithm, as text."""
+    row, name = record.mesh.paper_row, record.cell.algorithm
+    what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
+    energy, mean, sd = (
+        paper_of(row).printed_figure(column, name, row)
+        for column in ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
+    )
+    if energy is None or mean is None or sd is None:
+        return what
+    return f"{what}; printed: E_C {energy:.4f}, mean angle error {mean:.2f}, SD {sd:.2f}"
+
+
+def many_table(records: Sequence[Record]) -> Table:
+    """Return valid maps, angle errors, seconds and commonest faults by algorithm."""
+    by_algorithm: dict[str, list[Record]] = {}
+    for record in records:
+        by_algorithm.setdefault(record.cell.algorithm, []).append(record)
+    causes = Counter(
+        (record.cell.algorithm, record.outcome.status, fault.kind.replace("_", " "))
+        for record in records
+        for fault in record.outcome.faults
+    )
+    notes = [
+        f"{count:>6}  {name}: {status}, {kind}"
+        for (name, status, kind), count in causes.most_common(MOST_CAUSES)
+    ]
+    if len(causes) > MOST_CAUSES:
+        notes.append(f"        and {len(causes) - MOST_CAUSES} other kinds")
+    surfaces = len({record.cell.mesh_hash for record in records})
+    angles = [Column(f"{t}°", form=".2f", lacking="no map") for t in ("median", "90 %", "worst")]
+    return Table.of(
+        "many",
+        f"Valid maps, angle errors and median seconds over {surfaces} surfaces",
+        [
+            *(ALGORITHM, Column("surfaces"), Column("ok"), Column("share", form=".1%"), *angles),
+            Column("seconds", form=".3g", lacking="not timed"),
+        ],
+        [[name, *_over_surfaces(found)] for name, found in by_algorithm.items()],
+        notes=tuple(notes),
+    )
+
+
+def _over_surfaces(records: Sequence[Record]) -> Iterator[float | None]:
+    ok = [record.outcome for record in records if record.outcome.status == "ok"]
+    yield from (len(records), len(ok), len(ok) / len(records))
+    errors = [one.metrics.get("angle_error_mean_deg") for one in ok]
+    known = [float(error) for error in errors if error is not None]
+    ninth = (
+        quantiles(known, n=10, method="inclusive")[8]
+        if len(known) > 1
+        else max(known, default=None)
+    )
+    yield from (median(known) if known else None, ninth, max(known, default=None))
+    seconds = [one.median_seconds for one in ok if one.median_seconds is not None]
+    yield median(seconds) if seconds else None
+
+
+def machine_lines(marked: Marks) -> list[str]:
+    """Say that median seconds are of several machines, if they are."""
+    machines = len(marked.letters)
+    mixed = f"! median seconds are over surfaces on {machines} machines, which mixes them"
+    return [mixed, *marked.explained()] if machines else []
+
+
+def peers_tables(evidence: Evidence) -> Section:
+    """Return a table for each surface and target, sorted by E_C / A."""
+    items: list[Item] = []
+    for (_, target), group in evidence.frame.groupby(["place", "target"]):
+        first = evidence.by_key[group["key"].iloc[0]]
+        about = {"surface": first.cell.mesh, "faces": f"{first.mesh.faces:,}", "target": target}
+        table = declared_table(evidence, "peers", keys=group["key"], **about)
+        items += [table] if table else []
+    items.append(
+        Text(
+            "\nE_C / A is E_C over the image's area; compare it within a target. call: seconds in "
+            "the process. wall, start, solve: of an external program's process."
+        )
+    )
+    items += map(Text, marks_explained(list(evidence.records)))
+    return Section("peers", "", tuple(items))
