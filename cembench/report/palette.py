@@ -77,3 +77,25 @@ def series_styles(names: Sequence[str]) -> dict[str, SeriesStyle]:
     """Return a style for each name: fixed for known algorithms, others in turn."""
     others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
     return _KNOWN | {name: _another(k) for k, name in enumerate(others)}
+
+
+#: Phases with a colour of their own, the same in every plot.
+_PHASES = (
+    "solves",
+    "factorisation",
+    "assembly",
+    "laplacian",
+    "ordering",
+    "symbolic",
+    "boundary",
+    "beltrami",
+    "boundary step",
+    "folds",
+    "energy",
+    "start",
+)
+
+
+def phase_style(phase: str) -> SeriesStyle:
+    """Return the colour of a phase; the remainder and phases of plug-ins are grey."""
+    return SeriesStyle(PARTS[_PHASES.index(phase)] if phase in _PHASES else REST)

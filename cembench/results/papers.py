@@ -1,9 +1,9 @@
 """Papers: folders of data with printed tables, misprints, claims and how the paper was run.
 
 A folder holds `paper.toml`, `tables.toml` with the CSV files that it names and, if wanted,
-`runs.toml`, `claims.toml` and the Python modules that test claims. `papers/cem` is an example.
-Installed papers are found by the entry points of the group ``cembench.papers``, each of which names
-the package that is the folder.
+`runs.toml`, `figures.toml`, `claims.toml` and the Python modules that test claims. `papers/cem` is
+an example. Installed papers are found by the entry points of the group ``cembench.papers``, each of
+which names the package that is the folder.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 GROUP = "cembench.papers"
 REMEDY = "Repair it; papers/cem is an example."
 #: The file that a part of a paper is in; others are in paper.toml.
-_FILES = {"runs": "runs.toml", "claims": "claims.toml"} | dict.fromkeys(
+_FILES = {"runs": "runs.toml", "claims": "claims.toml", "plots": "figures.toml"} | dict.fromkeys(
     ("tables", "printed", "errata"), "tables.toml"
 )
 
@@ -76,8 +76,12 @@ class Picture(_Part):
 
 
 class PlottedFigure(_Part):
-    """A figure that a plot of the report shows, with a panel for each model where it has any."""
+    """A figure that a plot shows, with a panel for each model where it has any.
 
+    Its other keys declare the plot (:mod:`cembench.report.declared_plots`).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
     figure: str = ""
     models: tuple[str, ...] = ()
 
@@ -327,6 +331,7 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         "tables": tables,
         "printed": printed,
         "errata": listed.get("errata", ()),
+        "plots": _read_toml(folder / "figures.toml", optional=True),
         "runs": _read_toml(folder / "runs.toml", optional=True).get("runs", ()),
         "claims": _spelled_out(folder / "claims.toml", claimed, "claims", words),
         "folder": folder,

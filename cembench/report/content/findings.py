@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cembench.report.content.as_good import AS_GOOD, DEGREES
 from cembench.report.content.by_surface import own_table
-from cembench.report.content.evidence import REFERENCE, Evidence
+from cembench.report.content.evidence import AS_GOOD, DEGREES, REFERENCE, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
 from cembench.report.content.standings import (

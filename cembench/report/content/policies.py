@@ -20,8 +20,6 @@ from cembench.report.content.printed_beside_measured import (
 )
 from cembench.report.content.rates import measured_rates
 from cembench.report.document import Column, Gap, Table, Value, count, missing, words
-from cembench.report.plots import Axis, Plot, PlotPanel
-from cembench.report.plots import PlotSeries as Bars
 from cembench.results.columns import COLUMNS, FrameColumn
 from cembench.results.records import Record
 
@@ -99,20 +97,4 @@ def speedups_table(evidence: Evidence) -> Table:
         tuple(columns),
         tuple(rows),
         "Rates of speedup (Eq. 33) on the surfaces that are or stand in for models of the paper.",
-    )
-
-
-def policies_plot(evidence: Evidence) -> Plot:
-    """Return a plot of the ratios by surface."""
-    drawn = []
-    for series in evidence.series:
-        names = [surface.title for surface in evidence.surfaces]
-        values = [_ratio(evidence, surface, series) for surface in evidence.surfaces]
-        drawn.append(Bars(series.label, names, values, "both", evidence.styles[series.label]))
-    return Plot(
-        "reuse-against-backslash",
-        "Cost of repeated factorisation",
-        (PlotPanel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
-        "Ratio of seconds with a factorisation at every solve to seconds with reused ones.",
-        "A line for each algorithm over the surfaces; those of iterative algorithms are high.",
     )

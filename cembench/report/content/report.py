@@ -12,16 +12,10 @@ from cembench import __version__
 from cembench.report.content import policies
 from cembench.report.content.both_policies import has_both_policies
 from cembench.report.content.claims import claims
-from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface
+from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface, model_surface
 from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
+from cembench.report.content.exponents import exponents_table
 from cembench.report.content.failures import not_ok
-from cembench.report.content.figures.accuracy_against_time import accuracy_against_time
-from cembench.report.content.figures.angle_histograms import angle_histograms
-from cembench.report.content.figures.cost_by_faces import cost_by_faces, exponents_table
-from cembench.report.content.figures.energy_by_iteration import energy_by_iteration, model_gap
-from cembench.report.content.figures.over_models import angles_over_models, energy_over_models
-from cembench.report.content.figures.performance_profile import performance_profile
-from cembench.report.content.figures.time_by_phase import time_by_phase
 from cembench.report.content.findings import findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
@@ -34,6 +28,7 @@ from cembench.report.content.rates import rates_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table
+from cembench.report.declared_plots import declared_plot, own_plots, plot_and_models
 from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
 from cembench.report.plots import Plot, write_plot
 from cembench.report.shared_drawing import each
@@ -225,19 +220,14 @@ def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Sect
         if found:
             items += found
         else:
-            gaps.append(model_gap(evidence, picture.model, picture.figure))
-    for plot, lacking in (
-        energy_by_iteration(evidence),
-        angle_histograms(evidence, inspections),
-    ):
+            gaps.append(model_gap(evidence, picture.model, picture.figure, inspections))
+    for name in ("energy-by-iteration", "angle-histograms"):
+        plot, lacking = _of_models(evidence, name, inspections)
         items += _drawn([plot], folder)
         gaps += lacking
-    items += _drawn([cost_by_faces(evidence)], folder)
+    items += _declared(evidence, folder, "cost-by-faces")
     items.append(exponents_table(evidence))
-    over_models = (("energy", energy_over_models), ("angles", angles_over_models))
-    for name, plot_of in over_models:
-        if evidence.models and f"{name}_over_models" in evidence.paper.plots:
-            items += _drawn([plot_of(evidence)], folder)
+    items += _declared(evidence, folder, "energy-over-models", "angles-over-models")
     gaps += exhibit_gaps(evidence)
     return Section("figures", "Figures of the paper", (*items, *gaps))
 
@@ -273,14 +263,14 @@ def _beyond_the_paper(
     evidence: Evidence, folder: Path, *, by_surface: bool, of_paper: bool
 ) -> Section:
     # Over many surfaces, the profile of the time stands beside those of accuracy.
-    profiles = [performance_profile(evidence)] if by_surface else []
-    items = _drawn([*profiles, accuracy_against_time(evidence), time_by_phase(evidence)], folder)
+    profiles = ["performance-profile"] if by_surface else []
+    items = _declared(evidence, folder, *profiles, "accuracy-against-time", "time-by-phase")
     if not of_paper:  # otherwise it is below Table 2
         for policy in evidence.policies:
             items += sure_speedups(evidence, policy)
     if has_both_policies(evidence):
         items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
-        items += _drawn([policies.policies_plot(evidence)], folder)
+        items += _declared(evidence, folder, "reuse-against-backslash")
     else:
         items.append(policies.one_policy_gap(evidence))
     if by_surface:
@@ -305,18 +295,18 @@ def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Sec
         figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
         for surface in evidence.surfaces
     ]
-    angles, _ = angle_histograms(evidence, inspections)
-    energies, _ = energy_by_iteration(evidence)
     items += work_tables(evidence)
     items += [item for item in beyond.items if not isinstance(item, Gap)]
-    items += _drawn([angles, energies, cost_by_faces(evidence)], folder)
+    for name in ("angle-histograms", "energy-by-iteration"):
+        items += _drawn([_of_models(evidence, name, inspections)[0]], folder)
+    items += _declared(evidence, folder, "cost-by-faces")
     return Section("results", "Results", tuple(items))
 
 
 def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
     """Return the section on cost over all surfaces."""
     items: list[Item] = [item for item in beyond.items if isinstance(item, Table | Figure)]
-    items += _drawn([cost_by_faces(evidence)], folder)
+    items += _declared(evidence, folder, "cost-by-faces")
     items.append(exponents_table(evidence))
     return Section("costs", "What maps cost", tuple(items))
 
@@ -331,6 +321,42 @@ def _page(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, folder
     page, plot = surface_page(evidence, surface, seen)
     items = (*page.items, *_drawn([plot], folder))
     return Section(page.name, page.title, items, page.sections, page.page)
+
+
+def _declared(evidence: Evidence, folder: Path, *names: str) -> list[Item]:
+    known = own_plots(evidence)
+    return _drawn([declared_plot(evidence, name) for name in names if name in known], folder)
+
+
+def _of_models(
+    evidence: Evidence, name: str, inspections: Inspections
+) -> tuple[Plot | None, list[Gap]]:
+    """Return a plot of the paper's models in the run, and a gap for each missing one."""
+    spec = own_plots(evidence).get(name)
+    if spec is None:
+        return None, []
+    plot, drawn = plot_and_models(evidence, name, spec, seen=inspections)
+    absent = [model for model in spec.models if model not in drawn]
+    return plot, [model_gap(evidence, model, spec.figure, inspections) for model in absent]
+
+
+def model_gap(evidence: Evidence, model: str, figure: str, seen: Inspections) -> Gap:
+    """Return the gap for a model without a map by CEM in the run, or without the map itself."""
+    surface = evidence.surface_for_model(model)
+    series = evidence.series_of(REFERENCE)
+    record = evidence.find(surface, series) if surface and series else None
+    if surface and record and record.outcome.status == "ok" and not seen[surface.mesh_hash].kept:
+        return Gap(f"{figure}: {model}", seen[surface.mesh_hash].missing_reason)
+    why = (
+        evidence.missing_reason(record)
+        if surface
+        else "no surface of this run is or stands in for it"
+    )
+    return Gap(
+        f"{figure}: {model}",
+        f"no map of {model} by CEM: {why}.",
+        f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
+    )
 
 
 def _drawn(plots: Sequence[Plot | None], folder: Path) -> list[Item]:

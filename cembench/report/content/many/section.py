@@ -7,14 +7,12 @@ from pathlib import Path
 
 from cembench.report.content.by_surface import hardest_table
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.figures.performance_profile import performance_profile
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.many import MANY
-from cembench.report.content.many.accuracy_profiles import accuracy_profiles
-from cembench.report.content.many.difficulty import difficulties, errors_by_difficulty
 from cembench.report.content.many.pairwise_wins import pairwise_wins
 from cembench.report.content.many.worst import hardest_gallery
 from cembench.report.declared import declared_table
+from cembench.report.declared_plots import declared_plot
 from cembench.report.document import Item, Section, Text
 from cembench.report.plots import write_plot
 
@@ -36,11 +34,8 @@ def many_section(
     if len(evidence.policies) > 1:
         items.append(Text(f"Unless stated otherwise, the linear-algebra policy is {policy}."))
     items += [t for name in ("success", "spread") if (t := declared_table(evidence, name))]
-    plots = (
-        accuracy_profiles(evidence, policy),
-        performance_profile(evidence),
-        errors_by_difficulty(evidence, policy, difficulties(evidence, policy)),
-    )
+    names = ("accuracy-profiles", "performance-profile", "errors-by-difficulty")
+    plots = (declared_plot(evidence, name) for name in names)
     items += [write_plot(plot, folder) for plot in plots if plot]
     items += pairwise_wins(evidence, policy)
     items.append(hardest_table(evidence, policy, shown))

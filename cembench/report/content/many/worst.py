@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from math import inf
 
+from cembench.report.content.difficulty import best_record
 from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
-from cembench.report.content.many.difficulty import best_record
 from cembench.report.document import Gallery
 
 #: Number of surfaces shown.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf
 
@@ -13,12 +12,8 @@ from cembench.conformal.metrics import in_common_gauge, is_disk_map
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import ANGLE, DISK, Evidence, MeasuredSurface, figure
-from cembench.report.plots import Axis, Plot, PlotPanel, Point, through
 from cembench.report.surface_facts import factor_spans
 from cembench.results.records import Record
-
-#: Maximum number of algorithms in the plot; more cannot be distinguished.
-DRAWN = 8
 
 
 @dataclass(frozen=True)
@@ -99,42 +94,3 @@ def boundary_crowding(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> float |
         return None
     low, high = np.percentile(images / lengths, [1, 99])
     return float(high / low)
-
-
-def errors_by_difficulty(
-    evidence: Evidence, policy: str, known: Mapping[str, Difficulty]
-) -> Plot | None:
-    """Return a plot of angle errors against size, thin triangles, span and crowding."""
-    if not known:
-        return None
-    axes = (
-        (Axis("triangles", log=True), lambda s: float(s.faces)),
-        (Axis("edges not Delaunay (%)"), lambda s: 100 * s.non_delaunay_share),
-        (Axis("span of the conformal factor", log=True), lambda s: known[s.mesh_hash].span),
-        (Axis("crowding of the boundary", log=True), lambda s: known[s.mesh_hash].crowding),
-    )
-    series = [s for s in evidence.disk_series if s.main]
-    surfaces = [s for s in evidence.surfaces if s.mesh_hash in known]
-    panels = []
-    for axis, place in axes:
-        clouds = []
-        for one in series[:DRAWN]:
-            points = []
-            for surface in surfaces:
-                error = figure(evidence, surface, one, policy, ANGLE)
-                if error is not None and 0 < error < inf:
-                    points.append(Point(place(surface), error, surface.title))
-            clouds.append(through(one.label, points, "points", evidence.styles[one.label]))
-        panels.append(PlotPanel(axis, Axis("mean angle error (degrees)", log=True), tuple(clouds)))
-    others = ", ".join(s.label for s in series[DRAWN:])
-    left = f" Not drawn: {others}." if others else ""
-    return Plot(
-        "errors-by-difficulty",
-        "Angle errors by the difficulty of surfaces",
-        tuple(panels),
-        "Each point is a valid map to the disk. The span is that of the conformal factor of the "
-        "surface's best map, a ratio of lengths (99.9 over 0.1 percentile of the triangles); "
-        "crowding is the same along the boundary, in the common gauge (99 over 1 percentile of "
-        f"its edges).{left}",
-        "Clouds of points; if they rise to the right, surfaces of that kind are harder.",
-    )
