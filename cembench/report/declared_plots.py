@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from importlib.resources import files
 from math import inf
@@ -190,13 +191,12 @@ def further_plots(evidence: Evidence, path: Path, number: int) -> list[Plot | Te
 
 
 class _Drawn(NamedTuple):
-    """A panel, the value that has it, the number of surfaces in it, and the series left out."""
+    """A panel, the number of surfaces in it, and the series left out."""
 
     panel: PlotPanel
-    facet: Any
     n: int
-    left_out: tuple[str, ...]
-    about: str
+    left_out: Sequence[str] = ()
+    about: str = ""
 
 
 def declared_plot(
@@ -226,33 +226,23 @@ def declared_plot(
         Another name for the plot's files and anchor.
 
     """
-    return plot_and_models(evidence, name, declared, seen=seen, surface=surface, called=called)[0]
-
-
-def plot_and_models(
-    evidence: Evidence,
-    name: str,
-    declared: DeclaredPlot | None = None,
-    *,
-    seen: Inspections = UNSEEN,
-    surface: MeasuredSurface | None = None,
-    called: str = "",
-) -> tuple[Plot | None, list[Any]]:
-    """Return a declared plot, and the values of its facet that have a panel."""
     spec = declared or own_plots(evidence)[name]
-    drawn = [one for panel in spec.panels for one in _panels(evidence, spec, panel, seen, surface)]
+    drawn: list[_Drawn] = []
+    for panel in spec.panels:
+        frame = _rows(evidence, spec, panel, seen, surface)
+        drawn += _panels(evidence, panel, frame, spec.models)
     if not drawn:
-        return None, []
+        return None
     left_out = list(dict.fromkeys(label for one in drawn for label in one.left_out))
     texts = {
         "as_good": AS_GOOD,
         "degrees": DEGREES,
         "surface": surface.title if surface else "",
-        "counts": ", ".join(f"{d.n} of {len(evidence.surfaces)} ({d.facet})" for d in drawn),
+        "counts": ", ".join(f"{d.n} of {len(evidence.surfaces)} ({d.panel.of})" for d in drawn),
         "panels": "; ".join(one.about for one in drawn),
         "left_out": spec.left_out.format(", ".join(left_out)) if left_out else "",
     }
-    plot = Plot(
+    return Plot(
         called or spec.figure.lower().replace(" ", "-") or name,
         _filled(spec.title, texts),
         tuple(one.panel for one in drawn),
@@ -261,7 +251,6 @@ def plot_and_models(
         spec.figure,
         spec.columns,
     )
-    return plot, [one.facet for one in drawn]
 
 
 def _filled(text: str, known: Mapping[str, Any]) -> str:
@@ -275,33 +264,26 @@ def _filled(text: str, known: Mapping[str, Any]) -> str:
 
 
 def _panels(
-    evidence: Evidence,
-    plot: DeclaredPlot,
-    spec: DeclaredPanel,
-    seen: Inspections,
-    surface: MeasuredSurface | None,
+    evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame, models: Sequence[str]
 ) -> Iterator[_Drawn]:
-    frame = _rows(evidence, plot, spec, seen, surface)
-    facet = "model" if plot.models else spec.facet
-    named = [("facet", facet), ("series", spec.series), *(("by", name) for name in spec.by)]
-    for key, name in named:
+    """Yield a panel for each value of the facet that has something to draw."""
+    facet = "model" if models else spec.facet
+    for key, name in (("facet", facet), ("series", spec.series), *(("by", n) for n in spec.by)):
         if name and name not in frame:
             known = ", ".join(map(str, frame))
             raise ParameterError(f"{key} = {name!r} names no column; known: {known}.")
-    order: dict[Any, int] = {name: k for k, name in enumerate((*evidence.policies, *plot.models))}
-    values = sorted(frame[facet].unique(), key=lambda v: order.get(v, -1)) if facet else [None]
+    order: dict[Any, int] = {name: k for k, name in enumerate((*evidence.policies, *models))}
+    values = sorted(frame[facet].unique(), key=lambda v: order.get(v, -1)) if facet else [""]
+    make = _profile if spec.kind == "profile" else _points
     for value in values:
         group = frame[frame[facet] == value] if facet else frame
         if group.empty or (spec.needs and not evaluate(spec.needs, group).any()):
             continue
-        make = _profile if spec.kind == "profile" else _points
-        x, y, series, n, left_out = make(evidence, spec, group)
-        if not series:
-            continue
-        about = group.iloc[0].to_dict() | {"n": n}
-        about["origins"] = ", ".join(sorted(set(group["origin"]))) if "origin" in group else ""
-        panel = PlotPanel(x, y, tuple(series), _filled(spec.panel, about))
-        yield _Drawn(panel, value, n, tuple(left_out), spec.about)
+        if drawn := make(evidence, spec, group):
+            about = group.iloc[0].to_dict() | {"n": drawn.n}
+            about["origins"] = ", ".join(sorted(set(group.get("origin", ()))))
+            title = _filled(spec.panel, about)
+            yield drawn._replace(panel=replace(drawn.panel, title=title, of=str(value)))
 
 
 def _rows(
@@ -333,68 +315,61 @@ def _rows(
     return frame
 
 
-_Made = tuple[Axis, Axis, list[PlotSeries], int, Sequence[str]]
-
-
-def _profile(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Made:
+def _profile(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Drawn | None:
     """Return the performance profile of the panel's figure: a staircase for each algorithm."""
     good = evaluate(spec.valid, frame).astype(bool)
     cost = evaluate(spec.y.value, frame).astype(float).where(good).fillna(inf)
     ratios = cost_ratios(frame, cost, spec.least)
-    left_out = [label for label in dict.fromkeys(frame["label"]) if label not in ratios]
+    if ratios.empty or len(ratios.columns) < 2:
+        return None
     finite = ratios.to_numpy()
-    series = []
-    last = inf if spec.x.high is None else spec.x.high
-    if len(ratios) and len(ratios.columns) > 1:
-        last = min(last, 1.15 * float(finite[finite < inf].max()))
-        for label in ratios:
-            x, y = staircase(ratios[label].tolist(), last)
-            series.append(PlotSeries(str(label), x, y, "steps", evidence.styles[str(label)]))
-    x_axis = Axis(spec.x.axis().title, log=True, low=1.0, high=last)
-    return x_axis, Axis("surfaces (%)", low=0, high=104), series, len(ratios), left_out
+    last = min(spec.x.high or inf, 1.15 * float(finite[finite < inf].max()))
+    series = tuple(
+        PlotSeries(label, *staircase(ratios[label].tolist(), last), "steps", evidence.styles[label])
+        for label in map(str, ratios)
+    )
+    x = Axis(spec.x.axis().title, log=True, low=1.0, high=last)
+    panel = PlotPanel(x, Axis("surfaces (%)", low=0, high=104), series)
+    left_out = [label for label in dict.fromkeys(frame["label"]) if label not in ratios]
+    return _Drawn(panel, len(ratios), left_out, spec.about)
 
 
-def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Made:
+def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Drawn | None:
     """Return the points of a panel in series, with what is laid over them.
 
     With names on x, each series has an entry for each name, None where there is no figure.
     """
     points = _evaluated(spec, frame)
     if points.empty:
-        return spec.x.axis(), spec.y.axis(), [], 0, ()
-    slots: list[tuple[int, str]] = []
-    if isinstance(points["x"].iloc[0], str):
-        slots = sorted(
-            dict.fromkeys(zip(frame["place"], evaluate(spec.x.value, frame), strict=True))
-        )
-    ordered = (frame if slots else points).sort_values("series", kind="stable")
+        return None
+    named = isinstance(points["x"].iloc[0], str)
+    slots = zip(frame["place"], evaluate(spec.x.value, frame), strict=True) if named else ()
+    places = sorted(dict.fromkeys(slots))
+    ordered = (frame if named else points).sort_values("series", kind="stable")
     names = list(dict.fromkeys(ordered[spec.series]))
     if spec.kind == "stack":
         total = points.groupby(spec.series)["y"].sum()
         names.sort(key=lambda name: (name == "other", -total[name], name))
-    absent = 0.0 if spec.kind == "stack" else None
     styles = _styles(evidence, spec, ordered, names)
     series: list[PlotSeries] = []
     clouds: dict[str, list[Point]] = {}
     for name in names[: spec.most]:
         own = points[points[spec.series] == name]
-        cloud = [Point(*p) for p in own[["x", "y", "tooltip"]].itertuples(index=False, name=None)]
-        clouds[name] = cloud
-        x: Sequence[float | str]
-        y: Sequence[float | None]
-        if slots:
-            held = dict(zip(zip(own["place"], own["x"], strict=True), own["y"], strict=True))
-            x, y = [x for _, x in slots], [held.get(slot, absent) for slot in slots]
-        else:
-            x, y = [p.x for p in cloud], [p.y for p in cloud]
-        tooltips = own["tooltip"].tolist() if spec.tooltip and not slots else ()
-        series.append(PlotSeries(name, x, y, cast(Kind, spec.kind), styles[name], tooltips))
-        if spec.overlay == "power law" and (line := power_law(name, cloud, styles[name])):
+        x, y, tooltips = own["x"].tolist(), own["y"].tolist(), own["tooltip"].tolist()
+        clouds[name] = list(map(Point, x, y, tooltips))
+        if named:
+            held = dict(zip(zip(own["place"], x, strict=True), y, strict=True))
+            absent = 0.0 if spec.kind == "stack" else None
+            x, y = [x for _, x in places], [held.get(place, absent) for place in places]
+        about = tooltips if spec.tooltip and not named else ()
+        series.append(PlotSeries(name, x, y, cast(Kind, spec.kind), styles[name], about))
+        if spec.overlay == "power law" and (line := power_law(name, clouds[name], styles[name])):
             series.append(line)
     if spec.overlay == "front":
         series.append(front(clouds))
-    left_out = names[spec.most :] if spec.most else []
-    return spec.x.axis(), spec.y.axis(), series, points["place"].nunique(), left_out
+    panel = PlotPanel(spec.x.axis(), spec.y.axis(), tuple(series))
+    left_out = names[spec.most :] if spec.most else ()
+    return _Drawn(panel, points["place"].nunique(), left_out, spec.about)
 
 
 def _evaluated(spec: DeclaredPanel, frame: pd.DataFrame) -> pd.DataFrame:

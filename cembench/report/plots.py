@@ -84,6 +84,8 @@ class PlotPanel:
     y: Axis
     series: tuple[PlotSeries, ...]
     title: str = ""
+    #: What it is of, in a plot with a panel for each of some: a model, a policy.
+    of: str = ""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from cembench.report.declared_plots import (
     further_plots,
     own_plots,
     parse_plots,
-    plot_and_models,
 )
 from cembench.report.document import Text
 from cembench.report.plot_statistics import cost_ratios, fit, front
@@ -160,9 +159,9 @@ def test_a_front_has_the_means_that_no_other_beats():
 
 
 def test_a_model_without_a_panel_is_known(evidence):
-    plot, models = plot_and_models(evidence, "energy-by-iteration")
+    plot = declared_plot(evidence, "energy-by-iteration")
     assert (plot.name, plot.paper) == ("figure-8", "Figure 8")
-    assert models == ["Chinese Vase"]
+    assert [panel.of for panel in plot.panels] == ["Chinese Vase"]
 
 
 def test_the_angles_of_a_map_are_computed_where_nobody_has_seen_it(evidence):

@@ -9,9 +9,9 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench.report.content.difficulty import boundary_crowding, difficulties
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.many.found import many_findings
-from cembench.report.content.many.pairwise_wins import _wins, pairwise_wins
-from cembench.report.content.many.worst import HARDEST, hardest
+from cembench.report.content.findings import many_findings
+from cembench.report.content.many import HARDEST, hardest
+from cembench.report.content.pairwise_wins import _wins, pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
 from cembench.report.document import plain

@@ -1,43 +1,48 @@
-"""The whole report of a run."""
+"""The whole report of a run: of a paper, of the user's own surfaces, or over many surfaces."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from cembench import __version__
-from cembench.report.content import policies
-from cembench.report.content.both_policies import has_both_policies
+from cembench.core.version import installed_version
+from cembench.report.content import many, policies
 from cembench.report.content.claims import claims
-from cembench.report.content.evidence import REFERENCE, Evidence, MeasuredSurface, model_surface
-from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
+from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.exponents import exponents_table
-from cembench.report.content.failures import not_ok
-from cembench.report.content.findings import findings
+from cembench.report.content.findings import findings, many_findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
 from cembench.report.content.machines import machines_section
-from cembench.report.content.many.found import many_findings
-from cembench.report.content.many.section import is_many, many_section
-from cembench.report.content.many.worst import hardest
+from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.rates import rates_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
-from cembench.report.declared import declared_table
-from cembench.report.declared_plots import declared_plot, own_plots, plot_and_models
-from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
-from cembench.report.plots import Plot, write_plot
+from cembench.report.declared import declared_table, own_tables
+from cembench.report.declared_plots import declared_plot
+from cembench.report.document import (
+    ORIGINS,
+    Claim,
+    Figure,
+    Findings,
+    Item,
+    Report,
+    Section,
+    Table,
+    Text,
+    words,
+)
+from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
-from cembench.results.papers import Picture
 from cembench.results.records import MeshOrigin
 
 #: Receives progress: a text, the number of finished steps, and their total.
 Progress = Callable[[str, int, int], None]
-Inspections = Mapping[str, Inspection]
 
 #: The title of a paper's report goes before this.
 PAPER = ": its claims, tables and figures, measured"
@@ -52,13 +57,36 @@ _KINDS: Mapping[MeshOrigin, str] = {
 }
 
 
+@dataclass(frozen=True)
+class _Run:
+    """A run with what was seen of its surfaces; `shown` have a page each."""
+
+    evidence: Evidence
+    folder: Path
+    shown: Sequence[MeasuredSurface]
+    seen: Mapping[str, Inspection]
+
+    def plots(self, *names: str) -> list[Item]:
+        """Return declared plots, drawn."""
+        return drawn([declared_plot(self.evidence, name) for name in names], self.folder)
+
+    def tables(self, *names: str) -> list[Item]:
+        """Return declared tables."""
+        made = (declared_table(self.evidence, name) for name in names)
+        return [table for table in made if table]
+
+
+#: A section of a report; None if the run has nothing for it.
+_Maker = Callable[[_Run], Section | None]
+
+
 def build_report(
     evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
 ) -> Report:
     """Compute the contents of a run's report, and draw its figures into `folder`."""
     of_paper = is_of_the_paper(evidence)
-    many = is_many(evidence) and not of_paper
-    shown = hardest(evidence, evidence.policies[0]) if many else evidence.surfaces
+    over_many = many.is_many(evidence) and not of_paper
+    shown = many.hardest(evidence, evidence.policies[0]) if over_many else evidence.surfaces
     n = len(shown) + 1
     inspections: dict[str, Inspection] = {}
     pages = []
@@ -68,41 +96,36 @@ def build_report(
         seen = inspections[surface.mesh_hash] = next(inspected)
         pages.append(_page(evidence, surface, seen, folder))
     progress("tables, plots and claims", n - 1, n)
-    tested = claims(evidence, inspections) if of_paper else []
-    beyond = _beyond_the_paper(evidence, folder, by_surface=not many, of_paper=of_paper)
-    first = _first_plot(beyond)
-    sections = [] if many else [_summary(evidence, of_paper=of_paper)]
-    machines = machines_section(evidence)
-    sections += [machines] if machines else []
-    if many:
-        about_all = many_section(evidence, shown, inspections, folder)
-        first = _first_plot(about_all)
-        sections.append(about_all)
-        sections.append(_costs(evidence, folder, beyond))
-    elif of_paper:
-        sections += [
-            _tables(evidence),
-            Section("claims", "Claims of the paper", tuple(tested)),
-            _figures(evidence, inspections, folder),
-            beyond,
-        ]
-    else:
-        sections.append(_own(evidence, inspections, folder, beyond))
+    run = _Run(evidence, folder, shown, inspections)
+    makers = _OF_A_PAPER if of_paper else _OVER_MANY if over_many else _OF_OWN_SURFACES
+    sections = [section for make in makers if (section := make(run))]
     sections += exhibit_sections(evidence, folder)
-    if many:
+    if over_many:
         sections.append(Section("not-ok", "Cells without a valid map", (not_ok(evidence),)))
     sections.append(Section("surfaces", "Surfaces", (), tuple(pages)))
     progress("done", n, n)
-    found = many_findings(evidence) if many else findings(evidence, inspections, tested)
+    head = many_findings(evidence) if over_many else _findings(run, sections)
     return Report(
         title=evidence.paper.title + PAPER if of_paper else _title_of_own_surfaces(evidence),
-        findings=replace(found, plot=first),
+        findings=replace(head, plot=_first_plot(sections)),
         command=command,
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
         records=evidence.rows,
         paper=evidence.paper.citation if of_paper else None,
     )
+
+
+def _findings(run: _Run, sections: Sequence[Section]) -> Findings:
+    tested = [item for s in sections for item in s.items if isinstance(item, Claim)]
+    return findings(run.evidence, run.seen, tested)
+
+
+def _first_plot(sections: Sequence[Section]) -> Figure | None:
+    """Return the plot for the head of the report, from the sections on the run as a whole."""
+    chosen = [section for section in sections if section.name in ("beyond", "results", "many")]
+    plots = [i for s in chosen for i in s.items if isinstance(i, Figure)]
+    return next((f for f in plots if f.name in FIRST_PLOTS), plots[0] if plots else None)
 
 
 def is_of_the_paper(evidence: Evidence) -> bool:
@@ -152,7 +175,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
     for key, machine in evidence.store.environments().items():
         if key in used:
             found.append(("machine", _machine(machine)))
-    found.append(("report by", f"cembench {__version__}"))
+    found.append(("report by", f"cembench {installed_version()}"))
     return found
 
 
@@ -173,9 +196,33 @@ def _machine(about: Mapping[str, object]) -> str:
     )
 
 
-def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
-    if not of_paper:
-        return Section("summary", "What this is", (not_ok(evidence),))
+def not_ok(evidence: Evidence) -> Table | Text:
+    """Return a table of cells that did not end ok or are missing; a sentence if there is none."""
+    declared = own_tables()["not-ok"]
+    table = declared_table(evidence, "not-ok")
+    held = {record.cell.key for record in evidence.store.records()}
+    again = "requested but not finished: run the same `cembench run` again to resume"
+    missing = tuple(
+        tuple(map(words, (cell.mesh, cell.algorithm, cell.solves, "missing", again)))
+        for cell in evidence.store.plan()
+        if cell.key not in held
+    )
+    if table is None and not missing:
+        return Text(f"All {len(evidence.records)} cells ended ok.")
+    rows = table.rows if table else ()
+    title = (
+        f"{len(rows)} of {len(evidence.records)} cells did not end ok; {len(missing)} are missing"
+    )
+    columns = tuple(column.heading for column in declared.columns)
+    return Table("not-ok", title, columns, (*rows, *missing), declared.caption)
+
+
+def _own_summary(run: _Run) -> Section:
+    return Section("summary", "What this is", (not_ok(run.evidence),))
+
+
+def _paper_summary(run: _Run) -> Section:
+    evidence = run.evidence
     marks = "; ".join(
         f"{words}{f' ({mark})' if mark else ''}" for words, mark in ORIGINS.values() if words
     )
@@ -197,9 +244,9 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
     return Section("summary", "What this is", tuple(items))
 
 
-def _tables(evidence: Evidence) -> Section:
+def _tables(run: _Run) -> Section:
     """Return the paper's tables, each comparison of seconds with its averages and certainty."""
-    printed = evidence.paper.printed
+    evidence, printed = run.evidence, run.evidence.paper.printed
     items: list[Item] = []
     for number in sorted(printed):
         if printed[number].compares:
@@ -212,72 +259,44 @@ def _tables(evidence: Evidence) -> Section:
     return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
 
 
-def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
-    items: list[Item] = []
-    gaps: list[Gap] = []
-    for picture in evidence.paper.pictures:
-        found = _pictures(evidence, inspections, picture)
-        if found:
-            items += found
-        else:
-            gaps.append(model_gap(evidence, picture.model, picture.figure, inspections))
-    for name in ("energy-by-iteration", "angle-histograms"):
-        plot, lacking = _of_models(evidence, name, inspections)
-        items += _drawn([plot], folder)
-        gaps += lacking
-    items += _declared(evidence, folder, "cost-by-faces")
-    items.append(exponents_table(evidence))
-    items += _declared(evidence, folder, "energy-over-models", "angles-over-models")
-    gaps += exhibit_gaps(evidence)
-    return Section("figures", "Figures of the paper", (*items, *gaps))
+def _machines(run: _Run) -> Section | None:
+    return machines_section(run.evidence)
 
 
-def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> list[Figure]:
-    """Return CEM's pictures of a model, as in the paper."""
-    figure, model = wanted.figure, wanted.model
-    surface = evidence.surface_for_model(model)
-    series = evidence.series_of(REFERENCE)
-    if surface is None or series is None:
+def _claims(run: _Run) -> Section:
+    return Section("claims", "Claims of the paper", tuple(claims(run.evidence, run.seen)))
+
+
+def _figures(run: _Run) -> Section:
+    return figures_section(run.evidence, run.seen, run.folder)
+
+
+#: Plots of time, and tables of what does not compare with the rest.
+_TIMES = ("performance-profile", "accuracy-against-time", "time-by-phase")
+
+
+def _beside(run: _Run) -> list[Item]:
+    """Return the tables of maps that do not go to the disk, and of programs of others."""
+    external = any(record.external for record in run.evidence.records)
+    return run.tables("other-targets", *(["beside-others"] if external else []))
+
+
+def _policies(run: _Run) -> list[Item]:
+    """Return tables and a plot of both policies; empty if the run has one."""
+    if not policies.has_both_policies(run.evidence):
         return []
-    seen = inspections[surface.mesh_hash]
-    checkerboard = seen.checkerboards.get(series.label)
-    if checkerboard is None:
-        return []
-    kinds = {"checkerboard": checkerboard, "curvature": seen.curvature, "mesh": seen.mesh}
-    chosen = [kinds[kind] for kind in wanted.shows]
-    return [
-        Figure(
-            f"{figure.lower().replace(' ', '-')}-{k + 1}",
-            f"{model} ({surface.origin}) and its map by CEM: {picture.title}",
-            picture.files,
-            picture.caption,
-            alternative=picture.alternative,
-            paper=figure,
-        )
-        for k, picture in enumerate(chosen)
-        if picture
-    ]
+    made = (policies.policies_table(run.evidence), policies.speedups_table(run.evidence))
+    return [*made, *run.plots("reuse-against-backslash")]
 
 
-def _beyond_the_paper(
-    evidence: Evidence, folder: Path, *, by_surface: bool, of_paper: bool
-) -> Section:
-    # Over many surfaces, the profile of the time stands beside those of accuracy.
-    profiles = ["performance-profile"] if by_surface else []
-    items = _declared(evidence, folder, *profiles, "accuracy-against-time", "time-by-phase")
-    if not of_paper:  # otherwise it is below Table 2
-        for policy in evidence.policies:
-            items += sure_speedups(evidence, policy)
-    if has_both_policies(evidence):
-        items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
-        items += _declared(evidence, folder, "reuse-against-backslash")
-    else:
-        items.append(policies.one_policy_gap(evidence))
-    if by_surface:
-        external = any(record.external for record in evidence.records)
-        names = ("other-targets", *(("beside-others",) if external else ()))
-        items += [table for name in names if (table := declared_table(evidence, name))]
-    return Section("beyond", "Beyond the paper", tuple(items))
+def _certain(run: _Run) -> list[Item]:
+    return [t for policy in run.evidence.policies for t in sure_speedups(run.evidence, policy)]
+
+
+def _beyond_the_paper(run: _Run) -> Section:
+    both = _policies(run) or [policies.one_policy_gap(run.evidence)]
+    items = (*run.plots(*_TIMES), *both, *_beside(run))
+    return Section("beyond", "Beyond the paper", items)
 
 
 def _title_of_own_surfaces(evidence: Evidence) -> str:
@@ -289,75 +308,39 @@ def _title_of_own_surfaces(evidence: Evidence) -> str:
     return f"{of}, mapped by {algorithms} algorithm{'s' if algorithms > 1 else ''}"
 
 
-def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Section) -> Section:
+def _own_results(run: _Run) -> Section:
     """Return the section for other surfaces, without the paper's columns and claims."""
+    evidence = run.evidence
     items: list[Item] = [
         figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
         for surface in evidence.surfaces
     ]
     items += work_tables(evidence)
-    items += [item for item in beyond.items if not isinstance(item, Gap)]
-    for name in ("angle-histograms", "energy-by-iteration"):
-        items += _drawn([_of_models(evidence, name, inspections)[0]], folder)
-    items += _declared(evidence, folder, "cost-by-faces")
+    items += (*run.plots(*_TIMES), *_certain(run), *_policies(run), *_beside(run))
+    of_models = [paper_plot(evidence, name, run.seen) for name in reversed(OF_MODELS)]
+    items += (*drawn(of_models, run.folder), *run.plots("cost-by-faces"))
     return Section("results", "Results", tuple(items))
 
 
-def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
+def _many(run: _Run) -> Section:
+    return many.many_section(run.evidence, run.shown, run.seen, run.folder)
+
+
+def _costs(run: _Run) -> Section:
     """Return the section on cost over all surfaces."""
-    items: list[Item] = [item for item in beyond.items if isinstance(item, Table | Figure)]
-    items += _declared(evidence, folder, "cost-by-faces")
-    items.append(exponents_table(evidence))
-    return Section("costs", "What maps cost", tuple(items))
+    # The profile of the time is beside those of accuracy.
+    items = (*run.plots(*_TIMES[1:]), *_certain(run), *_policies(run))
+    exponents = (*run.plots("cost-by-faces"), exponents_table(run.evidence))
+    return Section("costs", "What maps cost", (*items, *exponents))
 
 
-def _first_plot(section: Section) -> Figure | None:
-    """Return the plot for the head of the report, from this section."""
-    figures = [item for item in section.items if isinstance(item, Figure)]
-    return next((f for f in figures if f.name in FIRST_PLOTS), figures[0] if figures else None)
+_OF_A_PAPER: tuple[_Maker, ...] = (
+    _paper_summary, _machines, _tables, _claims, _figures, _beyond_the_paper,
+)  # fmt: skip
+_OF_OWN_SURFACES: tuple[_Maker, ...] = (_own_summary, _machines, _own_results)
+_OVER_MANY: tuple[_Maker, ...] = (_machines, _many, _costs)
 
 
 def _page(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, folder: Path) -> Section:
     page, plot = surface_page(evidence, surface, seen)
-    items = (*page.items, *_drawn([plot], folder))
-    return Section(page.name, page.title, items, page.sections, page.page)
-
-
-def _declared(evidence: Evidence, folder: Path, *names: str) -> list[Item]:
-    known = own_plots(evidence)
-    return _drawn([declared_plot(evidence, name) for name in names if name in known], folder)
-
-
-def _of_models(
-    evidence: Evidence, name: str, inspections: Inspections
-) -> tuple[Plot | None, list[Gap]]:
-    """Return a plot of the paper's models in the run, and a gap for each missing one."""
-    spec = own_plots(evidence).get(name)
-    if spec is None:
-        return None, []
-    plot, drawn = plot_and_models(evidence, name, spec, seen=inspections)
-    absent = [model for model in spec.models if model not in drawn]
-    return plot, [model_gap(evidence, model, spec.figure, inspections) for model in absent]
-
-
-def model_gap(evidence: Evidence, model: str, figure: str, seen: Inspections) -> Gap:
-    """Return the gap for a model without a map by CEM in the run, or without the map itself."""
-    surface = evidence.surface_for_model(model)
-    series = evidence.series_of(REFERENCE)
-    record = evidence.find(surface, series) if surface and series else None
-    if surface and record and record.outcome.status == "ok" and not seen[surface.mesh_hash].kept:
-        return Gap(f"{figure}: {model}", seen[surface.mesh_hash].missing_reason)
-    why = (
-        evidence.missing_reason(record)
-        if surface
-        else "no surface of this run is or stands in for it"
-    )
-    return Gap(
-        f"{figure}: {model}",
-        f"no map of {model} by CEM: {why}.",
-        f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
-    )
-
-
-def _drawn(plots: Sequence[Plot | None], folder: Path) -> list[Item]:
-    return [write_plot(plot, folder) for plot in plots if plot]
+    return replace(page, items=(*page.items, *drawn([plot], folder)))
