@@ -109,7 +109,7 @@ def test_wins_are_counted_both_ways_and_failures_lose(evidence):
 
 
 def test_equal_figures_and_untried_surfaces_are_no_win():
-    first = [1.0, 2.0, np.inf, np.inf, None]
+    first = [1.0, 2.0, np.inf, np.inf, np.nan]
     second = [1.0 + 1e-9, 1.0, 5.0, np.inf, 1.0]
     assert _wins(first, second) == (0, 2)
 

@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 
 from cembench.report.content.by_surface import hardest_table
-from cembench.report.content.difficulty import best_record
+from cembench.report.content.difficulty import best_maps
 from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.pairwise_wins import pairwise_wins
@@ -27,13 +27,9 @@ def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
 
     Surfaces without any map come first.
     """
-
-    def error(surface: MeasuredSurface) -> float:
-        best = best_record(evidence, surface, policy)
-        found = None if best is None else best.outcome.metrics.get(ANGLE)
-        return inf if found is None else float(found)
-
-    return tuple(sorted(evidence.surfaces, key=error, reverse=True)[:HARDEST])
+    errors = best_maps(evidence, policy)[ANGLE].to_dict()
+    by_error = sorted(evidence.surfaces, key=lambda s: errors.get(s.mesh_hash, inf), reverse=True)
+    return tuple(by_error[:HARDEST])
 
 
 def hardest_gallery(
@@ -43,13 +39,9 @@ def hardest_gallery(
     inspections: Mapping[str, Inspection],
 ) -> Gallery | None:
     """Return the best map of each of these surfaces; None if the run saved no surface."""
-    figures = []
-    for surface in surfaces:
-        seen = inspections.get(surface.mesh_hash)
-        best = best_record(evidence, surface, policy)
-        labels = [s.label for s in evidence.series if best and evidence.find(surface, s) is best]
-        drawn = [seen.checkerboards[name] for name in labels if seen and name in seen.checkerboards]
-        figures += drawn[:1]
+    labels = best_maps(evidence, policy)["label"].to_dict()
+    best = [(inspections[s.mesh_hash].checkerboards, labels.get(s.mesh_hash)) for s in surfaces]
+    figures = [maps[label] for maps, label in best if label in maps]
     if not figures:
         return None
     return Gallery(
