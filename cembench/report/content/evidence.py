@@ -401,14 +401,6 @@ def figure_of(record: Record, metric: str) -> float:
     return inf if record.outcome.status != "ok" or found is None else float(found)
 
 
-def figure(
-    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str, metric: str
-) -> float | None:
-    """Return a figure of a map; infinite if the cell did not end ok, None if not tried."""
-    record = evidence.find(surface, series, policy)
-    return None if record is None else figure_of(record, metric)
-
-
 def model_surface(model: str) -> str:
     """Return the name of the registered stand-in for a model, or the model's name."""
     from cembench.registry import load_registry

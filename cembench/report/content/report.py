@@ -217,10 +217,6 @@ def not_ok(evidence: Evidence) -> Table | Text:
     return Table("not-ok", title, columns, (*rows, *missing), declared.caption)
 
 
-def _own_summary(run: _Run) -> Section:
-    return Section("summary", "What this is", (not_ok(run.evidence),))
-
-
 def _paper_summary(run: _Run) -> Section:
     evidence = run.evidence
     marks = "; ".join(
@@ -257,18 +253,6 @@ def _tables(run: _Run) -> Section:
             items += work_tables(evidence)
     numbers = sorted(evidence.paper.tables)
     return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
-
-
-def _machines(run: _Run) -> Section | None:
-    return machines_section(run.evidence)
-
-
-def _claims(run: _Run) -> Section:
-    return Section("claims", "Claims of the paper", tuple(claims(run.evidence, run.seen)))
-
-
-def _figures(run: _Run) -> Section:
-    return figures_section(run.evidence, run.seen, run.folder)
 
 
 #: Plots of time, and tables of what does not compare with the rest.
@@ -322,10 +306,6 @@ def _own_results(run: _Run) -> Section:
     return Section("results", "Results", tuple(items))
 
 
-def _many(run: _Run) -> Section:
-    return many.many_section(run.evidence, run.shown, run.seen, run.folder)
-
-
 def _costs(run: _Run) -> Section:
     """Return the section on cost over all surfaces."""
     # The profile of the time is beside those of accuracy.
@@ -335,10 +315,23 @@ def _costs(run: _Run) -> Section:
 
 
 _OF_A_PAPER: tuple[_Maker, ...] = (
-    _paper_summary, _machines, _tables, _claims, _figures, _beyond_the_paper,
-)  # fmt: skip
-_OF_OWN_SURFACES: tuple[_Maker, ...] = (_own_summary, _machines, _own_results)
-_OVER_MANY: tuple[_Maker, ...] = (_machines, _many, _costs)
+    _paper_summary,
+    lambda run: machines_section(run.evidence),
+    _tables,
+    lambda run: Section("claims", "Claims of the paper", tuple(claims(run.evidence, run.seen))),
+    lambda run: figures_section(run.evidence, run.seen, run.folder),
+    _beyond_the_paper,
+)
+_OF_OWN_SURFACES: tuple[_Maker, ...] = (
+    lambda run: Section("summary", "What this is", (not_ok(run.evidence),)),
+    lambda run: machines_section(run.evidence),
+    _own_results,
+)
+_OVER_MANY: tuple[_Maker, ...] = (
+    lambda run: machines_section(run.evidence),
+    lambda run: many.many_section(run.evidence, run.shown, run.seen, run.folder),
+    _costs,
+)
 
 
 def _page(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, folder: Path) -> Section:
