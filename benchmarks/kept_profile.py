@@ -18,7 +18,7 @@ from typing import Any
 from benchmarks.pages import ROOT
 from cembench.core.atomic import write_bytes, write_text
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.figures.performance_profile import performance_profile
+from cembench.report.declared_plots import declared_plot
 from cembench.report.plots import Plot, write_plot
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 from cembench.results.store import Store
@@ -71,7 +71,7 @@ def _record(row: dict[str, Any]) -> Record:
 def main(folders: list[str]) -> None:
     """Draw the profiles."""
     for name in folders or KEPT:
-        plot = performance_profile(evidence_of(ROOT / name))
+        plot = declared_plot(evidence_of(ROOT / name), "performance-profile")
         if plot is not None:
             keep(plot, ROOT / name)
             print(f"{name}: {', '.join(panel.title for panel in plot.panels)}\n{plot.caption}")

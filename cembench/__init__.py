@@ -117,9 +117,9 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
-        from importlib.metadata import version
+        from cembench.core.version import installed_version
 
-        return version("cembench")
+        return installed_version()
     if name not in _PLACE_OF:
         raise AttributeError(f"module 'cembench' has no attribute {name!r}")
     value = getattr(importlib.import_module(_PLACE_OF[name]), name)

@@ -46,6 +46,8 @@ def violations(rooms, package=PACKAGE):
             continue  # the package's own __init__ offers names of all layers
         for name in imported(file):
             there = room_of(name)
+            if name.startswith("cembench.__"):
+                yield f"{file.relative_to(package)} imports {name} of the package's face"
             if there in ("algorithms", "papers", "surfaces"):
                 yield f"{file.name} imports the plug-in {name} by name"
             elif there in rooms and rooms.index(there) > rooms.index(here):
@@ -97,6 +99,12 @@ def test_every_room_has_a_budget():
 def test_an_upward_import_would_be_found(tmp_path):
     (tmp_path / "mesh").mkdir()
     (tmp_path / "mesh/files.py").write_text("def f():\n    from cembench.report import html\n")
+    assert len(list(violations(layers(), tmp_path))) == 1
+
+
+def test_an_import_of_the_package_s_face_would_be_found(tmp_path):
+    (tmp_path / "report").mkdir()
+    (tmp_path / "report/page.py").write_text("from cembench import __version__\n")
     assert len(list(violations(layers(), tmp_path))) == 1
 
 

@@ -95,9 +95,9 @@ app = typer.Typer(
 
 def _print_version(asked: bool) -> None:
     if asked:
-        from cembench import __version__
+        from cembench.core.version import installed_version
 
-        out.print(f"cembench {__version__}")
+        out.print(f"cembench {installed_version()}")
         raise typer.Exit
 
 

@@ -24,7 +24,7 @@ Output = Annotated[
 
 Tables = Annotated[
     list[Path],
-    typer.Option("--tables", help="A TOML file that declares more tables. Repeatable."),
+    typer.Option("--tables", help="A TOML file that declares more tables and plots. Repeatable."),
 ]
 PaperName = Annotated[
     str | None,
@@ -53,7 +53,7 @@ def report(
 
     The folder holds index.html (one file that works offline), report.md,
     report.tex, and each table, figure and its data as separate files. The four
-    tables are printed here too. --tables adds tables of your own; docs/tables.md
+    tables are printed here too. --tables adds tables and plots of your own; docs/tables.md
     says how they are declared.
     """
     written, folder = make_report(run, output, tables=tables, paper=paper, verify=verify)

@@ -181,6 +181,8 @@ def _declarations(text: str, where: str) -> dict[str, DeclaredTable]:
         raise ParameterError(f"{where} is not TOML: {error}.") from error
     found = {}
     for name, table in given.items():
+        if name == "plots":  # cembench.report.declared_plots reads these
+            continue
         try:
             found[name] = DeclaredTable.model_validate(table)
         except ValidationError as error:

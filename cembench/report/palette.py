@@ -29,13 +29,9 @@ _KNOWN = {
 }
 _COLOURS = ("#7f5f00", "#4d4d4d", "#8c564b", "#5f6b9a", "#3b7d7d", "#a0405f")
 _MARKERS = (
-    ("X", "x"),
-    ("<", "triangle-left"),
-    (">", "triangle-right"),
-    ("p", "pentagon"),
-    ("h", "hexagon"),
-    ("*", "star"),
-)
+    ("X", "x"), ("<", "triangle-left"), (">", "triangle-right"), ("p", "pentagon"),
+    ("h", "hexagon"), ("*", "star"),
+)  # fmt: skip
 _DASHES = (("-", "solid"), ("--", "dash"), (":", "dot"), ("-.", "dashdot"))
 
 
@@ -57,19 +53,9 @@ PLAIN = SeriesStyle("#6b7683", ("o", "circle"), (":", "dot"))
 #: Colours for the phases of a call and for the remainder: paler than those of algorithms and
 #: different from them, because both occur in one legend.
 PARTS = (
-    "#77aadd",
-    "#ee8866",
-    "#44bb99",
-    "#eedd88",
-    "#ffaabb",
-    "#bbcc33",
-    "#99ddff",
-    "#c2a5cf",
-    "#d9b48f",
-    "#aaaa00",
-    "#8da0cb",
-    "#a9c7b4",
-)
+    "#77aadd", "#ee8866", "#44bb99", "#eedd88", "#ffaabb", "#bbcc33", "#99ddff", "#c2a5cf",
+    "#d9b48f", "#aaaa00", "#8da0cb", "#a9c7b4",
+)  # fmt: skip
 REST = "#b3b9c0"
 
 
@@ -77,3 +63,15 @@ def series_styles(names: Sequence[str]) -> dict[str, SeriesStyle]:
     """Return a style for each name: fixed for known algorithms, others in turn."""
     others = [name for name in dict.fromkeys(names) if name not in _KNOWN]
     return _KNOWN | {name: _another(k) for k, name in enumerate(others)}
+
+
+#: Phases with a colour of their own, the same in every plot.
+_PHASES = (
+    "solves", "factorisation", "assembly", "laplacian", "ordering", "symbolic", "boundary",
+    "beltrami", "boundary step", "folds", "energy", "start",
+)  # fmt: skip
+
+
+def phase_style(phase: str) -> SeriesStyle:
+    """Return the colour of a phase; the remainder and phases of plug-ins are grey."""
+    return SeriesStyle(PARTS[_PHASES.index(phase)] if phase in _PHASES else REST)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any, Literal, NamedTuple
@@ -25,7 +25,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from PIL import Image
 
 from cembench.core.atomic import write_bytes, write_text
-from cembench.report.document import Figure
+from cembench.report.document import Figure, Item
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.shared_drawing import draw
 
@@ -84,6 +84,8 @@ class PlotPanel:
     y: Axis
     series: tuple[PlotSeries, ...]
     title: str = ""
+    #: What it is of, in a plot with a panel for each of some: a model, a policy.
+    of: str = ""
 
 
 @dataclass(frozen=True)
@@ -147,6 +149,11 @@ def write_plot(plot: Plot, folder: Path) -> Figure:
         alternative=plot.alternative,
         paper=plot.paper,
     )
+
+
+def drawn(items: Iterable[Plot | Item | None], folder: Path) -> list[Item]:
+    """Return a report's items with plots as figures, drawn into ``folder/figures``."""
+    return [write_plot(one, folder) if isinstance(one, Plot) else one for one in items if one]
 
 
 def _draw_into(plot: Plot, place: Path) -> None:

@@ -18,12 +18,12 @@ from math import exp, log
 from pathlib import Path
 from statistics import mean
 
-from cembench import __version__
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable, write_text
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.names import distinct_slugs
+from cembench.core.version import installed_version
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import build_report
 from cembench.report.palette import series_styles
@@ -214,7 +214,7 @@ def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
             style=template_text("site.css"),
             drawn=len(runs) > 1 and bool(told),
             starred=any(one and not one.common for row in told.values() for one in row),
-            version=__version__,
+            version=installed_version(),
         )
     )
     write_text(draft / "index.html", page)

@@ -23,9 +23,11 @@ from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import Progress, build_report
 from cembench.report.declared import further_tables
+from cembench.report.declared_plots import further_plots
 from cembench.report.document import Report
 from cembench.report.export import export_rows
 from cembench.report.export_format import Format
+from cembench.report.plots import drawn
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv
@@ -45,8 +47,9 @@ def write_report(
 ) -> Report:
     """Write the report of a run in all its forms; `jobs` processes draw its pictures and plots.
 
-    `tables` are files with declarations of more tables (:mod:`cembench.report.declared`). `paper`
-    is the one it is of; default: the one with most rows of the run.
+    `tables` are files with declarations of more tables and plots (:mod:`cembench.report.declared`,
+    :mod:`cembench.report.declared_plots`). `paper` is the one it is of; default: the one with most
+    rows of the run.
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -65,13 +68,18 @@ def write_report(
     """
     require(Extra.REPORT, "a report")
     evidence = Evidence.of(run, paper)
-    more = further_tables(evidence, tables)
+    further = further_tables(evidence, tables)
+    plots = [further_plots(evidence, path, k) for k, path in enumerate(tables, start=1)]
     folders.check(folder, "report")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
             with shared_drawing(jobs):
                 report = build_report(evidence, draft, command, progress)
+                more = [
+                    replace(section, items=(*section.items, *drawn(declared, draft)))
+                    for section, declared in zip(further, plots, strict=True)
+                ]
                 report = replace(report, sections=(*report.sections, *more))
             _write_all(report, evidence, draft)
             folders.publish(draft, folder, "report")

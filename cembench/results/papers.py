@@ -1,9 +1,9 @@
 """Papers: folders of data with printed tables, misprints, claims and how the paper was run.
 
 A folder holds `paper.toml`, `tables.toml` with the CSV files that it names and, if wanted,
-`runs.toml`, `claims.toml` and `checks.py`, the numerics of claims. `papers/cem` is an example.
-Installed papers are found by the entry points of the group ``cembench.papers``, each of which names
-the package that is the folder.
+`runs.toml`, `figures.toml`, `claims.toml` and `checks.py`, the numerics of claims. `papers/cem` is
+an example. Installed papers are found by the entry points of the group ``cembench.papers``, each of
+which names the package that is the folder.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Group of the entry points of papers.
 GROUP = "cembench.papers"
 #: Files that a paper need not have.
-_OPTIONAL = ("runs.toml", "claims.toml")
+_OPTIONAL = ("runs.toml", "figures.toml", "claims.toml")
 #: Fields in which names in braces stand for words and numbers.
 _PROSE = frozenset({"title", "caption", "quote", "place", "test", "remark"})
 REMEDY = "Repair it; papers/cem is an example."
@@ -43,16 +43,9 @@ _ELSEWHERE = {
     **dict.fromkeys(("tables", "printed", "errata"), "tables.toml"),
     **dict.fromkeys(("claims", "numbers"), "claims.toml"),
     "runs": "runs.toml",
+    "plots": "figures.toml",
 }
 
-#: The plots of the report that can be a figure of a paper.
-PlotName = Literal[
-    "energy_by_iteration",
-    "angle_histograms",
-    "cost_by_faces",
-    "energy_over_models",
-    "angles_over_models",
-]
 #: Printed figures of a model by column; None where the paper has a dash.
 Row = Mapping[str, float | None]
 
@@ -89,8 +82,12 @@ class Picture(_Part):
 
 
 class PlottedFigure(_Part):
-    """A figure that a plot of the report shows, with a panel for each model where it has any."""
+    """A figure that a plot shows, with a panel for each model where it has any.
 
+    Its other keys declare the plot (:mod:`cembench.report.declared_plots`).
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
     figure: str = ""
     models: tuple[str, ...] = ()
 
@@ -241,7 +238,7 @@ class Paper(_Part):
     #: Averages in its text, by what is averaged and by algorithm.
     stated: Mapping[Literal["rate", "saving"], Mapping[str, float]] = {}
     pictures: tuple[Picture, ...] = ()
-    plots: Mapping[PlotName, PlottedFigure] = {}
+    plots: Mapping[str, PlottedFigure] = {}
     exhibits: tuple[ExpectedExhibit, ...] = ()
     #: The printed tables with their misprints, by number, model and column.
     tables: Mapping[int, Mapping[str, Row]] = {}
@@ -288,7 +285,7 @@ class Paper(_Part):
         """Return the number of triangles of a model."""
         return self.count(model, "faces")
 
-    def plotted(self, plot: PlotName) -> PlottedFigure:
+    def plotted(self, plot: str) -> PlottedFigure:
         """Return the figure that is plotted in this way; an empty one if there is none."""
         return self.plots.get(plot, PlottedFigure())
 
@@ -405,6 +402,7 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         "tables": tables,
         "printed": printed,
         "errata": listed.get("errata", ()),
+        "plots": _read_toml(folder / "figures.toml"),
         "runs": _read_toml(folder / "runs.toml", ("runs",)).get("runs", ()),
         "claims": _spelled_out(folder / "claims.toml", claimed, "claims", words),
         "numbers": claimed.get("numbers", {}),
@@ -463,8 +461,8 @@ def _read_text(file: Path) -> str:
         raise RegistryError(f"{file} of a paper cannot be read: {why}. {REMEDY}") from error
 
 
-def _read_toml(file: Path, allowed: Collection[str]) -> dict[str, Any]:
-    """Return what a file holds under these names; nothing if it is left out and may be."""
+def _read_toml(file: Path, allowed: Collection[str] | None = None) -> dict[str, Any]:
+    """Return what a file holds under these names, or any; nothing if it is left out and may be."""
     if file.name in _OPTIONAL and not file.exists():
         return {}
     try:
@@ -472,7 +470,7 @@ def _read_toml(file: Path, allowed: Collection[str]) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise RegistryError(f"{file} is not TOML: {error}. {REMEDY}") from error
     for name in read:
-        if name not in allowed:
+        if allowed is not None and name not in allowed:
             raise _wrong(file, "at the top", _unknown(name, allowed))
     return read
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 
 import pytest
 
-from cembench.report.content.as_good import as_good
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.figures.performance_profile import shown_series
 from cembench.report.content.findings import findings
 from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
 from cembench.report.content.report import is_of_the_paper
+from cembench.report.content.standings import as_good
+from cembench.report.declared_plots import declared_plot
 from cembench.report.document import VERDICTS, Claim, plain
 from cembench.results.papers import find_paper
 from tests.report.small_run import write_run
@@ -248,7 +248,8 @@ def test_variants_tried_on_fewer_surfaces_are_left_out_of_a_profile(tmp_path):
     evidence = Evidence.of(store.folder)
     more = replace(evidence, records=(*evidence.records, one.model_copy(update={"cell": cell})))
     assert len(more.disk_series) == len(evidence.disk_series) + 1
-    assert {s.label for s in shown_series(more, "reuse")} == {s.label for s in evidence.disk_series}
+    panel = declared_plot(more, "performance-profile").panels[0]
+    assert {series.name for series in panel.series} == {s.label for s in evidence.disk_series}
 
 
 def test_the_head_says_how_many_times_are_unstable(evidence):

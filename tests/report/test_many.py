@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
+from cembench.report.content.difficulty import boundary_crowding, difficulties
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.many.accuracy_profiles import accuracy_profiles
-from cembench.report.content.many.difficulty import boundary_crowding, difficulties
-from cembench.report.content.many.found import many_findings
-from cembench.report.content.many.pairwise_wins import _wins, pairwise_wins
-from cembench.report.content.many.worst import HARDEST, hardest
+from cembench.report.content.findings import many_findings
+from cembench.report.content.many import HARDEST, hardest
+from cembench.report.content.pairwise_wins import _wins, pairwise_wins
 from cembench.report.declared import declared_table
+from cembench.report.declared_plots import declared_plot
 from cembench.report.document import plain
 from cembench.report.run_tables import many_table
 from cembench.report.write_report import write_report
@@ -80,7 +80,7 @@ def test_the_interval_of_a_share_holds_it_and_says_something_at_the_ends(k):
 
 
 def test_a_profile_ends_at_the_success_rate_and_the_best_starts_highest(evidence):
-    plot = accuracy_profiles(evidence, "reuse")
+    plot = declared_plot(evidence, "accuracy-profiles")
     angles = plot.panels[0]
     assert angles.title == f"mean angle error, n = {COUNT}"
     ends = {line.name: line.y[-1] for line in angles.series}
@@ -109,7 +109,7 @@ def test_wins_are_counted_both_ways_and_failures_lose(evidence):
 
 
 def test_equal_figures_and_untried_surfaces_are_no_win():
-    first = [1.0, 2.0, np.inf, np.inf, None]
+    first = [1.0, 2.0, np.inf, np.inf, np.nan]
     second = [1.0 + 1e-9, 1.0, 5.0, np.inf, 1.0]
     assert _wins(first, second) == (0, 2)
 

@@ -7,12 +7,9 @@ import pytest
 
 from cembench.report import plots
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.figures.cost_by_faces import cost_by_faces, fit, printed_points
-from cembench.report.content.figures.energy_by_iteration import energy_by_iteration
-from cembench.report.content.figures.performance_profile import performance_profile, ratios
-from cembench.report.content.figures.time_by_phase import time_by_phase
+from cembench.report.declared_plots import declared_plot
 from cembench.report.palette import PARTS, series_styles
-from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, Point, plotly_of, write_plot
+from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, plotly_of, write_plot
 from cembench.results.papers import find_paper
 from tests.report.small_run import meshes, ok, record, write_run
 
@@ -84,42 +81,25 @@ def test_thirty_algorithms_have_styles_of_their_own():
     assert len({(found[name].colour, found[name].dash) for name in names}) == len(names)
 
 
-def test_a_fitted_exponent_is_that_of_a_power_law():
-    points = [Point(n, 1e-6 * n**1.25) for n in (100, 1_000, 50_000, 10**6)]
-    law = fit(points)
-    assert law.exponent == pytest.approx(1.25)
-    assert law.error == pytest.approx(0, abs=1e-6)
-    assert fit(points[:2]) is None
-    assert fit([points[0]] * 5) is None
-
-
-def test_the_printed_seconds_have_their_exponents():
-    paper = find_paper("cem")
-    x, y = np.log([p[:2] for p in printed_points(paper, "cem")]).T
-    fitted = fit(printed_points(paper, "cem"))
-    assert fitted.exponent == pytest.approx(np.polyfit(x, y, 1)[0])
-    assert len(printed_points(paper, "fdm")) == 18
-
-
-def test_a_failure_counts_as_infinitely_slow_in_a_profile(evidence):
-    found, used = ratios(evidence, "reuse")
-    assert used == ["Chinese Vase", "Liu's Neutral Face"]  # LDM was not tried on the third
-    assert found["QIEM"][0] == np.inf
-    panel = performance_profile(evidence).panels[0]
-    curves = {series.name: series.y for series in panel.series}
-    assert max(curves["QIEM"]) == 50
-    assert max(curves["CEM"]) == 100
-    assert "LSCM" not in curves
+def test_the_printed_seconds_have_their_exponents(evidence):
+    seconds = find_paper("cem").tables[1]
+    x, y = np.log([(row["faces"], row["cem"]) for row in seconds.values()]).T
+    panel = declared_plot(evidence, "cost-by-faces").panels[-1]
+    points, line = (series for series in panel.series if series.name.startswith("CEM"))
+    assert len(points.x) == len(seconds)
+    slope = np.polyfit(x, y, 1)[0]
+    assert np.diff(np.log(line.y)) / np.diff(np.log(line.x)) == pytest.approx(slope)
+    assert len(next(series for series in panel.series if series.name == "FDM").x) == 18
 
 
 def test_the_phases_of_every_algorithm_add_up_to_all_of_its_time(evidence):
-    panel = time_by_phase(evidence).panels[0]
+    panel = declared_plot(evidence, "time-by-phase").panels[0]
     total = np.sum([series.y for series in panel.series], axis=0)
     np.testing.assert_allclose(total, 100)
 
 
 def test_cost_is_shown_by_policy_beside_the_printed(evidence):
-    titles = [panel.title for panel in cost_by_faces(evidence).panels]
+    titles = [panel.title for panel in declared_plot(evidence, "cost-by-faces").panels]
     assert titles == [
         "measured here, solves: reuse",
         "measured here, solves: backslash",
@@ -133,8 +113,7 @@ def test_energies_of_algorithms_not_in_the_paper_stand_beside_those_of_cem(tmp_p
     outcome, uv = ok("direct-cem", vase, 1.0)
     rival = record("direct-cem", vase, "Chinese Vase", "reuse", outcome)
     store.save(rival, uv, {"id": "machine", "cpu": "x"})
-    plot, _ = energy_by_iteration(Evidence.of(tmp_path))
-    (panel,) = plot.panels
+    (panel,) = declared_plot(Evidence.of(tmp_path), "energy-by-iteration").panels
     assert [series.name for series in panel.series] == ["CEM", "Direct CEM"]
     assert panel.series[1].y[-1] < panel.series[0].y[0]
 

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
 DISK = "disk"
 #: The metric by which maps of all targets are compared: mean angle error in degrees.
 ANGLE = "angle_error_mean_deg"
+#: A map is as good as another if its mean angle error is at most this many times as large, or this
+#: many degrees larger.
+AS_GOOD, DEGREES = 1.25, 0.25
 Row = Mapping[str, Any]
 #: Parameters that distinguish two cells of an algorithm, besides surface and policy.
 Variant = tuple[tuple[str, str], ...]
@@ -146,10 +149,19 @@ class Evidence:
 
     @cached_property
     def frame(self) -> pd.DataFrame:
-        """The records as a frame, a row each, by surface, series and policy."""
+        """The records as a frame, a row each, by surface, series and policy.
+
+        Besides the columns of :attr:`frame_rows` it has `as_good`: about as good as the best map to
+        the disk there.
+        """
         import pandas as pd
 
-        return pd.DataFrame(self.frame_rows)
+        frame = pd.DataFrame(self.frame_rows)
+        frame = frame.astype(dict.fromkeys(frame.columns[frame.isna().all()], float))
+        disks = frame[frame["ok"] & (frame["target"] == DISK)]
+        best = disks.groupby(["place", "solves"])[ANGLE].transform("min")
+        good = (disks[ANGLE] <= AS_GOOD * best) | (disks[ANGLE] <= best + DEGREES)
+        return frame.assign(as_good=good.reindex(frame.index, fill_value=False))
 
     @cached_property
     def frame_rows(self) -> list[dict[str, Any]]:
@@ -157,7 +169,8 @@ class Evidence:
 
         Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
-        number), `main`, and `ok`.
+        number), `main`, and `ok`; `model` (of the paper), `counted` (not a stand-in for a model
+        that the run has too), `printed` (an algorithm of the paper), and `reference`.
         """
         series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
         surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
@@ -168,7 +181,11 @@ class Evidence:
             figures = dict.fromkeys(COLUMNS) | self.row(record)
             figures |= {column.name: column.of(record) for column in DERIVED}
             about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
-            more = {"main": own.main, "ok": record.outcome.status == "ok"}
+            more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
+            more["model"], more["origin"] = surface.paper_row or None, surface.origin
+            more["counted"] = surface not in self.stand_ins_left_out
+            more["printed"] = own.algorithm in self.paper.algorithms
+            more["reference"] = own.algorithm == self.reference
             order = (place, k, self.policies.index(record.cell.solves))
             found.append((order, figures | about | more))
         return [row for _, row in sorted(found, key=lambda pair: pair[0])]
@@ -394,14 +411,6 @@ def figure_of(record: Record, metric: str) -> float:
     """Return a figure of a map; infinite if the cell did not end ok."""
     found = record.outcome.metrics.get(metric)
     return inf if record.outcome.status != "ok" or found is None else float(found)
-
-
-def figure(
-    evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries, policy: str, metric: str
-) -> float | None:
-    """Return a figure of a map; infinite if the cell did not end ok, None if not tried."""
-    record = evidence.find(surface, series, policy)
-    return None if record is None else figure_of(record, metric)
 
 
 def model_surface(model: str) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cembench.report.content.as_good import AS_GOOD, DEGREES
 from cembench.report.content.by_surface import own_table
-from cembench.report.content.evidence import Evidence
+from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
 from cembench.report.content.standings import (
@@ -184,3 +183,36 @@ def _picture(
             if found and wanted in found.checkerboards:
                 return found.checkerboards[wanted]
     return None
+
+
+def many_findings(evidence: Evidence) -> Findings:
+    """Return who mapped everything, whose maps to the disk are the best, and suspect maps.
+
+    All of it is under the run's first policy.
+    """
+    policy = evidence.policies[0]
+    main = evidence.frame[evidence.frame["main"] & (evidence.frame["solves"] == policy)]
+    ok = main.sort_values("series", kind="stable").groupby("label", sort=False)["ok"]
+    whole = [str(label) for label, all_ok in ok.all().items() if all_ok]
+    sentences = [
+        f"Over {len(evidence.surfaces)} surfaces, {len(whole)} of {len(ok)} algorithms have a "
+        f"valid map of every one that they take{f': {listed(whole)}' if whole else ''}."
+    ]
+    figures = [Finding(f"{100 * main['ok'].mean():.1f} %", f"of {len(main)} cells are valid maps")]
+    field = field_of(evidence, policy)
+    if field is not None:
+        sentences += field_words(field)
+        figures += field_figures(field)
+    valid = main[main["ok"]]
+    if valid[ANGLE].notna().any():
+        worst = valid.loc[valid[ANGLE].idxmax()]
+        where = f"{worst['label']}, {worst['surface']}"
+        figures.append(
+            Finding(f"{worst[ANGLE]:.1f}°", f"the worst mean angle error of a valid map: {where}")
+        )
+    sentences.append(stability_words(evidence.records))
+    return Findings(
+        tuple((words,) for words in sentences if words),
+        tuple(outlier_lines(evidence.records)),
+        figures=tuple(figures),
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path, PurePosixPath
 
 import numpy as np
@@ -92,28 +93,74 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
     mesh = evidence.mesh(surface)
     if mesh is None:
         return Inspection(surface, kept=False)
-    found = [(s, evidence.find(surface, s)) for s in evidence.series]
-    maps = [(s, r, evidence.uv(r)) for s, r in found if r is not None]
-    drawer = _Drawer(evidence, surface, mesh, folder)
+    slugs = distinct_slugs({digest(s.label): s.label for s in evidence.series})
+    write = partial(_write, folder, evidence.name_of(surface))
+    space = shading.surface_panel(mesh, SIDE)
     checkerboards: dict[str, Figure] = {}
     angles: dict[str, Angles] = {}
     shown: tuple[AlgorithmSeries, shading.RasterPanel] | None = None
     viewed: list[ViewedMap] = []
-    for series, record, found_uv in maps:
-        if found_uv is None:
+    for series in evidence.series:
+        record = evidence.find(surface, series)
+        kept_uv = evidence.uv(record)
+        if record is None or kept_uv is None:
             continue
-        uv = rotated_to_match(found_uv, viewed[0].z) if viewed else upright(mesh, found_uv)
-        viewed.append(ViewedMap(series.label, uv, _about(series, record)))
+        uv = rotated_to_match(kept_uv, viewed[0].z) if viewed else upright(mesh, kept_uv)
+        about = _about(series, record)
+        viewed.append(ViewedMap(series.label, uv, about))
         panel = shading.image_panel(mesh, uv, SIDE)
-        checkerboards[series.label] = drawer.checkerboard(series, record, panel, uv)
+        checkerboards[series.label] = write(
+            f"{slugs[digest(series.label)]}-checkerboard",
+            [shading.paint(p, shading.checkerboard(p, mesh, uv, space)) for p in (space, panel)],
+            title=series.label,
+            caption=f"{surface.title}, {about}",
+            alternative=f"{surface.title} and its image by {series.label} under one checkerboard",
+            record=record.cell.key,
+        )
         if series.target == DISK:
             angles[series.label] = _angles(mesh, uv, record)
         if shown is None or (series.algorithm == evidence.reference and series.main):
             shown = (series, panel)
-    curved, meshed = drawer.curvature_and_mesh(*shown) if shown else (None, None)
+    if shown is None:
+        return Inspection(surface, kept=True)
+    of = f"{surface.title} and its image by {shown[0].label}"
+    panels, H = (space, shown[1]), mean_curvature(mesh)
+    curved = write(
+        "curvature",
+        [shading.paint(p, shading.curvature(p, H)) for p in panels],
+        title="mean curvature",
+        caption=f"{of}, coloured by the mean curvature of the surface: orange where it bulges "
+        "outwards, blue where it bulges inwards.",
+        alternative=f"{of}, coloured by mean curvature",
+    )
+    meshed = write(
+        "mesh",
+        [shading.paint(p, shading.edges(p)) for p in panels],
+        title="mesh",
+        caption=f"The mesh of {of}.",
+        alternative=f"{of}, with their edges",
+    )
     most = triangles_per_surface([s.faces for s in evidence.surfaces])
-    scene = view_scene(mesh, viewed, surface.title, most) if viewed else b""
+    scene = view_scene(mesh, viewed, surface.title, most)
     return Inspection(surface, True, checkerboards, curved, meshed, angles, scene)
+
+
+def _write(
+    folder: Path,
+    surface: str,
+    what: str,
+    pictures: list[NDArray[np.uint8]],
+    *,
+    title: str,
+    caption: str,
+    alternative: str,
+    record: str = "",
+) -> Figure:
+    """Write pictures beside each other to a file, and return its figure."""
+    name = f"{surface}-{what}"
+    path = PurePosixPath("figures", f"{name}.jpg")
+    write_bytes(folder / path, shading.jpeg(shading.beside(pictures)))
+    return Figure(name, title, (path,), caption, alternative=alternative, record=record)
 
 
 def _about(series: AlgorithmSeries, record: Record) -> str:
@@ -133,71 +180,9 @@ def _angles(mesh: TriangleMesh, uv: NDArray[np.complex128], record: Record) -> A
     return Angles(counts / len(errors), float((errors < 1).mean()), len(errors), agrees)
 
 
-class _Drawer:
-    """Draws one surface with its maps; the view in space is computed once."""
-
-    def __init__(
-        self, evidence: Evidence, surface: MeasuredSurface, mesh: TriangleMesh, folder: Path
-    ) -> None:
-        self.surface, self.mesh, self.folder = surface, mesh, folder
-        self.name = evidence.name_of(surface)
-        labels = {digest(s.label): s.label for s in evidence.series}
-        slugs = distinct_slugs(labels)
-        self.labels = {label: slugs[key] for key, label in labels.items()}
-        self.space = shading.surface_panel(mesh, SIDE)
-
-    def checkerboard(
-        self,
-        series: AlgorithmSeries,
-        record: Record,
-        panel: shading.RasterPanel,
-        uv: NDArray[np.complex128],
-    ) -> Figure:
-        pictures = [
-            shading.paint(p, shading.checkerboard(p, self.mesh, uv, self.space))
-            for p in (self.space, panel)
-        ]
-        caption = f"{self.surface.title}, {_about(series, record)}"
-        return self._figure(
-            f"{self.labels[series.label]}-checkerboard",
-            f"{series.label}",
-            caption,
-            f"{self.surface.title} and its image by {series.label} under one checkerboard",
-            pictures,
-            record.cell.key,
-        )
-
-    def curvature_and_mesh(
-        self, series: AlgorithmSeries, panel: shading.RasterPanel
-    ) -> tuple[Figure, Figure]:
-        H = mean_curvature(self.mesh)
-        panels = (self.space, panel)
-        coloured = [shading.paint(p, shading.curvature(p, H)) for p in panels]
-        drawn = [shading.paint(p, shading.edges(p)) for p in panels]
-        of = f"{self.surface.title} and its image by {series.label}"
-        return (
-            self._figure(
-                "curvature",
-                "mean curvature",
-                f"{of}, coloured by the mean curvature of the surface: orange where it bulges "
-                "outwards, blue where it bulges inwards.",
-                f"{of}, coloured by mean curvature",
-                coloured,
-            ),
-            self._figure("mesh", "mesh", f"The mesh of {of}.", f"{of}, with their edges", drawn),
-        )
-
-    def _figure(
-        self,
-        what: str,
-        title: str,
-        caption: str,
-        alternative: str,
-        pictures: list[NDArray[np.uint8]],
-        record: str = "",
-    ) -> Figure:
-        path = PurePosixPath("figures", f"{self.name}-{what}.jpg")
-        content = shading.jpeg(shading.beside(pictures))
-        write_bytes(self.folder / path, content)
-        name = f"{self.name}-{what}"
-        return Figure(name, title, (path,), caption, alternative=alternative, record=record)
+def angles_of(evidence: Evidence, record: Record) -> Angles | None:
+    """Return the angles of a record's map; None if the run did not save it."""
+    surface = next(s for s in evidence.surfaces if s.mesh_hash == record.cell.mesh_hash)
+    uv = evidence.uv(record)
+    mesh = None if uv is None else evidence.mesh(surface)
+    return None if mesh is None or uv is None else _angles(mesh, uv, record)

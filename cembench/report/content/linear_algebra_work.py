@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from cembench.report.content.both_policies import BOTH, seconds_under
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import (
     POLICIES,
@@ -86,16 +85,12 @@ def own_order(evidence: Evidence) -> str:
     Under "backslash" CEM is Algorithm 1 as printed, with whole solves. So records of both policies
     tell; those of one do not.
     """
-    reference = evidence.series_of(evidence.reference)
-    factored, solved, seconds = [], [], []
-    for surface in evidence.surfaces if reference else ():
-        assert reference is not None
-        kept, anew = (work_of(evidence, surface, reference, p) for p in BOTH)
-        times = [seconds_under(evidence, surface, reference, p) for p in BOTH]
-        if kept and anew and kept.right_hand_sides and anew.right_hand_sides and all(times):
-            factored.append(kept.numeric / anew.numeric)
-            solved.append(kept.right_hand_sides / anew.right_hand_sides)
-            seconds.append((times[0] or 0.0) / (times[1] or 1.0))
+    frame = evidence.frame
+    own = frame[frame["reference"] & frame["main"] & frame["ok"]]
+    names = ["counted_factorisations", "counted_columns", "seconds"]
+    under = {policy: rows.set_index("place")[names] for policy, rows in own.groupby("solves")}
+    ratios = under["reuse"] / under["backslash"] if len(under) > 1 else own[names].iloc[:0]
+    factored, solved, seconds = (ratios.dropna()[name].tolist() for name in names)
     if not solved:
         return (
             f"How much of CEM's lead is its {_OWN_ORDER} only a run with both policies tells: "

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from cembench.report.content.averages import geometric_rate, mean_rate
-from cembench.report.content.both_policies import BOTH, seconds_under
 from cembench.report.content.evidence import (
-    AlgorithmSeries,
     Evidence,
-    MeasuredSurface,
 )
 from cembench.report.content.printed_beside_measured import (
     Footer,
@@ -17,10 +14,15 @@ from cembench.report.content.printed_beside_measured import (
 )
 from cembench.report.content.rates import measured_rates
 from cembench.report.document import Column, Gap, Table, count, entry, words
-from cembench.report.plots import Axis, Plot, PlotPanel
-from cembench.report.plots import PlotSeries as Bars
 from cembench.results.columns import COLUMNS, FrameColumn
 from cembench.results.records import Record
+
+BOTH = ("reuse", "backslash")
+
+
+def has_both_policies(evidence: Evidence) -> bool:
+    """Whether the run measured both policies."""
+    return all(policy in evidence.policies for policy in BOTH)
 
 
 def one_policy_gap(evidence: Evidence) -> Gap:
@@ -35,12 +37,16 @@ def one_policy_gap(evidence: Evidence) -> Gap:
 
 def policies_table(evidence: Evidence) -> Table:
     """Return a table of seconds under both policies and their ratio, for every algorithm."""
-    surfaces = {surface.mesh_hash: surface for surface in evidence.surfaces}
+    frame = evidence.frame
+    known = frame[frame["ok"]].pivot(
+        index=["mesh_hash", "label"], columns="solves", values="seconds"
+    )
+    ratios = (known[BOTH[1]] / known[BOTH[0]]).dropna().to_dict()
     quantities = []
     for series in evidence.series:
 
-        def ratio(record: Record, series: AlgorithmSeries = series) -> float | None:
-            return _ratio(evidence, surfaces[record.cell.mesh_hash], series)
+        def ratio(record: Record, label: str = series.label) -> float | None:
+            return ratios.get((record.cell.mesh_hash, label))
 
         of_ratio = FrameColumn("ratio", ratio, form=".2f", lacking="not under both policies")
         seconds = COLUMNS["seconds"]
@@ -57,12 +63,6 @@ def policies_table(evidence: Evidence) -> Table:
         "whatever the algorithm. The paper's MATLAB code factored at every solve.",
         footers=(mean,),
     )
-
-
-def _ratio(evidence: Evidence, surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
-    """Return the seconds with a factorisation at every solve over those with reused ones."""
-    kept, anew = (seconds_under(evidence, surface, series, policy) for policy in BOTH)
-    return anew / kept if kept and anew else None
 
 
 def speedups_table(evidence: Evidence) -> Table:
@@ -90,20 +90,4 @@ def speedups_table(evidence: Evidence) -> Table:
         tuple(columns),
         tuple(rows),
         "Rates of speedup on the surfaces that are or stand in for models of the paper.",
-    )
-
-
-def policies_plot(evidence: Evidence) -> Plot:
-    """Return a plot of the ratios by surface."""
-    drawn = []
-    for series in evidence.series:
-        names = [surface.title for surface in evidence.surfaces]
-        values = [_ratio(evidence, surface, series) for surface in evidence.surfaces]
-        drawn.append(Bars(series.label, names, values, "both", evidence.styles[series.label]))
-    return Plot(
-        "reuse-against-backslash",
-        "Cost of repeated factorisation",
-        (PlotPanel(Axis(""), Axis("backslash over reuse, seconds", log=True), tuple(drawn)),),
-        "Ratio of seconds with a factorisation at every solve to seconds with reused ones.",
-        "A line for each algorithm over the surfaces; those of iterative algorithms are high.",
     )

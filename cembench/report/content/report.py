@@ -1,48 +1,48 @@
-"""The whole report of a run."""
+"""The whole report of a run: of a paper, of the user's own surfaces, or over many surfaces."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
-from cembench import __version__
-from cembench.report.content import policies
-from cembench.report.content.both_policies import has_both_policies
+from cembench.core.version import installed_version
+from cembench.report.content import many, policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.exhibits import exhibit_gaps, exhibit_sections
-from cembench.report.content.failures import not_ok
-from cembench.report.content.figures.accuracy_against_time import accuracy_against_time
-from cembench.report.content.figures.angle_histograms import angle_histograms
-from cembench.report.content.figures.cost_by_faces import cost_by_faces, exponents_table
-from cembench.report.content.figures.energy_by_iteration import energy_by_iteration, model_gap
-from cembench.report.content.figures.over_models import angles_over_models, energy_over_models
-from cembench.report.content.figures.performance_profile import performance_profile
-from cembench.report.content.figures.time_by_phase import time_by_phase
-from cembench.report.content.findings import findings
+from cembench.report.content.exhibits import exhibit_sections
+from cembench.report.content.exponents import exponents_table
+from cembench.report.content.findings import findings, many_findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
 from cembench.report.content.machines import machines_section
-from cembench.report.content.many.found import many_findings
-from cembench.report.content.many.section import is_many, many_section
-from cembench.report.content.many.worst import hardest
+from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.rates import rates_tables
 from cembench.report.content.sure_speedups import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
-from cembench.report.declared import declared_table
-from cembench.report.document import ORIGINS, Figure, Gap, Item, Report, Section, Table, Text
-from cembench.report.plots import Plot, write_plot
+from cembench.report.declared import declared_table, own_tables
+from cembench.report.declared_plots import declared_plot
+from cembench.report.document import (
+    ORIGINS,
+    Claim,
+    Figure,
+    Findings,
+    Item,
+    Report,
+    Section,
+    Table,
+    Text,
+    words,
+)
+from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
-from cembench.results.papers import Picture
 from cembench.results.records import MeshOrigin
 
 #: Receives progress: a text, the number of finished steps, and their total.
 Progress = Callable[[str, int, int], None]
-Inspections = Mapping[str, Inspection]
 
 #: The title of a paper's report goes before this.
 PAPER = ": its claims, tables and figures, measured"
@@ -57,13 +57,36 @@ _KINDS: Mapping[MeshOrigin, str] = {
 }
 
 
+@dataclass(frozen=True)
+class _Run:
+    """A run with what was seen of its surfaces; `shown` have a page each."""
+
+    evidence: Evidence
+    folder: Path
+    shown: Sequence[MeasuredSurface]
+    seen: Mapping[str, Inspection]
+
+    def plots(self, *names: str) -> list[Item]:
+        """Return declared plots, drawn."""
+        return drawn([declared_plot(self.evidence, name) for name in names], self.folder)
+
+    def tables(self, *names: str) -> list[Item]:
+        """Return declared tables."""
+        made = (declared_table(self.evidence, name) for name in names)
+        return [table for table in made if table]
+
+
+#: A section of a report; None if the run has nothing for it.
+_Maker = Callable[[_Run], Section | None]
+
+
 def build_report(
     evidence: Evidence, folder: Path, command: str, progress: Progress = lambda *_: None
 ) -> Report:
     """Compute the contents of a run's report, and draw its figures into `folder`."""
     of_paper = is_of_the_paper(evidence)
-    many = is_many(evidence) and not of_paper
-    shown = hardest(evidence, evidence.policies[0]) if many else evidence.surfaces
+    over_many = many.is_many(evidence) and not of_paper
+    shown = many.hardest(evidence, evidence.policies[0]) if over_many else evidence.surfaces
     n = len(shown) + 1
     inspections: dict[str, Inspection] = {}
     pages = []
@@ -73,41 +96,36 @@ def build_report(
         seen = inspections[surface.mesh_hash] = next(inspected)
         pages.append(_page(evidence, surface, seen, folder))
     progress("tables, plots and claims", n - 1, n)
-    tested = claims(evidence, inspections) if of_paper else []
-    beyond = _beyond_the_paper(evidence, folder, by_surface=not many, of_paper=of_paper)
-    first = _first_plot(beyond)
-    sections = [] if many else [_summary(evidence, of_paper=of_paper)]
-    machines = machines_section(evidence)
-    sections += [machines] if machines else []
-    if many:
-        about_all = many_section(evidence, shown, inspections, folder)
-        first = _first_plot(about_all)
-        sections.append(about_all)
-        sections.append(_costs(evidence, folder, beyond))
-    elif of_paper:
-        sections += [
-            _tables(evidence),
-            Section("claims", "Claims of the paper", tuple(tested)),
-            _figures(evidence, inspections, folder),
-            beyond,
-        ]
-    else:
-        sections.append(_own(evidence, inspections, folder, beyond))
+    run = _Run(evidence, folder, shown, inspections)
+    makers = _OF_A_PAPER if of_paper else _OVER_MANY if over_many else _OF_OWN_SURFACES
+    sections = [section for make in makers if (section := make(run))]
     sections += exhibit_sections(evidence, folder)
-    if many:
+    if over_many:
         sections.append(Section("not-ok", "Cells without a valid map", (not_ok(evidence),)))
     sections.append(Section("surfaces", "Surfaces", (), tuple(pages)))
     progress("done", n, n)
-    found = many_findings(evidence) if many else findings(evidence, inspections, tested)
+    head = many_findings(evidence) if over_many else _findings(run, sections)
     return Report(
         title=evidence.paper.title + PAPER if of_paper else _title_of_own_surfaces(evidence),
-        findings=replace(found, plot=first),
+        findings=replace(head, plot=_first_plot(sections)),
         command=command,
         facts=tuple(facts(evidence)),
         sections=tuple(sections),
         records=evidence.rows,
         paper=evidence.paper if of_paper else None,
     )
+
+
+def _findings(run: _Run, sections: Sequence[Section]) -> Findings:
+    tested = [item for s in sections for item in s.items if isinstance(item, Claim)]
+    return findings(run.evidence, run.seen, tested)
+
+
+def _first_plot(sections: Sequence[Section]) -> Figure | None:
+    """Return the plot for the head of the report, from the sections on the run as a whole."""
+    chosen = [section for section in sections if section.name in ("beyond", "results", "many")]
+    plots = [i for s in chosen for i in s.items if isinstance(i, Figure)]
+    return next((f for f in plots if f.name in FIRST_PLOTS), plots[0] if plots else None)
 
 
 def is_of_the_paper(evidence: Evidence) -> bool:
@@ -157,7 +175,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
     for key, machine in evidence.store.environments().items():
         if key in used:
             found.append(("machine", _machine(machine)))
-    found.append(("report by", f"cembench {__version__}"))
+    found.append(("report by", f"cembench {installed_version()}"))
     return found
 
 
@@ -178,9 +196,29 @@ def _machine(about: Mapping[str, object]) -> str:
     )
 
 
-def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
-    if not of_paper:
-        return Section("summary", "What this is", (not_ok(evidence),))
+def not_ok(evidence: Evidence) -> Table | Text:
+    """Return a table of cells that did not end ok or are missing; a sentence if there is none."""
+    declared = own_tables()["not-ok"]
+    table = declared_table(evidence, "not-ok")
+    held = {record.cell.key for record in evidence.store.records()}
+    again = "requested but not finished: run the same `cembench run` again to resume"
+    missing = tuple(
+        tuple(map(words, (cell.mesh, cell.algorithm, cell.solves, "missing", again)))
+        for cell in evidence.store.plan()
+        if cell.key not in held
+    )
+    if table is None and not missing:
+        return Text(f"All {len(evidence.records)} cells ended ok.")
+    rows = table.rows if table else ()
+    title = (
+        f"{len(rows)} of {len(evidence.records)} cells did not end ok; {len(missing)} are missing"
+    )
+    columns = tuple(column.heading for column in declared.columns)
+    return Table("not-ok", title, columns, (*rows, *missing), declared.caption)
+
+
+def _paper_summary(run: _Run) -> Section:
+    evidence = run.evidence
     marks = "; ".join(
         f"{words}{f' ({mark})' if mark else ''}" for words, mark in ORIGINS.values() if words
     )
@@ -202,9 +240,9 @@ def _summary(evidence: Evidence, *, of_paper: bool) -> Section:
     return Section("summary", "What this is", tuple(items))
 
 
-def _tables(evidence: Evidence) -> Section:
+def _tables(run: _Run) -> Section:
     """Return the paper's tables, each comparison of seconds with its averages and certainty."""
-    printed = evidence.paper.printed
+    evidence, printed = run.evidence, run.evidence.paper.printed
     items: list[Item] = []
     for number in sorted(printed):
         if printed[number].compares:
@@ -217,77 +255,32 @@ def _tables(evidence: Evidence) -> Section:
     return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
 
 
-def _figures(evidence: Evidence, inspections: Inspections, folder: Path) -> Section:
-    items: list[Item] = []
-    gaps: list[Gap] = []
-    for picture in evidence.paper.pictures:
-        found = _pictures(evidence, inspections, picture)
-        if found:
-            items += found
-        else:
-            gaps.append(model_gap(evidence, picture.model, picture.figure))
-    for plot, lacking in (
-        energy_by_iteration(evidence),
-        angle_histograms(evidence, inspections),
-    ):
-        items += _drawn([plot], folder)
-        gaps += lacking
-    items += _drawn([cost_by_faces(evidence)], folder)
-    items.append(exponents_table(evidence))
-    over_models = (("energy", energy_over_models), ("angles", angles_over_models))
-    for name, plot_of in over_models:
-        if evidence.models and f"{name}_over_models" in evidence.paper.plots:
-            items += _drawn([plot_of(evidence)], folder)
-    gaps += exhibit_gaps(evidence)
-    return Section("figures", "Figures of the paper", (*items, *gaps))
+#: Plots of time, and tables of what does not compare with the rest.
+_TIMES = ("performance-profile", "accuracy-against-time", "time-by-phase")
 
 
-def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> list[Figure]:
-    """Return CEM's pictures of a model, as in the paper."""
-    figure, model = wanted.figure, wanted.model
-    surface = evidence.surface_for_model(model)
-    series = evidence.series_of(evidence.reference)
-    if surface is None or series is None:
+def _beside(run: _Run) -> list[Item]:
+    """Return the tables of maps that do not go to the disk, and of programs of others."""
+    external = any(record.external for record in run.evidence.records)
+    return run.tables("other-targets", *(["beside-others"] if external else []))
+
+
+def _policies(run: _Run) -> list[Item]:
+    """Return tables and a plot of both policies; empty if the run has one."""
+    if not policies.has_both_policies(run.evidence):
         return []
-    seen = inspections[surface.mesh_hash]
-    checkerboard = seen.checkerboards.get(series.label)
-    if checkerboard is None:
-        return []
-    kinds = {"checkerboard": checkerboard, "curvature": seen.curvature, "mesh": seen.mesh}
-    chosen = [kinds[kind] for kind in wanted.shows]
-    return [
-        Figure(
-            f"{figure.lower().replace(' ', '-')}-{k + 1}",
-            f"{model} ({surface.origin}) and its map by CEM: {picture.title}",
-            picture.files,
-            picture.caption,
-            alternative=picture.alternative,
-            paper=figure,
-        )
-        for k, picture in enumerate(chosen)
-        if picture
-    ]
+    made = (policies.policies_table(run.evidence), policies.speedups_table(run.evidence))
+    return [*made, *run.plots("reuse-against-backslash")]
 
 
-def _beyond_the_paper(
-    evidence: Evidence, folder: Path, *, by_surface: bool, of_paper: bool
-) -> Section:
-    # Over many surfaces, the profile of the time stands beside those of accuracy.
-    profiles = [performance_profile(evidence)] if by_surface else []
-    items = _drawn([*profiles, accuracy_against_time(evidence), time_by_phase(evidence)], folder)
-    if not of_paper:  # otherwise it is below its table
-        for policy in evidence.policies:
-            items += sure_speedups(evidence, policy)
-    if has_both_policies(evidence):
-        items += [policies.policies_table(evidence), policies.speedups_table(evidence)]
-        items += _drawn([policies.policies_plot(evidence)], folder)
-    else:
-        items.append(policies.one_policy_gap(evidence))
-    if by_surface:
-        external = any(record.external for record in evidence.records)
-        names = ("other-targets", *(("beside-others",) if external else ()))
-        items += [table for name in names if (table := declared_table(evidence, name))]
-    return Section("beyond", "Beyond the paper", tuple(items))
+def _certain(run: _Run) -> list[Item]:
+    return [t for policy in run.evidence.policies for t in sure_speedups(run.evidence, policy)]
+
+
+def _beyond_the_paper(run: _Run) -> Section:
+    both = _policies(run) or [policies.one_policy_gap(run.evidence)]
+    items = (*run.plots(*_TIMES), *both, *_beside(run))
+    return Section("beyond", "Beyond the paper", items)
 
 
 def _title_of_own_surfaces(evidence: Evidence) -> str:
@@ -299,39 +292,48 @@ def _title_of_own_surfaces(evidence: Evidence) -> str:
     return f"{of}, mapped by {algorithms} algorithm{'s' if algorithms > 1 else ''}"
 
 
-def _own(evidence: Evidence, inspections: Inspections, folder: Path, beyond: Section) -> Section:
+def _own_results(run: _Run) -> Section:
     """Return the section for other surfaces, without the paper's columns and claims."""
+    evidence = run.evidence
     items: list[Item] = [
         figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
         for surface in evidence.surfaces
     ]
-    angles, _ = angle_histograms(evidence, inspections)
-    energies, _ = energy_by_iteration(evidence)
     items += work_tables(evidence)
-    items += [item for item in beyond.items if not isinstance(item, Gap)]
-    items += _drawn([angles, energies, cost_by_faces(evidence)], folder)
+    items += (*run.plots(*_TIMES), *_certain(run), *_policies(run), *_beside(run))
+    of_models = [paper_plot(evidence, name, run.seen) for name in reversed(OF_MODELS)]
+    items += (*drawn(of_models, run.folder), *run.plots("cost-by-faces"))
     return Section("results", "Results", tuple(items))
 
 
-def _costs(evidence: Evidence, folder: Path, beyond: Section) -> Section:
+def _costs(run: _Run) -> Section:
     """Return the section on cost over all surfaces."""
-    items: list[Item] = [item for item in beyond.items if isinstance(item, Table | Figure)]
-    items += _drawn([cost_by_faces(evidence)], folder)
-    items.append(exponents_table(evidence))
-    return Section("costs", "What maps cost", tuple(items))
+    # The profile of the time is beside those of accuracy.
+    items = (*run.plots(*_TIMES[1:]), *_certain(run), *_policies(run))
+    exponents = (*run.plots("cost-by-faces"), exponents_table(run.evidence))
+    return Section("costs", "What maps cost", (*items, *exponents))
 
 
-def _first_plot(section: Section) -> Figure | None:
-    """Return the plot for the head of the report, from this section."""
-    figures = [item for item in section.items if isinstance(item, Figure)]
-    return next((f for f in figures if f.name in FIRST_PLOTS), figures[0] if figures else None)
+_OF_A_PAPER: tuple[_Maker, ...] = (
+    _paper_summary,
+    lambda run: machines_section(run.evidence),
+    _tables,
+    lambda run: Section("claims", "Claims of the paper", tuple(claims(run.evidence, run.seen))),
+    lambda run: figures_section(run.evidence, run.seen, run.folder),
+    _beyond_the_paper,
+)
+_OF_OWN_SURFACES: tuple[_Maker, ...] = (
+    lambda run: Section("summary", "What this is", (not_ok(run.evidence),)),
+    lambda run: machines_section(run.evidence),
+    _own_results,
+)
+_OVER_MANY: tuple[_Maker, ...] = (
+    lambda run: machines_section(run.evidence),
+    lambda run: many.many_section(run.evidence, run.shown, run.seen, run.folder),
+    _costs,
+)
 
 
 def _page(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, folder: Path) -> Section:
     page, plot = surface_page(evidence, surface, seen)
-    items = (*page.items, *_drawn([plot], folder))
-    return Section(page.name, page.title, items, page.sections, page.page)
-
-
-def _drawn(plots: Sequence[Plot | None], folder: Path) -> list[Item]:
-    return [write_plot(plot, folder) for plot in plots if plot]
+    return replace(page, items=(*page.items, *drawn([plot], folder)))

@@ -9,8 +9,14 @@ from statistics import median
 
 import numpy as np
 
-from cembench.report.content.as_good import as_good
-from cembench.report.content.evidence import ANGLE, AlgorithmSeries, Evidence, figure_of
+from cembench.report.content.evidence import (
+    ANGLE,
+    AS_GOOD,
+    DEGREES,
+    AlgorithmSeries,
+    Evidence,
+    figure_of,
+)
 from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
 from cembench.results.intervals import Interval
 from cembench.results.many import average_interval, geometric
@@ -22,6 +28,14 @@ SHARE = 0.9
 FLOOR = 0.01
 #: An angle error within this share of the smallest one of a surface counts as equal to it.
 NEAR = 0.01
+
+
+def as_good(angles: Sequence[float], best: Sequence[float]) -> bool:
+    """Whether maps are about as good as the best ones on every surface.
+
+    Both are mean angle errors in degrees, one per surface.
+    """
+    return all(a <= max(AS_GOOD * b, b + DEGREES) for a, b in zip(angles, best, strict=True))
 
 
 @dataclass(frozen=True)

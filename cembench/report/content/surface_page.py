@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.figures.angle_histograms import histogram
-from cembench.report.content.figures.energy_by_iteration import history_panel
-from cembench.report.content.figures.time_by_phase import phases_panel
 from cembench.report.content.inspection import Inspection
 from cembench.report.declared import declared_table
+from cembench.report.declared_plots import declared_plot
 from cembench.report.document import (
     ORIGINS,
     Gallery,
@@ -19,16 +15,13 @@ from cembench.report.document import (
     Table,
     Text,
 )
-from cembench.report.plots import Axis, Plot, PlotPanel
-
-#: Upper end of the histograms on a page, in degrees.
-SHOWN = 5.0
+from cembench.report.plots import Plot
 
 
 def surface_page(
     evidence: Evidence, surface: MeasuredSurface, seen: Inspection
 ) -> tuple[Section, Plot | None]:
-    """Return the page without its plot, which :func:`with_plot` inserts, and the plot."""
+    """Return the page without its plot, and the plot of angles, energies and phases, if any."""
     name = evidence.name_of(surface)
     items: list[Item] = [Text(_about(surface)), *notices(evidence, surface)]
     if seen.checkerboards:
@@ -52,7 +45,10 @@ def surface_page(
         items.append(Gap("Pictures", f"{seen.missing_reason}.", command))
     items.append(figures_table(evidence, surface, name))
     section = Section(f"surface-{name}", surface.title, tuple(items), page=True)
-    return section, _plot(evidence, surface, seen, name)
+    plot = declared_plot(
+        evidence, "surface", seen={surface.mesh_hash: seen}, surface=surface, called=f"{name}-plots"
+    )
+    return section, plot
 
 
 def _about(surface: MeasuredSurface) -> str:
@@ -80,38 +76,3 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
     table = declared_table(evidence, "figures", keys=keys, called=called, surface=surface.title)
     assert table is not None, "a surface has records"
     return table
-
-
-def _plot(evidence: Evidence, surface: MeasuredSurface, seen: Inspection, name: str) -> Plot | None:
-    """Return the plot of histograms, energies by iteration and phases, as available."""
-    panels: list[PlotPanel] = []
-    curves = [
-        histogram(s.label, seen.angles[s.label], evidence.styles[s.label], SHOWN, "line")
-        for s in evidence.series
-        if s.label in seen.angles
-    ]
-    if curves:
-        axis = Axis("angular distortion (degrees)", low=0, high=SHOWN)
-        panels.append(PlotPanel(axis, Axis("corners (%)", low=0), tuple(curves), "angles"))
-    history = history_panel(evidence, surface, "energy against iterations")
-    phases = phases_panel(evidence, surface, evidence.policies[0])
-    panels += [panel for panel in (history, phases) if panel]
-    if not panels:
-        return None
-    return Plot(
-        f"{name}-plots",
-        f"{surface.title}: angles, energy and time",
-        tuple(panels),
-        _caption(panels),
-        "Curves of the angular distortion for each algorithm, and bars of the time by phase.",
-        columns=3,
-    )
-
-
-def _caption(panels: Sequence[PlotPanel]) -> str:
-    about = {
-        "angles": "share of the corners by angular distortion, in bins of a tenth of a degree",
-        "energy against iterations": "conformal energy after each iteration of CEM",
-    }
-    parts = [about.get(panel.title, "seconds by phase of the measured call") for panel in panels]
-    return "From left to right: " + "; ".join(parts) + "."

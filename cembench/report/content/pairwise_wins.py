@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import combinations
-from math import inf, isclose
+from math import inf, isclose, isnan
 
-from cembench.report.content.evidence import (
-    ANGLE,
-    AlgorithmSeries,
-    Evidence,
-    MeasuredSurface,
-    figure,
-)
+from cembench.report.content.evidence import ANGLE, DISK, Evidence
 from cembench.report.content.printed_beside_measured import policy_suffix
 from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.intervals import ERROR
@@ -21,35 +14,26 @@ from cembench.results.many import holm, sign_test
 #: Figures that differ by less than this share count as equal.
 SAME = 1e-6
 
-Score = Callable[[MeasuredSurface, AlgorithmSeries], float | None]
-
 
 def pairwise_wins(evidence: Evidence, policy: str) -> list[Table]:
     """Return tables of angles and seconds for maps to the disk, if there are several."""
-
-    def angle(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
-        return figure(evidence, surface, series, policy, ANGLE)
-
-    def seconds(surface: MeasuredSurface, series: AlgorithmSeries) -> float | None:
-        record = evidence.find(surface, series, policy)
-        if record is None:
-            return None
-        found = record.outcome.median_seconds
-        return inf if record.outcome.status != "ok" or found is None else found
-
     suffix = policy_suffix(policy, evidence)
     made = (
-        _table(evidence, f"wins-angles{suffix}", "Who has the smaller angle errors", angle),
-        _table(evidence, f"wins-seconds{suffix}", "Who is faster", seconds),
+        _table(evidence, f"wins-angles{suffix}", "Who has the smaller angle errors", policy, ANGLE),
+        _table(evidence, f"wins-seconds{suffix}", "Who is faster", policy, "seconds"),
     )
     return [table for table in made if table is not None]
 
 
-def _table(evidence: Evidence, name: str, title: str, score: Score) -> Table | None:
-    series = [s for s in evidence.disk_series if s.main]
+def _table(evidence: Evidence, name: str, title: str, policy: str, figure: str) -> Table | None:
+    frame = evidence.frame
+    tried = frame[frame["main"] & (frame["target"] == DISK) & (frame["solves"] == policy)]
+    series = [s for s in evidence.disk_series if s.label in set(tried["label"])]
     if len(series) < 2:
         return None
-    scores = {s.label: [score(surface, s) for surface in evidence.surfaces] for s in series}
+    cost = tried[figure].where(tried["ok"]).fillna(inf)
+    table = tried.assign(cost=cost).pivot(index="place", columns="label", values="cost")
+    scores = {str(label): column.tolist() for label, column in table.items()}
     pairs = list(combinations([s.label for s in series], 2))
     wins = {(a, b): _wins(scores[a], scores[b]) for a, b in pairs}
     chances = holm([sign_test(*wins[pair]) for pair in pairs])
@@ -80,9 +64,9 @@ def _together(pairs: int) -> str:
     return f" for all {pairs} pairs of this table together (two-sided sign tests, Holm)"
 
 
-def _wins(first: list[float | None], second: list[float | None]) -> tuple[int, int]:
-    """Return the numbers of surfaces on which the first and the second have the smaller figure."""
-    both = [(a, b) for a, b in zip(first, second, strict=True) if a is not None and b is not None]
+def _wins(first: list[float], second: list[float]) -> tuple[int, int]:
+    """Return on how many surfaces the first and the second are smaller; untried ones are NaN."""
+    both = [(a, b) for a, b in zip(first, second, strict=True) if not (isnan(a) or isnan(b))]
     differ = [(a, b) for a, b in both if not (a == b or isclose(a, b, rel_tol=SAME))]
     won = sum(a < b for a, b in differ)
     return won, len(differ) - won

@@ -1,1 +1,0 @@
-"""The figures of a report, one per file; each turns records into plot data."""

@@ -1,0 +1,80 @@
+"""The section of a report on a run over many surfaces, in place of a page for each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from pathlib import Path
+
+from cembench.report.content.by_surface import hardest_table
+from cembench.report.content.difficulty import best_maps
+from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.pairwise_wins import pairwise_wins
+from cembench.report.declared import declared_table
+from cembench.report.declared_plots import declared_plot
+from cembench.report.document import Gallery, Item, Section, Text
+from cembench.report.plots import drawn
+
+#: With more surfaces than this, runs are summarised instead of shown cell by cell.
+MANY = 24
+#: Number of surfaces shown.
+HARDEST = 10
+
+
+def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
+    """Return the surfaces with the largest angle errors of the best map, worst first.
+
+    Surfaces without any map come first.
+    """
+    errors = best_maps(evidence, policy)[ANGLE].to_dict()
+    by_error = sorted(evidence.surfaces, key=lambda s: errors.get(s.mesh_hash, inf), reverse=True)
+    return tuple(by_error[:HARDEST])
+
+
+def hardest_gallery(
+    evidence: Evidence,
+    policy: str,
+    surfaces: Sequence[MeasuredSurface],
+    inspections: Mapping[str, Inspection],
+) -> Gallery | None:
+    """Return the best map of each of these surfaces; None if the run saved no surface."""
+    labels = best_maps(evidence, policy)["label"].to_dict()
+    best = [(inspections[s.mesh_hash].checkerboards, labels.get(s.mesh_hash)) for s in surfaces]
+    figures = [maps[label] for maps, label in best if label in maps]
+    if not figures:
+        return None
+    return Gallery(
+        "hardest-maps",
+        "The hardest surfaces, each with its best map",
+        tuple(figures),
+        "The surface and its image under one checkerboard; folded triangles are red.",
+    )
+
+
+def is_many(evidence: Evidence) -> bool:
+    """Whether a run has too many surfaces for a page each."""
+    return len(evidence.surfaces) > MANY
+
+
+def many_section(
+    evidence: Evidence,
+    shown: Sequence[MeasuredSurface],
+    inspections: Mapping[str, Inspection],
+    folder: Path,
+) -> Section:
+    """Return success rates, profiles, pairwise wins, and the hardest surfaces, as a section."""
+    policy = evidence.policies[0]
+    items: list[Item] = []
+    if len(evidence.policies) > 1:
+        items.append(Text(f"Unless stated otherwise, the linear-algebra policy is {policy}."))
+    items += [t for name in ("success", "spread") if (t := declared_table(evidence, name))]
+    names = ("accuracy-profiles", "performance-profile", "errors-by-difficulty")
+    plots = (declared_plot(evidence, name) for name in names)
+    items += drawn(plots, folder)
+    items += pairwise_wins(evidence, policy)
+    items.append(hardest_table(evidence, policy, shown))
+    gallery = hardest_gallery(evidence, policy, shown, inspections)
+    if gallery:
+        items.append(gallery)
+    return Section("many", f"Over {len(evidence.surfaces)} surfaces", tuple(items))
