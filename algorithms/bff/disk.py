@@ -12,6 +12,7 @@ from cembench.conformal.boundary_energy import in_gauge
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure
+from cembench.conformal.last_resort import with_last_resort
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -33,6 +34,7 @@ CROWDED = 1e13
     source="Sawhney & Crane, Boundary first flattening, 2017",
     usual=False,
 )
+@with_last_resort
 def bff(
     mesh: DiskMesh,
     *,
@@ -41,6 +43,7 @@ def bff(
     gauge: Gauge = "boundary",
     delaunay: bool = False,
     repair: bool = True,
+    last_resort: bool = True,
 ) -> Parameterization:
     """Map to the disk with exterior angles of the boundary in proportion to its lengths.
 

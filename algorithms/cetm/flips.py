@@ -14,6 +14,7 @@ from cembench.conformal.doubling import doubled
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
+from cembench.conformal.last_resort import with_last_resort
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -37,6 +38,7 @@ Indices = NDArray[np.int64]
     source="Gu, Luo, Sun & Wu 2018; Gillespie, Springborn & Crane 2021; Campen et al. 2021",
     usual=False,
 )
+@with_last_resort
 def cetm_flips(
     mesh: DiskMesh,
     *,
@@ -44,6 +46,7 @@ def cetm_flips(
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 200,
     gauge: Gauge = "boundary",
     repair: bool = True,
+    last_resort: bool = True,
 ) -> Parameterization:
     """Map to the disk by scaling edges, with flips that keep the triangulation Delaunay.
 
