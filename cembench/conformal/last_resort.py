@@ -1,11 +1,12 @@
 """A valid map of a disk wherever doubles hold one, whatever an algorithm returned.
 
 A triangle whose three corners lie on arcs of length h has an area of about h^3 / 4, and its sign is
-lost in rounding below :data:`LEAST_ARC`. So arcs at folds are widened to that. Then patches of the
-interior around the folds are laid out again, small ones first, by two methods: the conformal energy
-with a barrier (:mod:`cembench.conformal.untangling`), and mean value weights, which are positive.
-In every patch the one of better angles is taken. If folds remain, the whole interior gets mean
-value weights: on a convex boundary such a map has no folds (Tutte 1963, Floater 2003).
+lost in rounding below :data:`LEAST_ARC`; so arcs at folds are widened to that. The interior around
+the folds is laid out again in patches (:mod:`cembench.conformal.folds`). Where that is not enough,
+or costs angles, every interior vertex becomes a mean of its neighbours with positive weights: mean
+value weights of the image, which reproduce it, except near folds, where they are the surface's. On
+a convex boundary such a map has no folds (Tutte 1963; Floater 2003). At worst the surface's weights
+are used everywhere.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import figures
 from cembench.conformal.folds import LEAST_ARC as DISTINCT
-from cembench.conformal.folds import in_order
+from cembench.conformal.folds import in_order, interior_without_folds
 from cembench.conformal.harmonic import arc_length_circle
 from cembench.conformal.mean_value import convex_extension, mean_value_weights
 from cembench.conformal.metrics import angle_errors, flipped_triangles
@@ -40,11 +41,16 @@ DiskAlgorithm = Callable[..., Parameterization]
 
 #: Shortest arc, in radians, between the corners of a triangle that doubles resolve.
 LEAST_ARC = 3e-8
-#: Numbers of rings of vertices around the folds that are laid out again, in this order.
-RINGS = (1, 2, 4, 8, 16, 32)
-#: Patches are no remedy if more than this share of the triangles fold, and a map whose mean angle
-#: error, in degrees, is above BAD may be worse than mean value weights everywhere.
-MOST_FOLDED, BAD = 0.1, 30.0
+#: Numbers of rings of vertices around the folds that get the surface's weights.
+RINGS = (0, 2, 8)
+#: Patches are no remedy if more than this share of the triangles fold; they are all that is tried
+#: if they raise the mean angle error by no more than the share CHEAP.
+MOST_FOLDED, CHEAP = 0.3, 0.01
+#: Up to this size the whole interior is laid out again if the above leaves folds or costs more.
+MOST_TRIANGLES = 20_000
+#: A map whose mean angle error, in degrees, is above this may be worse than mean value weights
+#: everywhere.
+BAD = 30.0
 
 
 def with_last_resort(method: DiskAlgorithm) -> DiskAlgorithm:
@@ -90,13 +96,13 @@ def valid_map(
     Returns
     -------
     z : complex (n,)
-        The map; `own` itself if that is valid and not crowded. It is folded only if doubles do not
-        hold the mean value map and Tutte's either.
+        The map; `own` itself if that is valid and not crowded. It is folded only if doubles hold
+        neither the mean value map nor Tutte's.
     extras : dict
         ``fold_repairs``, ``folded_before_repair`` and ``before_repair`` as for
-        :func:`cembench.conformal.fold_repair.accepted_repair`. Where arcs were widened or mean
-        value weights used, ``last_resort`` has ``arcs_widened`` and ``mean_value_vertices``, the
-        numbers of boundary vertices that were moved and of interior vertices that were placed so.
+        :func:`cembench.conformal.fold_repair.accepted_repair`. Where arcs were widened or the
+        surface's mean value weights used, ``last_resort`` has ``moved_boundary_vertices`` and
+        ``mean_value_vertices``, the numbers of vertices concerned.
 
     Examples
     --------
@@ -110,127 +116,132 @@ def valid_map(
     with phase("folds"):
         folded = 0 if own is None else flipped_triangles(mesh, own)
         extras: dict[str, Any] = {"fold_repairs": 0, "folded_before_repair": folded}
-        if own is None:
-            maps = []
-        elif not folded:
-            maps = [(own, _resort(0, 0))]
-        else:
+        choice = _Choice(mesh)
+        if own is not None:
+            choice.offer(own)
+        if own is not None and folded:
             extras["before_repair"] = figures(mesh, own, folded)
-            z, extras["fold_repairs"], resort = _repaired_patches(mesh, own, folded)
-            maps = [(z, resort)]
-        if not maps or crowded or _cost(mesh, maps[0][0]) > (0, BAD if folded else np.inf):
-            extras["fold_repairs"] += 1
-            maps += _convex_maps(mesh, own)
-        uv, resort = min(maps, key=lambda one: _cost(mesh, one[0]))
-    return uv, extras | ({"last_resort": resort} if any(resort.values()) else {})
+            limit = (1 + CHEAP) * choice.error
+            extras["fold_repairs"] = _offer_patches(choice, own, folded)
+            if (choice.folds, choice.error) > (0, limit):
+                _offer_convex_maps(choice, own)
+        if own is None or crowded or (folded and (choice.folds, choice.error) > (0, BAD)):
+            _offer_mean_value_maps(choice, own)
+        extras["fold_repairs"] += choice.solves
+        b = mesh.boundary
+        moved = len(b) if own is None else int(np.count_nonzero(choice.z[b] != own[b]))
+        if moved or choice.by_means:
+            extras["last_resort"] = {
+                "moved_boundary_vertices": moved,
+                "mean_value_vertices": choice.by_means,
+            }
+    return choice.z, extras
 
 
-def _resort(arcs_widened: int, mean_value_vertices: int) -> dict[str, int]:
-    """Return the record of what the last resort changed."""
-    return {"arcs_widened": arcs_widened, "mean_value_vertices": mean_value_vertices}
+class _Choice:
+    """The best map offered so far: fewest folds, then least mean angle error."""
+
+    def __init__(self, mesh: DiskMesh) -> None:
+        self.mesh = mesh
+        self.z = np.zeros(mesh.n, dtype=np.complex128)
+        self.folds, self.error = mesh.m + 1, float("inf")
+        #: Number of vertices of the best map that have the surface's weights; solves in all.
+        self.by_means = self.solves = 0
+
+    def offer(self, z: Complex, by_means: int = 0) -> None:
+        """Keep a map if it is better."""
+        folds = flipped_triangles(self.mesh, z)
+        error = float(angle_errors(self.mesh, z).mean())
+        if (folds, error) < (self.folds, self.error):
+            self.z, self.folds, self.error, self.by_means = z, folds, error, by_means
+
+    def offer_means(self, z: Complex, surface: Mask, W: scipy.sparse.csr_array) -> None:
+        """Offer the map with the boundary of `z` and positive weights.
+
+        They are W's at the vertices `surface` (n,), elsewhere mean value weights of the image z.
+        """
+        mesh, b, i = self.mesh, self.mesh.boundary, self.mesh.interior
+        if not surface[i].all():
+            image = mean_value_weights(np.stack([z.real, z.imag], axis=1), mesh.F)
+            image.data[~np.isfinite(image.data)] = 0
+            share = surface.astype(np.float64)
+            W = scipy.sparse.diags_array(share) @ W + scipy.sparse.diags_array(1 - share) @ image
+        with contextlib.suppress(AlgorithmFailed):
+            self.solves += 1
+            means = convex_extension(scipy.sparse.csr_array(W), b, i, z) if len(i) else z
+            self.offer(means, int(surface[i].sum()))
 
 
-def _cost(mesh: DiskMesh, z: Complex) -> tuple[int, float]:
-    """Return the number of folds and the mean angle error of a map."""
-    return flipped_triangles(mesh, z), float(angle_errors(mesh, z).mean())
+def _offer_patches(choice: _Choice, own: Complex, folded: int) -> int:
+    """Offer the map with the interior around folds laid out again; return the rounds."""
+    mesh = choice.mesh
+    if folded > MOST_FOLDED * mesh.m:
+        return 0
+    # No layout of the interior removes a fold whose corners are all on the boundary.
+    corners = mesh.F[folded_triangles(own, mesh.F)]
+    stuck = corners[np.isin(corners, mesh.boundary).all(axis=1)]
+    z = _widened(mesh, own, stuck)
+    if z is None:
+        return 0
+    z, rounds = interior_without_folds(mesh, z)
+    choice.offer(z)
+    return rounds
 
 
-def _repaired_patches(
-    mesh: DiskMesh, z: Complex, count: int
-) -> tuple[Complex, int, dict[str, int]]:
-    """Return the map with patches around its folds laid out again, the rounds and the record."""
-    own, b, rounds = z, mesh.boundary, 0
-    held, by_means = np.zeros((2, mesh.n), dtype=bool)
-    held[b] = True
+def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
+    """Offer maps with the image's mean value weights except near its folds, and one made of them.
+
+    That is the best one with its interior laid out anew, on surfaces where this takes a moment.
+    """
+    mesh = choice.mesh
     graph = vertex_graph(mesh.F, mesh.n)
     W = mean_value_weights(mesh.V, mesh.F)
-    for rings in RINGS if count <= MOST_FOLDED * mesh.m else ():
-        folded = folded_triangles(z, mesh.F)
-        if not len(folded):
-            break
-        # At first arcs are widened only where no layout of the interior removes the fold.
-        stuck = folded if rounds else folded[held[mesh.F[folded]].all(axis=1)]
-        widened = _widened(z[b], np.isin(b, mesh.F[stuck]))
-        if widened is None:
-            break
-        z = z.copy()
-        z[b] = widened
-        near = np.zeros(mesh.n, dtype=bool)
-        near[mesh.F[np.concatenate([folded, folded_triangles(z, mesh.F)])]] = True
-        for _ in range(rings):
-            near |= graph @ near.astype(np.float64) > 0
-        free = near & ~held
-        z = _better_patches(mesh, z, free, graph, W, by_means) if free.any() else z
-        rounds += 1
-    return z, rounds, _resort(int((z[b] != own[b]).sum()), int(by_means.sum()))
+    folded = folded_triangles(own, mesh.F)
+    for rings in RINGS:
+        near = _rings(graph, mesh.F[folded], rings)
+        z = _widened(mesh, own, np.flatnonzero(near))
+        if z is None:
+            return
+        both = np.concatenate([folded, folded_triangles(z, mesh.F)])
+        choice.offer_means(z, _rings(graph, mesh.F[both], rings), W)
+    if not choice.folds and mesh.m <= MOST_TRIANGLES:
+        inside = ~_rings(graph, mesh.boundary, 0)
+        choice.offer(untangled(mesh, choice.z, inside, graph)[0], choice.by_means)
 
 
-def _better_patches(
-    mesh: DiskMesh,
-    z: Complex,
-    free: Mask,
-    graph: scipy.sparse.csr_array,
-    W: scipy.sparse.csr_array,
-    by_means: Mask,
-) -> Complex:
-    """Return the map with every patch of free vertices in its better layout without folds.
+def _offer_mean_value_maps(choice: _Choice, own: Complex | None) -> None:
+    """Offer maps with the surface's weights everywhere; uniform ones if these fold too."""
+    mesh, everywhere = choice.mesh, np.ones(choice.mesh.n, dtype=bool)
+    by_length = np.zeros(mesh.n, dtype=np.complex128)
+    by_length[mesh.boundary] = arc_length_circle(mesh)
+    widened = None if own is None else _widened(mesh, own, mesh.boundary)
+    for W in (mean_value_weights(mesh.V, mesh.F), vertex_graph(mesh.F, mesh.n)):
+        choice.offer_means(by_length, everywhere, W)
+        if widened is not None:
+            choice.offer_means(widened, everywhere, W)
+        if not choice.folds:
+            return
 
-    A patch without such a layout stays as it is. `by_means` (n,) marks vertices that mean value
-    weights placed; it is updated.
+
+def _rings(graph: scipy.sparse.csr_array, vertices: NDArray[np.int64], count: int) -> Mask:
+    """Return which vertices (n,) are at most `count` edges away from some vertices."""
+    near = np.zeros(graph.shape[0], dtype=bool)
+    near[vertices] = True
+    for _ in range(count):
+        near |= graph @ near.astype(np.float64) > 0
+    return near
+
+
+def _widened(mesh: DiskMesh, z: Complex, vertices: NDArray[np.int64]) -> Complex | None:
+    """Return the map with its boundary in order and arcs at these vertices wide enough.
+
+    None if the boundary does not go around the circle.
     """
-    laid_out, patch = untangled(mesh, z, free, graph)
-    layouts = [laid_out]
-    with contextlib.suppress(AlgorithmFailed):
-        layouts.append(convex_extension(W, np.flatnonzero(~free), np.flatnonzero(free), z))
-    inside = patch >= 0
-    T, of = mesh.F[inside], patch[inside]
-    errors = [np.bincount(of, _error_of_triangles(mesh, layout, inside)) for layout in layouts]
-    best = np.argmin(errors, axis=0)
-    choice = np.where(np.isfinite(np.min(errors, axis=0)), best, -1)
-    chosen = np.full(mesh.n, -1)
-    chosen[T] = choice[of][:, None]
-    chosen[~free] = -1
-    z = z.copy()
-    for k, layout in enumerate(layouts):
-        z[chosen == k] = layout[chosen == k]
-    by_means[chosen >= 0] = chosen[chosen >= 0] == 1
-    return z
-
-
-def _error_of_triangles(mesh: DiskMesh, z: Complex, some: Mask) -> NDArray[np.float64]:
-    """Return the angle errors of some triangles of a map, infinite if they fold."""
-    errors = angle_errors(mesh, z)[some].sum(axis=1)
-    errors[folded_triangles(z, mesh.F[some])] = np.inf
-    return errors
-
-
-def _widened(circle: Complex, at: Mask) -> Complex | None:
-    """Return a boundary in order, arcs at some vertices being at least :data:`LEAST_ARC`.
-
-    None if it does not go around the circle.
-    """
+    at = np.isin(mesh.boundary, vertices)
+    least = np.where(at | np.roll(at, -1), LEAST_ARC, DISTINCT)
+    widened = z.copy()
     try:
-        return in_order(circle, np.where(at | np.roll(at, -1), LEAST_ARC, DISTINCT))
+        widened[mesh.boundary] = in_order(z[mesh.boundary], least)
     except AlgorithmFailed:
         return None
-
-
-def _convex_maps(mesh: DiskMesh, own: Complex | None) -> list[tuple[Complex, dict[str, int]]]:
-    """Return maps with convex weights everywhere, on the algorithm's boundary and by arc length."""
-    b, i = mesh.boundary, mesh.interior
-    circles = [arc_length_circle(mesh)]
-    widened = None if own is None else _widened(own[b], np.ones(len(b), dtype=bool))
-    if widened is not None:
-        circles.append(widened)
-    maps = []
-    for W in (mean_value_weights(mesh.V, mesh.F), vertex_graph(mesh.F, mesh.n)):
-        for circle in circles:
-            z = np.zeros(mesh.n, dtype=np.complex128)
-            z[b] = circle
-            moved = len(b) if own is None else int((own[b] != circle).sum())
-            with contextlib.suppress(AlgorithmFailed):
-                z = convex_extension(W, b, i, z) if len(i) else z
-                maps.append((z, _resort(moved, len(i))))
-        if any(not flipped_triangles(mesh, z) for z, _ in maps):
-            break
-    return maps
+    return widened
