@@ -59,7 +59,8 @@ def bff(
     no arc changes by more than a relative `tolerance` (`sweeps`, `change`), and fail after
     `max_sweeps`; each removes about half of the error. The interior is the harmonic extension of
     both coordinates. `gauss_bonnet` is the distance of the sum of the natural k~ (u = 0) from 2 pi.
-    Folds are repaired as in CEM (`fold_repairs`).
+    Folds are repaired as in CEM (`fold_repairs`); `last_resort`
+    makes the map valid in any case.
     """
     yamabe = YamabeBoundary(mesh, delaunay=delaunay)
     measure = gauge_measure(mesh, gauge, mesh.boundary)

@@ -66,9 +66,9 @@ def cetm_flips(
     and their lengths after laying them out triangle by triangle. The map consists of the images of
     the vertices. The surface's own triangles, between straight edges, differ from the flipped ones:
     those that fold are counted (`folded_before_repair`) and repaired as in CEM (`fold_repairs`).
+    `last_resort` makes the map valid in any case.
     """
     b = mesh.boundary
-    L = laplacian(mesh)
     cones = _cones(mesh, BorderedLaplacian(mesh, laplacian(mesh, delaunay=True), (b,)))
     double = doubled(mesh)
     with phase("flips"):
@@ -84,11 +84,7 @@ def cetm_flips(
     uv /= np.maximum(np.abs(uv), 1.0)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
-    try:
-        uv, told = accepted_repair(mesh, uv, L, repair=repair)
-    except AlgorithmFailed as error:  # the map is reported unrepaired
-        _, told = accepted_repair(mesh, uv, repair=False)
-        told["no_repair"] = str(error)
+    uv, told = accepted_repair(mesh, uv, repair=repair)
     told |= {
         "curvature": residual,
         "flips": T.flips,

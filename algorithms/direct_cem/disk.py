@@ -74,7 +74,8 @@ def direct_cem(
     would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those held).
     Near its minimum E_C is flat but the angles are not, and harmonic measure has better ones. So
     the boundary is finally moved back towards it as far as that raises E_C by at most the share
-    `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`).
+    `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`); `last_resort`
+    makes the map valid in any case.
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("start"):

@@ -148,13 +148,14 @@ Repair = Annotated[
     bool, typer.Option("--repair", help="Repair the mesh files first, like `cembench repair`.")
 ]
 Weld = Annotated[
-    float,
+    float | None,
     typer.Option(
         metavar="TOLERANCE",
         min=0.0,
         max=1e60,
         callback=finite,
-        help="Weld vertices up to this distance apart, in the file's units; 0: equal ones only.",
+        help="Weld vertices up to this distance apart, in the file's units; 0: equal ones only, "
+        "which is the default but for the seams of a disk.",
     ),
 ]
 FillHoles = Annotated[

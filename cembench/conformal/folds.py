@@ -173,11 +173,15 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     ordered = np.roll(np.where(moved, cut[0] * np.exp(1j * (angles + turned)), cut), first)
     turns = round(arcs.sum() / (2 * np.pi))
     scrambled = backward_arcs(circle) > MOST_BACKWARD * len(circle)
-    if turns != 1 or scrambled or backward_arcs(ordered):
+    if turns != 1:
         raise AlgorithmFailed(
-            f"the boundary winds around the circle {turns} time(s) counter-clockwise (it must be "
-            f"once), and {backward_arcs(circle)} of its {len(circle)} arcs go backward or have "
-            "no length: the order cannot be repaired"
+            f"the boundary winds around the circle {turns} times counter-clockwise; it must do so "
+            "once, and its order cannot be repaired"
+        )
+    if scrambled or backward_arcs(ordered):
+        raise AlgorithmFailed(
+            f"{backward_arcs(circle)} of the boundary's {len(circle)} arcs go backward or have no "
+            f"length, more than the share of {MOST_BACKWARD:.0%} whose order can be repaired"
         )
     return ordered
 

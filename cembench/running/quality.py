@@ -51,7 +51,7 @@ def quality_notes(
 
     `error` is its mean angle error in degrees.
     """
-    notes = []
+    notes = _last_resort(mesh, extras, error)
     if extras.get("stopped") == "crowded":
         told = (
             "the iteration ended early because the boundary is too crowded: this is not the map "
@@ -80,6 +80,29 @@ def quality_notes(
         )
         notes.append(Notice(NoticeKind.FAR_FROM_CONFORMAL, told))
     return notes
+
+
+def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) -> list[Notice]:
+    """Return a remark on what a method's last resort did, and what that cost."""
+    done = extras.get("last_resort")
+    if not done:
+        return []
+    folded, failure = extras.get("folded_before_repair"), extras.get("failure")
+    own = f"failed ({failure})" if failure else f"has {folded:,} folds" if folded else "is crowded"
+    before = extras.get("before_repair", {}).get("angle_error_mean_deg")
+    cost = "" if before is None else f" instead of {before:.2f}"
+    told = (
+        f"the method's own map {own}, so this one is its last resort: "
+        f"{done['moved_boundary_vertices']:,} boundary vertices were moved, and mean value weights "
+        f"placed {done['mean_value_vertices']:,} vertices; the mean angle error is {error:.2f} "
+        f"degrees{cost}"
+    )
+    if done["mean_value_vertices"] == len(mesh.interior):
+        told += (
+            ". The surface may be too long for one disk: a free boundary has room for it, "
+            "e.g. -a abf-linear"
+        )
+    return [Notice(NoticeKind.LAST_RESORT, told)]
 
 
 def better_parameters(
