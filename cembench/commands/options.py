@@ -22,9 +22,9 @@ LONGEST = 10_000_000.0
 MOST_FACES = 1_000_000_000
 
 
-def finite(value: float) -> float:
+def finite(value: float | None) -> float | None:
     """Raise on NaN, which passes any comparison with a bound."""
-    if math.isnan(value):
+    if value is not None and math.isnan(value):
         raise typer.BadParameter("nan is not allowed; write a number within the range.")
     return value
 

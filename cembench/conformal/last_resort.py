@@ -21,12 +21,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cembench.conformal.fold_repair import figures
+from cembench.conformal.fold_repair import MOST_COST, figures
 from cembench.conformal.folds import LEAST_ARC as DISTINCT
 from cembench.conformal.folds import in_order, interior_without_folds
 from cembench.conformal.harmonic import arc_length_circle
 from cembench.conformal.mean_value import convex_extension, mean_value_weights
-from cembench.conformal.metrics import angle_errors, flipped_triangles
+from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.planar import folded_triangles
 from cembench.conformal.untangling import untangled
 from cembench.core.clock import phase
@@ -116,16 +116,15 @@ def valid_map(
     with phase("folds"):
         folded = 0 if own is None else flipped_triangles(mesh, own)
         extras: dict[str, Any] = {"fold_repairs": 0, "folded_before_repair": folded}
-        choice = _Choice(mesh)
-        if own is not None:
-            choice.offer(own)
+        if own is not None and not (folded or crowded):
+            return own, extras
+        choice = _Choice(mesh, own)
         if own is not None and folded:
-            extras["before_repair"] = figures(mesh, own, folded)
-            limit = (1 + CHEAP) * choice.error
+            extras["before_repair"] = before = figures(mesh, own, folded)
             extras["fold_repairs"] = _offer_patches(choice, own, folded)
-            if (choice.folds, choice.error) > (0, limit):
+            if choice.cost > (0, False, (1 + CHEAP) * before["angle_error_mean_deg"]):
                 _offer_convex_maps(choice, own)
-        if own is None or crowded or (folded and (choice.folds, choice.error) > (0, BAD)):
+        if own is None or crowded or (folded and choice.cost > (0, False, BAD)):
             _offer_mean_value_maps(choice, own)
         extras["fold_repairs"] += choice.solves
         b = mesh.boundary
@@ -139,21 +138,30 @@ def valid_map(
 
 
 class _Choice:
-    """The best map offered so far: fewest folds, then least mean angle error."""
+    """The best map offered: fewest folds, E_C in bounds, then least mean angle error.
 
-    def __init__(self, mesh: DiskMesh) -> None:
+    E_C is in bounds up to a multiple of that of the algorithm's own map
+    (:data:`cembench.conformal.fold_repair.MOST_COST`).
+    """
+
+    def __init__(self, mesh: DiskMesh, own: Complex | None) -> None:
         self.mesh = mesh
-        self.z = np.zeros(mesh.n, dtype=np.complex128)
-        self.folds, self.error = mesh.m + 1, float("inf")
+        self.cost, self.most_energy = (mesh.m + 1, True, np.inf), np.inf
         #: Number of vertices of the best map that have the surface's weights; solves in all.
         self.by_means = self.solves = 0
+        if own is not None:
+            energy = figures(mesh, own, 0)["conformal_energy"]
+            self.most_energy = MOST_COST["conformal_energy"] * max(energy, 0)
+            self.offer(own)
 
     def offer(self, z: Complex, by_means: int = 0) -> None:
         """Keep a map if it is better."""
         folds = flipped_triangles(self.mesh, z)
-        error = float(angle_errors(self.mesh, z).mean())
-        if (folds, error) < (self.folds, self.error):
-            self.z, self.folds, self.error, self.by_means = z, folds, error, by_means
+        new = figures(self.mesh, z, folds)
+        above = new["conformal_energy"] > self.most_energy
+        cost = (folds, above, new["angle_error_mean_deg"])
+        if cost < self.cost:
+            self.z, self.cost, self.by_means = z, cost, by_means
 
     def offer_means(self, z: Complex, surface: Mask, W: scipy.sparse.csr_array) -> None:
         """Offer the map with the boundary of `z` and positive weights.
@@ -162,7 +170,8 @@ class _Choice:
         """
         mesh, b, i = self.mesh, self.mesh.boundary, self.mesh.interior
         if not surface[i].all():
-            image = mean_value_weights(np.stack([z.real, z.imag], axis=1), mesh.F)
+            with np.errstate(all="ignore"):  # folded triangles may have no area or length
+                image = mean_value_weights(np.stack([z.real, z.imag], axis=1), mesh.F)
             image.data[~np.isfinite(image.data)] = 0
             share = surface.astype(np.float64)
             W = scipy.sparse.diags_array(share) @ W + scipy.sparse.diags_array(1 - share) @ image
@@ -204,7 +213,7 @@ def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
             return
         both = np.concatenate([folded, folded_triangles(z, mesh.F)])
         choice.offer_means(z, _rings(graph, mesh.F[both], rings), W)
-    if not choice.folds and mesh.m <= MOST_TRIANGLES:
+    if not choice.cost[0] and mesh.m <= MOST_TRIANGLES:
         inside = ~_rings(graph, mesh.boundary, 0)
         choice.offer(untangled(mesh, choice.z, inside, graph)[0], choice.by_means)
 
@@ -219,7 +228,7 @@ def _offer_mean_value_maps(choice: _Choice, own: Complex | None) -> None:
         choice.offer_means(by_length, everywhere, W)
         if widened is not None:
             choice.offer_means(widened, everywhere, W)
-        if not choice.folds:
+        if not choice.cost[0]:
             return
 
 
