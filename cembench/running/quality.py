@@ -34,9 +34,9 @@ Complex = NDArray[np.complex128]
 FAR = 2.0
 #: Below this mean angle error, in degrees, none is, so a large smooth surface needs no yardstick.
 CLOSE = 0.1
-#: So is a map above this share of the mean angle error of collapsed triangles; the yardstick may be
-#: as bad there.
-COLLAPSED = 0.25
+#: So is a map above this share of the mean angle error of collapsed triangles, or above so many
+#: degrees; the yardstick may be as bad there.
+COLLAPSED, POOR = 0.25, 10.0
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
@@ -62,7 +62,7 @@ def quality_notes(
     if known is None:
         return notes
     reachable = float(angle_errors(mesh, known).mean())
-    if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh)):
+    if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh), POOR):
         return notes
     causes = likely_causes(mesh, uv, extras)
     if error > FAR * reachable:
