@@ -12,6 +12,7 @@ from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import Stop, iterate_boundary, on_circle, pole_start
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.last_resort import with_last_resort
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -21,6 +22,7 @@ Complex = NDArray[np.complex128]
 
 
 @algorithm("cem", title="CEM", target="disk", source="The CEM paper, Algorithm 1")
+@with_last_resort
 def cem(
     mesh: DiskMesh,
     *,
@@ -31,6 +33,7 @@ def cem(
     best: bool = False,
     delaunay: bool = False,
     repair: bool = True,
+    last_resort: bool = False,
 ) -> Parameterization:
     """Map a disk by Algorithm 1 of the paper.
 

@@ -25,6 +25,7 @@ from cembench.conformal.harmonic import (
     harmonic_extension,
 )
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
+from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.planar import polygon_area, signed_areas
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
@@ -47,6 +48,7 @@ MIRRORED_SHARE = 1 / 3
     target="disk",
     source="Choi & Lui, Fast disk conformal parameterization, J. Sci. Comput. 65 (2015)",
 )
+@with_last_resort
 def fdm(
     mesh: DiskMesh,
     *,
@@ -55,6 +57,7 @@ def fdm(
     delaunay: bool = False,
     public_program: bool = False,
     repair: bool = True,
+    last_resort: bool = False,
 ) -> Parameterization:
     """Map a disk by correcting a harmonic map, first in the half plane and then by reflection.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.last_resort import with_last_resort
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
@@ -17,8 +18,9 @@ from cembench.registry import algorithm
     source="Eq. (10) with a prescribed boundary; Floater & Hormann 2005, Sec. 3",
     conformal=False,
 )
+@with_last_resort
 def harmonic_circle(
-    mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True
+    mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True, last_resort: bool = False
 ) -> Parameterization:
     """Map a disk by one Dirichlet solve, with the boundary spaced by arc length.
 

@@ -15,6 +15,7 @@ from cembench.conformal.doubling import DoubledSurface, doubled, doubled_laplaci
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.moebius import three_point_map
 from cembench.conformal.planar import polygon_area
 from cembench.conformal.spherical import balanced_planar_map
@@ -39,7 +40,10 @@ NEAREST = 1e-8
     target="disk",
     source="Choi & Lui, A linear formulation for disk conformal parameterization (2015)",
 )
-def ldm(mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True) -> Parameterization:
+@with_last_resort
+def ldm(
+    mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True, last_resort: bool = False
+) -> Parameterization:
     """Map a disk by half of a conformal map of the doubled surface to the sphere.
 
     Faithful to the published method and to the program that its authors made public: the doubled

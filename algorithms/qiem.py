@@ -14,6 +14,7 @@ from cembench.conformal.doubling import doubled, doubled_laplacian
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.planar import fitted_circle, polygon_area
 from cembench.conformal.spherical import balanced_planar_map
 from cembench.conformal.stereographic import to_plane, to_sphere
@@ -38,6 +39,7 @@ FIRST, GROWTH, CUT, SHARE, LEAST = 0.1, 1.5, 0.5, 0.9, 1e-6
     target="disk",
     source="Huang, Gu, Huang, Lin, Lin & Yau, Geom. Imag. Comput. 1 (2014), 223-258",
 )
+@with_last_resort
 def qiem(
     mesh: DiskMesh,
     *,
@@ -45,6 +47,7 @@ def qiem(
     max_iterations: Annotated[int, Field(ge=1, le=1_000_000)] = 200,
     delaunay: bool = False,
     repair: bool = True,
+    last_resort: bool = False,
 ) -> Parameterization:
     """Map a disk by half of the limit of the heat flow of the doubled surface on the sphere.
 

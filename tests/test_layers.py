@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 1_750,
     "mesh": 5_900,
     "linear_algebra": 1_450,
-    "conformal": 5_000,
+    "conformal": 5_350,
     "registry": 870,
     "results": 4_000,
     "running": 7_210,

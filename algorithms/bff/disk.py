@@ -12,6 +12,7 @@ from cembench.conformal.boundary_energy import in_gauge
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure
+from cembench.conformal.last_resort import with_last_resort
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -33,6 +34,7 @@ CROWDED = 1e13
     source="Sawhney & Crane, Boundary first flattening, 2017",
     usual=False,
 )
+@with_last_resort
 def bff(
     mesh: DiskMesh,
     *,
@@ -41,6 +43,7 @@ def bff(
     gauge: Gauge = "boundary",
     delaunay: bool = False,
     repair: bool = True,
+    last_resort: bool = True,
 ) -> Parameterization:
     """Map to the disk with exterior angles of the boundary in proportion to its lengths.
 
@@ -56,7 +59,8 @@ def bff(
     no arc changes by more than a relative `tolerance` (`sweeps`, `change`), and fail after
     `max_sweeps`; each removes about half of the error. The interior is the harmonic extension of
     both coordinates. `gauss_bonnet` is the distance of the sum of the natural k~ (u = 0) from 2 pi.
-    Folds are repaired as in CEM (`fold_repairs`).
+    Folds are repaired as in CEM (`fold_repairs`); `last_resort`
+    makes the map valid in any case.
     """
     yamabe = YamabeBoundary(mesh, delaunay=delaunay)
     measure = gauge_measure(mesh, gauge, mesh.boundary)

@@ -14,6 +14,7 @@ from cembench.conformal.doubling import doubled
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
+from cembench.conformal.last_resort import with_last_resort
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -37,6 +38,7 @@ Indices = NDArray[np.int64]
     source="Gu, Luo, Sun & Wu 2018; Gillespie, Springborn & Crane 2021; Campen et al. 2021",
     usual=False,
 )
+@with_last_resort
 def cetm_flips(
     mesh: DiskMesh,
     *,
@@ -44,6 +46,7 @@ def cetm_flips(
     max_iterations: Annotated[int, Field(ge=1, le=10_000)] = 200,
     gauge: Gauge = "boundary",
     repair: bool = True,
+    last_resort: bool = True,
 ) -> Parameterization:
     """Map to the disk by scaling edges, with flips that keep the triangulation Delaunay.
 
@@ -63,9 +66,9 @@ def cetm_flips(
     and their lengths after laying them out triangle by triangle. The map consists of the images of
     the vertices. The surface's own triangles, between straight edges, differ from the flipped ones:
     those that fold are counted (`folded_before_repair`) and repaired as in CEM (`fold_repairs`).
+    `last_resort` makes the map valid in any case.
     """
     b = mesh.boundary
-    L = laplacian(mesh)
     cones = _cones(mesh, BorderedLaplacian(mesh, laplacian(mesh, delaunay=True), (b,)))
     double = doubled(mesh)
     with phase("flips"):
@@ -81,11 +84,7 @@ def cetm_flips(
     uv /= np.maximum(np.abs(uv), 1.0)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
-    try:
-        uv, told = accepted_repair(mesh, uv, L, repair=repair)
-    except AlgorithmFailed as error:  # the map is reported unrepaired
-        _, told = accepted_repair(mesh, uv, repair=False)
-        told["no_repair"] = str(error)
+    uv, told = accepted_repair(mesh, uv, repair=repair)
     told |= {
         "curvature": residual,
         "flips": T.flips,

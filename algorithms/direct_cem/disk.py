@@ -21,6 +21,7 @@ from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.interior_laplacian import InteriorLaplacian, solves_pay
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.quasi_newton import quasi_newton_minimum
 from cembench.core.clock import phase
 from cembench.core.parameterization import Parameterization
@@ -38,6 +39,7 @@ SURELY_MORE = 2
 
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
+@with_last_resort
 def direct_cem(
     mesh: DiskMesh,
     *,
@@ -47,6 +49,7 @@ def direct_cem(
     back: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.01,
     delaunay: bool = True,
     repair: bool = True,
+    last_resort: bool = True,
 ) -> Parameterization:
     """Minimise the conformal energy over the boundary's angles on the circle, by Newton's method.
 
@@ -71,7 +74,8 @@ def direct_cem(
     would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those held).
     Near its minimum E_C is flat but the angles are not, and harmonic measure has better ones. So
     the boundary is finally moved back towards it as far as that raises E_C by at most the share
-    `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`).
+    `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`); `last_resort`
+    makes the map valid in any case.
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("start"):

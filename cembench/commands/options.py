@@ -22,9 +22,9 @@ LONGEST = 10_000_000.0
 MOST_FACES = 1_000_000_000
 
 
-def finite(value: float) -> float:
+def finite(value: float | None) -> float | None:
     """Raise on NaN, which passes any comparison with a bound."""
-    if math.isnan(value):
+    if value is not None and math.isnan(value):
         raise typer.BadParameter("nan is not allowed; write a number within the range.")
     return value
 
@@ -147,13 +147,14 @@ Repair = Annotated[
     bool, typer.Option("--repair", help="Repair the mesh files first, like `cembench repair`.")
 ]
 Weld = Annotated[
-    float,
+    float | None,
     typer.Option(
         metavar="TOLERANCE",
         min=0.0,
         max=1e60,
         callback=finite,
-        help="Weld vertices up to this distance apart, in the file's units; 0: equal ones only.",
+        help="Weld vertices up to this distance apart, in the file's units; 0: equal ones only, "
+        "which is the default but for the seams of a disk.",
     ),
 ]
 FillHoles = Annotated[

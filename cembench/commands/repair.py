@@ -27,7 +27,7 @@ def repair(
         Path,
         typer.Option("-o", "--output", help="File for the repaired surface: OBJ, OFF, PLY or STL."),
     ],
-    weld: Weld = 0.0,
+    weld: Weld = None,
     fill_holes: FillHoles = 0,
     components: Annotated[
         Keep,

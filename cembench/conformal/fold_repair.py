@@ -64,15 +64,15 @@ def accepted_repair(
     if not rounds:
         return own, extras
     with phase("folds"):
-        old = _figures(mesh, own, folded)
-        new = _figures(mesh, after, flipped_triangles(mesh, after))
+        old = figures(mesh, own, folded)
+        new = figures(mesh, after, flipped_triangles(mesh, after))
     extras |= {"fold_repairs": rounds, "before_repair": old}
     if all(new[name] <= most * max(old[name], 0) for name, most in MOST_COST.items()):
         return after, extras
     return own, extras | {"refused_repair": new}
 
 
-def _figures(mesh: TriangleMesh, uv: Complex, folded: int) -> dict[str, float | int]:
+def figures(mesh: TriangleMesh, uv: Complex, folded: int) -> dict[str, float | int]:
     """Return the metrics that decide on a repair."""
     return {
         "flipped_triangles": folded,

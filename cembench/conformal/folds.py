@@ -147,12 +147,13 @@ def _on_boundary_without_folds(mesh: DiskMesh, circle: Complex) -> Complex:
     return ordered
 
 
-def in_order(circle: Complex) -> Complex:
+def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     """Return the nearest points of the unit circle that go around it counter-clockwise.
 
     The angles (k,) are replaced by their isotonic regression; points that are in order stay. Points
     that changed places with each other are spread evenly over at least the part of the circle by
-    which they were out of order; no two are closer than `LEAST_ARC`.
+    which they were out of order; no arc is shorter than `least`, in radians: one number, or one
+    (k,) for the arc from each point to the next.
 
     Raises
     ------
@@ -165,30 +166,35 @@ def in_order(circle: Complex) -> Complex:
     first = int(np.argmax(arcs)) + 1  # cut the circle where points are least crowded
     arcs = np.roll(arcs, -first)
     angles = np.concatenate([[0.0], np.cumsum(arcs[:-1])])
-    turned = _in_order(angles) - angles
+    least = np.roll(np.broadcast_to(least, len(circle)), -first)
+    turned = _in_order(angles, least) - angles
     cut = np.roll(circle, -first)
     moved = np.abs(turned) > MOVED
     ordered = np.roll(np.where(moved, cut[0] * np.exp(1j * (angles + turned)), cut), first)
     turns = round(arcs.sum() / (2 * np.pi))
     scrambled = backward_arcs(circle) > MOST_BACKWARD * len(circle)
-    if turns != 1 or scrambled or backward_arcs(ordered):
+    if turns != 1:
         raise AlgorithmFailed(
-            f"the boundary winds around the circle {turns} time(s) counter-clockwise (it must be "
-            f"once), and {backward_arcs(circle)} of its {len(circle)} arcs go backward or have "
-            "no length: the order cannot be repaired"
+            f"the boundary winds around the circle {turns} times counter-clockwise; it must do so "
+            "once, and its order cannot be repaired"
+        )
+    if scrambled or backward_arcs(ordered):
+        raise AlgorithmFailed(
+            f"{backward_arcs(circle)} of the boundary's {len(circle)} arcs go backward or have no "
+            f"length, more than the share of {MOST_BACKWARD:.0%} whose order can be repaired"
         )
     return ordered
 
 
-def _in_order(angles: Real) -> Real:
-    """Return the isotonic regression of angles, with distinct values."""
+def _in_order(angles: Real, least: Real) -> Real:
+    """Return the isotonic regression of angles, each `least` before the next one."""
     from scipy.optimize import isotonic_regression  # slow to load, and rarely needed
 
-    spread = LEAST_ARC * np.arange(len(angles))
+    spread = np.cumsum(least) - least
     # Groups that changed places; each would collapse to one point.
     first = np.asarray(isotonic_regression(angles - spread).blocks)[:-1]
     sizes = np.diff(np.append(first, len(angles)))
     disorder = np.maximum.reduceat(angles, first) - np.minimum.reduceat(angles, first)
-    apart = np.repeat(np.maximum(LEAST_ARC, disorder / sizes), sizes)
+    apart = np.maximum(least, np.repeat(disorder / sizes, sizes))
     spread = np.cumsum(apart) - apart
     return np.asarray(isotonic_regression(angles - spread).x + spread)

@@ -140,11 +140,6 @@ class _Corners:
         return new
 
 
-def half_cotangents_of_sides(lengths: Real) -> Real:
-    """Return half the cotangent (m, 3) of the angle opposite to each edge length (m, 3)."""
-    return np.stack(_half_cotangents(*lengths.T), axis=1)
-
-
 def _half_cotangents(a: Real, b: Real, c: Real) -> list[Real]:
     """Return half the cotangents opposite to the sides a, b, c (m,) each."""
     eightfold = 8 * area_of_sides(a, b, c)

@@ -183,11 +183,6 @@ def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
     return max((circle.circularity for circle in boundary_circles(mesh, uv)), default=0.0)
 
 
-def surface_areas(mesh: TriangleMesh) -> Real:
-    """Return the area of each triangle of the surface, shape (m,)."""
-    return corner_products(mesh.V, mesh.F)[1] / 2
-
-
 def is_disk_map(mesh: TriangleMesh, uv: Complex) -> bool:
     """Whether the outer boundary lies on the unit circle, within :data:`NEAR_CIRCLE`."""
     if not mesh.loops:

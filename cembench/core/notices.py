@@ -40,6 +40,8 @@ class NoticeKind(StrEnum):
     FOLDED_BY_ROUNDING = "folded_by_rounding"
     #: The iteration ended early, because the boundary is too crowded for it.
     CROWDED_BOUNDARY = "crowded_boundary"
+    #: The method's own map was not valid, and its last resort made another one.
+    LAST_RESORT = "last_resort"
     FAR_FROM_CONFORMAL = "far_from_conformal"
     #: Other parameters, which the algorithm suggested, give much smaller angle errors.
     BETTER_PARAMETERS = "better_parameters"

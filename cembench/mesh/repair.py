@@ -5,7 +5,7 @@ The order of the steps; each may rely on the previous ones and undoes none of th
 1. *Faces with a missing or non-finite vertex* are dropped: nothing can be computed with them.
 2. *Polygons* are cut into triangles, which needs finite coordinates.
 3. *Coincident vertices* are welded. That closes seams, and makes some triangles degenerate and
-   others equal.
+   others equal. The seam of a surface that is a disk already is a cut: it stays open by default.
 4. *Degenerate triangles* are collapsed (two corners nearly coincide), flipped with their neighbour
    over the longest edge (three corners on a line: dropping such a triangle would leave a crack), or
    dropped if they have no neighbour there.
@@ -39,9 +39,11 @@ from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
 from cembench.mesh.defects import (
+    Defect,
     UnusableMeshError,
     degenerate,
     duplicates,
+    examine,
     oriented,
     out_of_scale,
     representatives,
@@ -132,7 +134,7 @@ def repair(
     V: ArrayLike,
     faces: Indices | Iterable[Indices],
     *,
-    weld: float = 0.0,
+    weld: float | None = None,
     fill_holes: int = 0,
     components: Components = "largest",
 ) -> Repaired:
@@ -144,9 +146,9 @@ def repair(
         Vertices; NaN and infinity are allowed.
     faces : integers (m, 3), or blocks (k, c) of k polygons with c corners each
         Vertex indices, counted from 0.
-    weld : float
+    weld : float, optional
         Vertices at most this far apart, in the units of `V`, become one; 0 welds vertices that
-        coincide exactly.
+        coincide exactly. By default these are welded unless the surface is a disk already.
     fill_holes : int
         Boundary loops with at most this many edges are filled, except the longest of a component.
     components : {"largest", "all"}
@@ -206,9 +208,9 @@ def repair(
     return Repaired(tuple(surfaces), steps)
 
 
-def _check_options(weld: float, fill_holes: int, components: str) -> None:
+def _check_options(weld: float | None, fill_holes: int, components: str) -> None:
     """Raise :class:`ParameterError` for options out of range."""
-    if not (np.isfinite(weld) and weld >= 0):
+    if weld is not None and not (np.isfinite(weld) and weld >= 0):
         raise ParameterError(f"weld={weld!r} is not allowed; a tolerance is 0 or a finite length.")
     if fill_holes < 0:
         raise ParameterError(f"fill_holes={fill_holes} is not allowed; give 0 or more edges.")
@@ -231,14 +233,28 @@ def _triangles(V: Points, faces: Indices | Iterable[Indices], steps: dict[Step, 
     return triangulate(V, kept)
 
 
-def _weld(V: Points, F: Indices, tolerance: float, steps: dict[Step, int]) -> Indices:
+def _weld(V: Points, F: Indices, tolerance: float | None, steps: dict[Step, int]) -> Indices:
     """Replace coincident vertices in the triangles by one of them; the others become isolated."""
-    used = np.unique(F)
-    first = used[representatives(V[used], tolerance)]
+    used, compact = np.unique(F, return_inverse=True)
+    first = used[representatives(V[used], tolerance or 0.0)]
+    if tolerance is None and (first != used).any() and _is_disk(V[used], compact.reshape(-1, 3)):
+        return F
     steps[Step.weld] = int((first != used).sum())
     number = np.arange(len(V))
     number[used] = first
     return number[F]
+
+
+def _is_disk(V: Points, F: Indices) -> bool:
+    """Whether triangles, apart from degenerate ones, form a manifold that is a disk.
+
+    A connected manifold with boundary is one if its Euler characteristic is 1.
+    """
+    edges, _, faces = edges_of_half_edges(F)
+    if len(V) - len(edges) + len(F) != 1 or not (faces == 1).any():
+        return False
+    harmless = {Defect.scale, Defect.coincident, Defect.degenerate, Defect.orientation}
+    return {problem.defect for problem in examine(V, F, connected=True).problems} <= harmless
 
 
 def _repair_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:

@@ -34,9 +34,9 @@ Complex = NDArray[np.complex128]
 FAR = 2.0
 #: Below this mean angle error, in degrees, none is, so a large smooth surface needs no yardstick.
 CLOSE = 0.1
-#: So is a map above this share of the mean angle error of collapsed triangles; the yardstick may be
-#: as bad there.
-COLLAPSED = 0.25
+#: So is a map above this share of the mean angle error of collapsed triangles, or above so many
+#: degrees; the yardstick may be as bad there.
+COLLAPSED, POOR = 0.25, 10.0
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
@@ -51,7 +51,7 @@ def quality_notes(
 
     `error` is its mean angle error in degrees.
     """
-    notes = []
+    notes = _last_resort(mesh, extras, error)
     if extras.get("stopped") == "crowded":
         told = (
             "the iteration ended early because the boundary is too crowded: this is not the map "
@@ -62,7 +62,7 @@ def quality_notes(
     if known is None:
         return notes
     reachable = float(angle_errors(mesh, known).mean())
-    if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh)):
+    if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh), POOR):
         return notes
     causes = "; ".join(likely_causes(mesh, uv, extras))
     harmonic = "a harmonic map of this mesh by harmonic measure"
@@ -77,6 +77,29 @@ def quality_notes(
         f"cause: {causes}"
     )
     return [*notes, Notice(NoticeKind.FAR_FROM_CONFORMAL, text)]
+
+
+def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) -> list[Notice]:
+    """Return a remark on what a method's last resort did, and what that cost."""
+    done = extras.get("last_resort")
+    if not done:
+        return []
+    folded, failure = extras.get("folded_before_repair"), extras.get("failure")
+    own = f"failed ({failure})" if failure else f"has {folded:,} folds" if folded else "is crowded"
+    before = extras.get("before_repair", {}).get("angle_error_mean_deg")
+    cost = "" if before is None else f" instead of {before:.2f}"
+    told = (
+        f"the method's own map {own}, so this one is its last resort: "
+        f"{done['moved_boundary_vertices']:,} boundary vertices were moved, and mean value weights "
+        f"placed {done['mean_value_vertices']:,} vertices; the mean angle error is {error:.2f} "
+        f"degrees{cost}"
+    )
+    if done["mean_value_vertices"] == len(mesh.interior):
+        told += (
+            ". The surface may be too long for one disk: a free boundary has room for it, "
+            "e.g. -a abf-linear"
+        )
+    return [Notice(NoticeKind.LAST_RESORT, told)]
 
 
 def better_parameters(

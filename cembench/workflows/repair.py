@@ -59,7 +59,7 @@ class Repair:
 def repair(
     surface: SurfaceInput,
     *,
-    weld: float = 0.0,
+    weld: float | None = None,
     fill_holes: int = 0,
     components: Components = "largest",
 ) -> Repair:
@@ -69,9 +69,10 @@ def repair(
     ----------
     surface : path, pair of arrays (V, F), or mesh
         V is (n, 3) and may hold NaN, F is (m, 3) and counts from 0.
-    weld : float
+    weld : float, optional
         Vertices up to this distance apart, in the surface's units, are merged; 0 merges only
-        those that coincide exactly.
+        those that coincide exactly. By default these are merged unless the surface is a disk
+        already, whose seams are cuts.
     fill_holes : int
         Boundary loops of at most this many edges are filled, except the longest of a component.
     components : "largest" or "all"

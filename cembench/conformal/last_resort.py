@@ -1,0 +1,256 @@
+"""A valid map of a disk wherever doubles hold one, whatever an algorithm returned.
+
+A triangle whose three corners lie on arcs of length h has an area of about h^3 / 4, and its sign is
+lost in rounding below :data:`LEAST_ARC`; so arcs at folds are widened to that. The interior around
+the folds is laid out again in patches (:mod:`cembench.conformal.folds`). Where that is not enough,
+or costs angles, every interior vertex becomes a mean of its neighbours with positive weights: mean
+value weights of the image, which reproduce it, except near folds, where they are the surface's. On
+a convex boundary such a map has no folds (Tutte 1963; Floater 2003). At worst the surface's weights
+are used everywhere.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from cembench.conformal.fold_repair import MOST_COST, figures
+from cembench.conformal.folds import LEAST_ARC as DISTINCT
+from cembench.conformal.folds import in_order, interior_without_folds
+from cembench.conformal.harmonic import arc_length_circle
+from cembench.conformal.mean_value import convex_extension, mean_value_weights
+from cembench.conformal.metrics import flipped_triangles
+from cembench.conformal.planar import folded_triangles
+from cembench.conformal.untangling import untangled
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
+from cembench.mesh.topology import vertex_graph
+from cembench.mesh.triangle_mesh import DiskMesh
+
+Complex = NDArray[np.complex128]
+Mask = NDArray[np.bool_]
+DiskAlgorithm = Callable[..., Parameterization]
+
+#: Shortest arc, in radians, between the corners of a triangle that doubles resolve.
+LEAST_ARC = 3e-8
+#: Numbers of rings of vertices around the folds that get the surface's weights.
+RINGS = (0, 2, 8)
+#: Patches are no remedy if more than this share of the triangles fold; they are all that is tried
+#: if they raise the mean angle error by no more than the share CHEAP.
+MOST_FOLDED, CHEAP = 0.3, 0.01
+#: Up to this size the whole interior is laid out again if the above leaves folds or costs more.
+MOST_TRIANGLES = 20_000
+#: A map whose mean angle error, in degrees, is above this may be worse than mean value weights
+#: everywhere.
+BAD = 30.0
+
+
+def with_last_resort(method: DiskAlgorithm) -> DiskAlgorithm:
+    """Let an algorithm for disks end in a valid map if its `repair` and `last_resort` are on.
+
+    Its own map, or its failure, is the start of :func:`valid_map`.
+    """
+    defaults = {
+        name: parameter.default for name, parameter in inspect.signature(method).parameters.items()
+    }
+
+    @functools.wraps(method)
+    def always_valid(mesh: DiskMesh, **parameters: Any) -> Parameterization:
+        chosen = defaults | parameters
+        if not (chosen["repair"] and chosen["last_resort"]):
+            return method(mesh, **parameters)
+        try:
+            own = method(mesh, **parameters | {"repair": False})
+        except AlgorithmFailed as error:
+            uv, extras = valid_map(mesh, None)
+            return Parameterization(uv, extras=extras | {"failure": str(error)})
+        crowded = own.extras.get("stopped") == "crowded"
+        uv, extras = valid_map(mesh, own.uv, crowded=crowded)
+        return Parameterization(uv, own.iterations, own.energy_history, own.extras | extras)
+
+    return always_valid
+
+
+def valid_map(
+    mesh: DiskMesh, own: Complex | None, *, crowded: bool = False
+) -> tuple[Complex, dict[str, Any]]:
+    """Return a map without folds, as close to an algorithm's own as its angles allow.
+
+    Parameters
+    ----------
+    mesh : DiskMesh
+        The surface.
+    own : complex (n,) or None
+        Its map with the boundary on the unit circle; None if the algorithm failed.
+    crowded : bool
+        Whether arcs of `own` are longer than they should be, because doubles hold no shorter ones.
+
+    Returns
+    -------
+    z : complex (n,)
+        The map; `own` itself if that is valid and not crowded. It is folded only if doubles hold
+        neither the mean value map nor Tutte's.
+    extras : dict
+        ``fold_repairs``, ``folded_before_repair`` and ``before_repair`` as for
+        :func:`cembench.conformal.fold_repair.accepted_repair`. Where arcs were widened or the
+        surface's mean value weights used, ``last_resort`` has ``moved_boundary_vertices`` and
+        ``mean_value_vertices``, the numbers of vertices concerned.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> disk = cembench.surface("flat-disk", 600)
+    >>> z, extras = valid_map(disk, None)
+    >>> extras["last_resort"]["mean_value_vertices"] == len(disk.interior)
+    True
+
+    """
+    with phase("folds"):
+        folded = 0 if own is None else flipped_triangles(mesh, own)
+        extras: dict[str, Any] = {"fold_repairs": 0, "folded_before_repair": folded}
+        if own is not None and not (folded or crowded):
+            return own, extras
+        choice = _Choice(mesh, own)
+        if own is not None and folded:
+            extras["before_repair"] = before = figures(mesh, own, folded)
+            extras["fold_repairs"] = _offer_patches(choice, own, folded)
+            if choice.cost > (0, False, (1 + CHEAP) * before["angle_error_mean_deg"]):
+                _offer_convex_maps(choice, own)
+        if own is None or crowded or (folded and choice.cost > (0, False, BAD)):
+            _offer_mean_value_maps(choice, own)
+        extras["fold_repairs"] += choice.solves
+        b = mesh.boundary
+        moved = len(b) if own is None else int(np.count_nonzero(choice.z[b] != own[b]))
+        if moved or choice.by_means:
+            extras["last_resort"] = {
+                "moved_boundary_vertices": moved,
+                "mean_value_vertices": choice.by_means,
+            }
+    return choice.z, extras
+
+
+class _Choice:
+    """The best map offered: fewest folds, E_C in bounds, then least mean angle error.
+
+    E_C is in bounds up to a multiple of that of the algorithm's own map
+    (:data:`cembench.conformal.fold_repair.MOST_COST`).
+    """
+
+    def __init__(self, mesh: DiskMesh, own: Complex | None) -> None:
+        self.mesh = mesh
+        self.cost, self.most_energy = (mesh.m + 1, True, np.inf), np.inf
+        #: Number of vertices of the best map that have the surface's weights; solves in all.
+        self.by_means = self.solves = 0
+        if own is not None:
+            energy = figures(mesh, own, 0)["conformal_energy"]
+            self.most_energy = MOST_COST["conformal_energy"] * max(energy, 0)
+            self.offer(own)
+
+    def offer(self, z: Complex, by_means: int = 0) -> None:
+        """Keep a map if it is better."""
+        folds = flipped_triangles(self.mesh, z)
+        new = figures(self.mesh, z, folds)
+        above = new["conformal_energy"] > self.most_energy
+        cost = (folds, above, new["angle_error_mean_deg"])
+        if cost < self.cost:
+            self.z, self.cost, self.by_means = z, cost, by_means
+
+    def offer_means(self, z: Complex, surface: Mask, W: scipy.sparse.csr_array) -> None:
+        """Offer the map with the boundary of `z` and positive weights.
+
+        They are W's at the vertices `surface` (n,), elsewhere mean value weights of the image z.
+        """
+        mesh, b, i = self.mesh, self.mesh.boundary, self.mesh.interior
+        if not surface[i].all():
+            with np.errstate(all="ignore"):  # folded triangles may have no area or length
+                image = mean_value_weights(np.stack([z.real, z.imag], axis=1), mesh.F)
+            image.data[~np.isfinite(image.data)] = 0
+            share = surface.astype(np.float64)
+            W = scipy.sparse.diags_array(share) @ W + scipy.sparse.diags_array(1 - share) @ image
+        with contextlib.suppress(AlgorithmFailed):
+            self.solves += 1
+            means = convex_extension(scipy.sparse.csr_array(W), b, i, z) if len(i) else z
+            self.offer(means, int(surface[i].sum()))
+
+
+def _offer_patches(choice: _Choice, own: Complex, folded: int) -> int:
+    """Offer the map with the interior around folds laid out again; return the rounds."""
+    mesh = choice.mesh
+    if folded > MOST_FOLDED * mesh.m:
+        return 0
+    # No layout of the interior removes a fold whose corners are all on the boundary.
+    corners = mesh.F[folded_triangles(own, mesh.F)]
+    stuck = corners[np.isin(corners, mesh.boundary).all(axis=1)]
+    z = _widened(mesh, own, stuck)
+    if z is None:
+        return 0
+    z, rounds = interior_without_folds(mesh, z)
+    choice.offer(z)
+    return rounds
+
+
+def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
+    """Offer maps with the image's mean value weights except near its folds, and one made of them.
+
+    That is the best one with its interior laid out anew, on surfaces where this takes a moment.
+    """
+    mesh = choice.mesh
+    graph = vertex_graph(mesh.F, mesh.n)
+    W = mean_value_weights(mesh.V, mesh.F)
+    folded = folded_triangles(own, mesh.F)
+    for rings in RINGS:
+        near = _rings(graph, mesh.F[folded], rings)
+        z = _widened(mesh, own, np.flatnonzero(near))
+        if z is None:
+            return
+        both = np.concatenate([folded, folded_triangles(z, mesh.F)])
+        choice.offer_means(z, _rings(graph, mesh.F[both], rings), W)
+    if not choice.cost[0] and mesh.m <= MOST_TRIANGLES:
+        inside = ~_rings(graph, mesh.boundary, 0)
+        choice.offer(untangled(mesh, choice.z, inside, graph)[0], choice.by_means)
+
+
+def _offer_mean_value_maps(choice: _Choice, own: Complex | None) -> None:
+    """Offer maps with the surface's weights everywhere; uniform ones if these fold too."""
+    mesh, everywhere = choice.mesh, np.ones(choice.mesh.n, dtype=bool)
+    by_length = np.zeros(mesh.n, dtype=np.complex128)
+    by_length[mesh.boundary] = arc_length_circle(mesh)
+    widened = None if own is None else _widened(mesh, own, mesh.boundary)
+    for W in (mean_value_weights(mesh.V, mesh.F), vertex_graph(mesh.F, mesh.n)):
+        choice.offer_means(by_length, everywhere, W)
+        if widened is not None:
+            choice.offer_means(widened, everywhere, W)
+        if not choice.cost[0]:
+            return
+
+
+def _rings(graph: scipy.sparse.csr_array, vertices: NDArray[np.int64], count: int) -> Mask:
+    """Return which vertices (n,) are at most `count` edges away from some vertices."""
+    near = np.zeros(graph.shape[0], dtype=bool)
+    near[vertices] = True
+    for _ in range(count):
+        near |= graph @ near.astype(np.float64) > 0
+    return near
+
+
+def _widened(mesh: DiskMesh, z: Complex, vertices: NDArray[np.int64]) -> Complex | None:
+    """Return the map with its boundary in order and arcs at these vertices wide enough.
+
+    None if the boundary does not go around the circle.
+    """
+    at = np.isin(mesh.boundary, vertices)
+    least = np.where(at | np.roll(at, -1), LEAST_ARC, DISTINCT)
+    widened = z.copy()
+    try:
+        widened[mesh.boundary] = in_order(z[mesh.boundary], least)
+    except AlgorithmFailed:
+        return None
+    return widened
