@@ -34,7 +34,7 @@ docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html
 
 bench: $(READY)
-	$(BIN)/python benchmarks/cem_against_factorisation.py
+	$(BIN)/python -m benchmarks limit 276000 1690000
 
 bench-kernels: $(READY)
 	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
