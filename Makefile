@@ -41,7 +41,7 @@ bench-kernels: $(READY)
 
 # Hours where nothing limits it; goes on where it was ended. FUZZ="--seconds 600 --seed 2" and the like.
 fuzz: $(READY)
-	$(BIN)/python -m fuzz $(FUZZ)
+	$(BIN)/python -m tests.campaign $(FUZZ)
 
 # Stale when the requirements change; the environment's own Python must still start.
 define environment

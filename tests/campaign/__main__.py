@@ -1,4 +1,4 @@
-"""The command line: ``python -m fuzz``."""
+"""The command line: ``python -m tests.campaign``."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from fuzz import campaign, summary
-from fuzz.journal import Entry, Journal, WrongFolder, fingerprint
-from fuzz.limited import run_cases
+from tests.campaign import campaign, summary
+from tests.campaign.journal import Entry, Journal, WrongFolder, fingerprint
+from tests.campaign.limited import run_cases
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def main(
