@@ -4,10 +4,6 @@ from __future__ import annotations
 
 import gc
 import os
-
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_variable] = "1"  # before numpy loads: a pool of threads does not survive a fork
-
 import tempfile
 import time
 from pathlib import Path
