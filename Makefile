@@ -28,20 +28,20 @@ types: $(READY)
 	$(BIN)/mypy
 
 tests: $(READY)
-	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile
+	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile --durations=25
 
 docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html
 
 bench: $(READY)
-	$(BIN)/python benchmarks/cem_against_factorisation.py
+	$(BIN)/python -m benchmarks limit 276000 1690000
 
 bench-kernels: $(READY)
 	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
 
 # Hours where nothing limits it; goes on where it was ended. FUZZ="--seconds 600 --seed 2" and the like.
 fuzz: $(READY)
-	$(BIN)/python -m fuzz $(FUZZ)
+	$(BIN)/python -m tests.campaign $(FUZZ)
 
 # Stale when the requirements change; the environment's own Python must still start.
 define environment

@@ -1,14 +1,7 @@
-"""What does a cell cost on a cluster? ``python -m benchmarks.cluster_cost``.
-
-Cells of algorithms that are never called go through two workers of this machine, and through the
-local runner. Told are CPU seconds of all processes that take part: they hang on what else the
-machine does much less than the clock. A unit is a sitting of its own, so its rounds have their own
-reference kernel; the local runner has one for the rounds of all cells. What that makes is told too.
-"""
+"""What does a cell cost on a cluster?"""
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +11,7 @@ import psutil
 from cembench.surfaces.flat_disk import flat_disk
 
 from benchmarks.empty_algorithms import COUNT
+from benchmarks.pages import Section, Table
 from cembench.registry import load_registry
 from cembench.results.records import Record
 from cembench.results.store import Store
@@ -28,32 +22,36 @@ from cembench.running.local import run_tasks
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 
 PLUGIN = str(Path(__file__).with_name("empty_algorithms.py"))
+LAYOUT = """
+| empty cells | ms of CPU time a cell by two workers | by the local runner | more | of which \
+each surface's own reference kernels |
+|---:|---:|---:|---:|---:|
+| {cells} | {workers:.1f} | {local:.1f} | {more:.1f} | {kernels:.1f} |"""
 
 
-def main() -> None:
-    """Print milliseconds of CPU time a cell, on a cluster and without."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--cells", type=int, default=2000)
-    count = parser.parse_args().cells
-    tasks = _tasks(count // COUNT, "s")
+def cluster_cost(*, cells: int = 2000) -> Section:
+    """Measure what a cell costs on a cluster, in CPU seconds.
+
+    Cells of algorithms that are never called go through two workers of this machine, and through
+    the local runner. CPU seconds of all processes that take part hang on what else the machine does
+    much less than the clock. A unit is a sitting of its own, so its rounds have their own reference
+    kernel; the local runner has one for the rounds of all cells. What that makes is given too.
+    """
+    tasks = _tasks(cells // COUNT, "s")
     with tempfile.TemporaryDirectory() as folder, connected(parse_cluster("local:2")) as client:
         place = Path(folder)
         # What a process does once: imports, and the other worker's start.
         run_on_cluster(_tasks(4, "first"), Store(place / "first"), client)
         before = _cpu_seconds()
-        records = run_on_cluster(tasks, Store(place / "there"), client)
-        there = _cpu_seconds() - before
+        records = run_on_cluster(tasks, Store(place / "cluster"), client)
+        cluster = _cpu_seconds() - before
         before = _cpu_seconds()
-        alone = run_tasks(tasks, Store(place / "here"))
-        here = _cpu_seconds() - before
-    cells = len(tasks)
+        alone = run_tasks(tasks, Store(place / "local"))
+        local = _cpu_seconds() - before
     kernels = _kernels(records) - _kernels(alone)
-    print(
-        f"{cells} empty cells: {1000 * there / cells:.1f} ms of CPU time a cell by two workers, "
-        f"{1000 * here / cells:.1f} ms by the local runner, {1000 * (there - here) / cells:.1f} ms "
-        f"more, of which {1000 * kernels / cells:.1f} ms are each surface's own reference "
-        "kernels"
-    )
+    seconds = {"workers": cluster, "local": local, "more": cluster - local, "kernels": kernels}
+    each = {name: 1000 * one / len(tasks) for name, one in seconds.items()}
+    return Section([Table([{"cells": len(tasks), **each}], LAYOUT)])
 
 
 def _tasks(surfaces: int, name: str) -> list[Task]:
@@ -76,7 +74,3 @@ def _cpu_seconds() -> float:
     """CPU seconds of this process and all below it, those that have ended included."""
     this = psutil.Process()
     return sum(sum(one.cpu_times()[:4]) for one in (this, *this.children(recursive=True)))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,11 +1,6 @@
-"""Draw docs/direct_cem.png: beads on a ring, and how fast two methods let them slide into place.
-
-python benchmarks/direct_cem_picture.py
-"""
+"""Beads on a ring, and how fast two methods let them slide into place."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
@@ -13,14 +8,19 @@ from cembench.algorithms.cem import cem
 from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench.core.atomic import write
+from benchmarks.measuring import png
+from benchmarks.pages import Section
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
+#: Energies are drawn down to here.
+FLOOR = 1e-12
+ARROW = {"arrowstyle": "-", "color": "tab:red", "lw": 0.6, "alpha": 0.7}
 
-def main() -> None:
-    """Draw both panels and write the picture of the page."""
+
+def direct_cem_picture() -> Section:
+    """Draw beads on a ring, and how fast two methods let them slide into place."""
     mesh = hemi_ellipsoid(3000, x=2.5)
     weights = {"delaunay": False}  # as CEM has them
     start = direct_cem(mesh, max_iterations=0, **weights)
@@ -53,21 +53,11 @@ def main() -> None:
     fall.legend(frameon=False)
     fall.grid(alpha=0.3)
     figure.tight_layout()
-    picture = {"format": "png", "dpi": 140, "metadata": {"Software": ""}}
-    write(PICTURE, lambda file: figure.savefig(file, **picture))
-    print(f"start {start.energy_history[0]:.6f}, end {end.energy_history[-1]:.6f}")
+    ends = f"start {start.energy_history[0]:.6f}, end {end.energy_history[-1]:.6f}"
+    return Section([ends], files={"docs/direct_cem.png": png(figure, dpi=140)})
 
 
 def travelled(loop: np.ndarray) -> np.ndarray:
     """What share of the way round a closed polygon has been gone at each corner?"""
     lengths = np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
     return (np.cumsum(lengths) - lengths) / lengths.sum()
-
-
-#: Energies are drawn down to here.
-PICTURE = Path(__file__).parents[1] / "docs" / "direct_cem.png"
-FLOOR = 1e-12
-ARROW = {"arrowstyle": "-", "color": "tab:red", "lw": 0.6, "alpha": 0.7}
-
-if __name__ == "__main__":
-    main()

@@ -1,18 +1,9 @@
-"""Direct CEM beside the other disk maps, each with its own weights and with Delaunay weights.
-
-    python benchmarks/direct_cem_quality.py face.obj head.ply ...
-
-prints Markdown: for every surface the mean angle error, the mean of |mu| over the surface's area
-and the conformal energy of each method, as multiples of the best of CEM, FDM, LDM and QIEM with the
-weights of their papers; then geometric means, worst cases and how many are within 1 %. Methods
-with intrinsic Delaunay weights are marked D. Energies are compared in one gauge, the surface's area
-centred in the disk, with the surface's own cotangents.
-"""
+"""Direct CEM beside the other disk maps, each with its own weights and with Delaunay weights."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +14,8 @@ from cembench.algorithms.ldm import ldm
 from cembench.algorithms.qiem import qiem
 from numpy.typing import NDArray
 
+from benchmarks.measuring import progress
+from benchmarks.pages import Section, Table
 from cembench import AlgorithmFailed, DiskMesh, Parameterization
 from cembench.conformal.beltrami import beltrami_coefficients
 from cembench.conformal.gauge import gauge_measure
@@ -30,27 +23,57 @@ from cembench.conformal.metrics import angle_errors, dirichlet_energy, flipped_t
 from cembench.mesh.files import read_mesh
 from cembench.workflows.morphing.align import to_centre
 
-PAPER = ("CEM", "FDM", "LDM", "QIEM")
+PAPER = {"CEM": cem, "FDM": fdm, "LDM": ldm, "QIEM": qiem}
+#: What is compared, by the parameters besides the weights.
+CALLS: dict[str, Callable[..., Parameterization]] = {
+    **PAPER,
+    "CEM 200": partial(cem, max_iterations=200, tolerance=0, stop="change"),
+    "direct": direct_cem,
+    "direct, back=0": partial(direct_cem, back=0),
+}
+#: With the weights of each method's paper, and with intrinsic Delaunay weights, marked D.
+METHODS = {
+    name + suffix: partial(call, delaunay=delaunay)
+    for suffix, delaunay in (("", False), (" D", True))
+    for name, call in CALLS.items()
+}
 FIGURES = ("angle", "mu", "energy")
-
-Method = Callable[[DiskMesh], Parameterization]
-
-
-def methods() -> dict[str, Method]:
-    """Return every method that is compared, by name."""
-    found: dict[str, Method] = {}
-    for suffix, delaunay in (("", False), (" D", True)):
-        for name, function in zip(PAPER, (cem, fdm, ldm, qiem), strict=True):
-            found[name + suffix] = _with(function, delaunay=delaunay)
-        slow = {"max_iterations": 200, "tolerance": 0, "stop": "change"}
-        found["CEM 200" + suffix] = _with(cem, delaunay=delaunay, **slow)
-        found["direct" + suffix] = _with(direct_cem, delaunay=delaunay)
-        found["direct, back=0" + suffix] = _with(direct_cem, delaunay=delaunay, back=0)
-    return found
+OTHERS = [name for name in METHODS if name not in PAPER]
+RATIOS = f"""
+| surface | figure | {" | ".join(OTHERS)} |
+|---|---|{"---:|" * len(OTHERS)}
+| {{surface}} | {{figure}} | {" | ".join(f"{{ratios[{name}]:.3f}}" for name in OTHERS)} |"""
+SUMMARY = """
+| method | figure | surfaces | geometric mean | worst | within 1 % |
+|---|---|---:|---:|---:|---:|
+| {method} | {figure} | {surfaces} | {mean:.3f} | {worst:.3f} | {near} |"""
 
 
-def _with(function: Method, **parameters: float | str) -> Method:
-    return lambda mesh: function(mesh, **parameters)
+def direct_cem_quality(meshes: Sequence[Path]) -> Section:
+    """Compare direct CEM with the other disk maps, each with both kinds of weights.
+
+    For every surface the mean angle error, the mean of |mu| over the surface's area and the
+    conformal energy of each method, as multiples of the best of CEM, FDM, LDM and QIEM with the
+    weights of their papers; then geometric means, worst cases and how many are within 1 %. Methods
+    with intrinsic Delaunay weights are marked D. Energies are compared in one gauge, the surface's
+    area centred in the disk, with the surface's own cotangents.
+    """
+    rows = []
+    for path in progress(meshes):
+        surface = read_mesh(path)
+        measured = ratios(DiskMesh.from_arrays(surface.V, surface.F))
+        for k, figure in enumerate(FIGURES):
+            both = {name: measured[name][k] if name in measured else None for name in METHODS}
+            rows.append({"surface": path.stem, "figure": figure, "ratios": both})
+    summary = []
+    for name in METHODS:
+        for figure in FIGURES:
+            some = [one["ratios"][name] for one in rows if one["figure"] == figure]
+            x = np.array([ratio for ratio in some if ratio is not None])
+            mean, near = np.exp(np.log(x).mean()), (x < 1.01).sum()
+            summary.append({"method": name, "figure": figure, "surfaces": len(x), "mean": mean,
+                            "worst": x.max(), "near": near})  # fmt: skip
+    return Section([Table(rows, RATIOS), Table(summary, SUMMARY)])
 
 
 def figures(mesh: DiskMesh, uv: NDArray[np.complex128]) -> tuple[float, float, float]:
@@ -68,7 +91,7 @@ def figures(mesh: DiskMesh, uv: NDArray[np.complex128]) -> tuple[float, float, f
 def ratios(mesh: DiskMesh) -> dict[str, NDArray[np.float64]]:
     """Return each valid map's figures as multiples of the paper's methods' best."""
     measured = {}
-    for name, method in methods().items():
+    for name, method in METHODS.items():
         try:
             uv = method(mesh.fresh()).uv
         except AlgorithmFailed:
@@ -77,29 +100,3 @@ def ratios(mesh: DiskMesh) -> dict[str, NDArray[np.float64]]:
             measured[name] = np.array(figures(mesh, uv))
     best = np.min([measured[name] for name in PAPER if name in measured], axis=0)
     return {name: values / best for name, values in measured.items()}
-
-
-def main(files: list[str]) -> None:
-    """Print the tables."""
-    names = [name for name in methods() if name not in PAPER]
-    every: dict[str, list[NDArray[np.float64]]] = {name: [] for name in methods()}
-    print("| surface | figure |", " | ".join(names), "|\n|---|---|" + "---:|" * len(names))
-    for file in files:
-        surface = read_mesh(Path(file))
-        found = ratios(DiskMesh.from_arrays(surface.V, surface.F))
-        for name, values in found.items():
-            every[name].append(values)
-        for k, figure in enumerate(FIGURES):
-            cells = [f"{found[name][k]:.3f}" if name in found else "-" for name in names]
-            print(f"| {Path(file).stem} | {figure} |", " | ".join(cells), "|", flush=True)
-    print("\n| method | figure | surfaces | geometric mean | worst | within 1 % |")
-    print("|---|---|---:|---:|---:|---:|")
-    for name, rows in every.items():
-        for k, figure in enumerate(FIGURES):
-            x = np.array(rows)[:, k]
-            mean, near = np.exp(np.log(x).mean()), (x < 1.01).sum()
-            print(f"| {name} | {figure} | {len(x)} | {mean:.3f} | {x.max():.3f} | {near} |")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

@@ -1,27 +1,19 @@
-"""Is the verdict of `validate` on growth as seldom wrong as it says?
-
-Simulates a solver and a reference on two sizes, on machines that are noisy in several ways
-(``noise.py``), with the rule as it is: looks after 7, 10, 14 and 20 rounds, both limits::
-
-    python -m benchmarks.growth
-    python -m benchmarks.growth --runs 4000 --write-docs
-"""
+"""Is the verdict of `validate` on growth as seldom wrong as it says?"""
 
 from __future__ import annotations
 
-import argparse
 from collections import Counter
 from dataclasses import dataclass
 from math import log
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks import noise, pages
+from benchmarks import noise
+from benchmarks.pages import Section, Table
 from cembench.results.looks import LOOKS
 from cembench.validation.scaling import MOST_ROUNDS, GrowthAnswer, answer_of
 
-PAGE = pages.ROOT / "docs/measuring.md"
 #: How much larger the larger mesh is.
 RATIO = 3.0
 #: Solvers of the table: their exponents.
@@ -64,37 +56,25 @@ def simulate(
     return Simulated(answers, rounds / runs)
 
 
-def table(runs: int) -> str:
-    """Return the Markdown of all models of noise."""
-    heads = " | ".join(f"faces^{exponent:g}" for exponent in SOLVERS)
-    lines = [
-        f"| noise | {heads} | faces^1.68, large meshes dearer by a third |",
-        "|---|" + "---:|" * (len(SOLVERS) + 1),
-    ]
+def growth(*, runs: int = 1000) -> Section:
+    """Count the answers of `validate` on growth over simulated validations.
+
+    Simulates a solver and a reference on two sizes, on machines that are noisy in several ways
+    (``noise.py``), with the rule as it is: looks after 7, 10, 14 and 20 rounds, both limits.
+    """
+    heads = [f"faces^{exponent:g}" for exponent in SOLVERS]
+    heads.append("faces^1.68, large meshes dearer by a third")
+    cells = "".join(f" {{steep[{one}]:.1%}} / {{fine[{one}]:.1%}} |" for one in heads)
+    layout = f"| noise | {' | '.join(heads)} |\n|---|{'---:|' * len(heads)}\n| {{noise}} |{cells}"
+    rows = []
     for model in noise.MODELS:
-        found = [simulate(model, runs, ours, REFERENCE) for ours in SOLVERS]
-        found.append(simulate(model, runs, 1.68, STEEP_REFERENCE, dearer=4 / 3))
-        cells = [
-            f"{one.share(GrowthAnswer.too_steep):.1%} / {one.share(GrowthAnswer.fine):.1%}"
-            for one in found
-        ]
-        lines.append(f"| {model} | {' | '.join(cells)} |")
-    told = f"*too steep* / *fine* of {runs:,} simulated validations; the rest cannot be told. "
-    told += f"The reference grows like faces^{REFERENCE:g}, in the last column like faces."
-    return "\n".join([*lines, "", told])
-
-
-def main() -> None:
-    """Print the table, or put it into the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=1000)
-    parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md")
-    chosen = parser.parse_args()
-    text = table(chosen.runs)
-    print(text)
-    if chosen.write_docs:
-        pages.fill(PAGE, Path(__file__).stem, text)
-
-
-if __name__ == "__main__":
-    main()
+        answers = [simulate(model, runs, ours, REFERENCE) for ours in SOLVERS]
+        answers.append(simulate(model, runs, 1.68, STEEP_REFERENCE, dearer=4 / 3))
+        row: dict[str, Any] = {"noise": model}
+        for name, answer in (("steep", GrowthAnswer.too_steep), ("fine", GrowthAnswer.fine)):
+            shares = [one.share(answer) for one in answers]
+            row[name] = dict(zip(heads, shares, strict=True))
+        rows.append(row)
+    note = f"*too steep* / *fine* of {runs:,} simulated validations; the rest cannot be told. "
+    note += f"The reference grows like faces^{REFERENCE:g}, in the last column like faces."
+    return Section([Table(rows, layout), note], "docs/measuring.md")

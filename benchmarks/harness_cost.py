@@ -1,21 +1,7 @@
-"""What does the harness add: to the seconds it tells, and by itself?
-
-1. CEM on a mesh in memory: the seconds that the harness tells over those of a bare call in a
-   script (to be within 2 %), and those told by a forked process over those of a fresh interpreter
-   (to be 1). In each round all three are measured once, in random order, with one thread; the
-   ratio is the median over the rounds, with its 95 % interval. Rounds go on until the interval is
-   narrow enough to tell, or there are as many as asked for.
-2. Planning and recording 1,000 cells whose processes are not started. To be under a minute.
-
-::
-
-    python benchmarks/harness_cost.py
-    python benchmarks/harness_cost.py --faces 20000 --rounds 20
-"""
+"""What does the harness add: to the seconds it reports, and by itself?"""
 
 from __future__ import annotations
 
-import argparse
 import random
 import subprocess
 import sys
@@ -28,6 +14,7 @@ import numpy as np
 from cembench.surfaces.spherical_cap import spherical_cap
 from numpy.typing import NDArray
 
+from benchmarks.pages import Section, Table
 from cembench.registry import load_registry
 from cembench.results.comparison import compare_ratios
 from cembench.results.records import Outcome, Round
@@ -58,37 +45,44 @@ print(sorted(seconds)[(len(seconds) - 1) // 2])
 """
 
 
+LAYOUT = """
+| seconds | ratio | 95 % interval | rounds |
+|---|---:|---|---:|
+| {seconds} | {ratio:.4f} | {interval} | {rounds} |"""
 #: The half-width of the interval, relative, below which no more rounds are needed.
 NARROW = 0.01
 FEWEST_ROUNDS = 12
 
 
-def main() -> None:
-    """Print the figures."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--faces", type=int, default=100_000)
-    parser.add_argument("--rounds", type=int, default=100, help="at most")
-    parser.add_argument("--cells", type=int, default=1000)
-    chosen = parser.parse_args()
-    ratios = measure_ratios(chosen.faces, chosen.rounds)
-    for words, found in ratios.items():
-        comparison = compare_ratios(found)
+def harness_cost(*, faces: int = 100_000, rounds: int = 100, cells: int = 1000) -> Section:
+    """Measure what the harness adds to the seconds it reports, and its own time a cell.
+
+    1. CEM on a mesh in memory: the seconds that the harness reports over those of a bare call in a
+       script (to be within 2 %), and those of a forked process over those of a fresh interpreter
+       (to be 1). In each round all three are measured once, in random order, with one thread; the
+       ratio is the median over the rounds, with its 95 % interval. Rounds go on until the interval
+       is narrow enough, or there are as many as asked for.
+    2. Planning and recording cells whose processes are not started; 1,000 are to be under a minute.
+    """
+    rows = []
+    for name, ratios in measure_ratios(faces, rounds).items():
+        comparison = compare_ratios(ratios)
         i = comparison.interval
-        sure = f"{i.low:.4f} to {i.high:.4f}" if i else "unknown"
-        print(f"{words}: {comparison.ratio:.4f}, 95 % interval {sure}, {len(found)} rounds")
-    planning, recording = empty_cells(chosen.cells)
-    print(
-        f"{chosen.cells} empty cells: planned in {planning:.1f} s, recorded in {recording:.1f} s "
-        f"({1000 * (planning + recording) / chosen.cells:.1f} ms a cell)"
-    )
+        between = f"{i.low:.4f} to {i.high:.4f}" if i else "unknown"
+        rows.append({"seconds": name, "ratio": comparison.ratio, "interval": between,
+                     "rounds": len(ratios)})  # fmt: skip
+    planning, recording = empty_cells(cells)
+    each = 1000 * (planning + recording) / cells
+    note = f"{cells} empty cells: planned in {planning:.1f} s, recorded in {recording:.1f} s "
+    return Section([Table(rows, LAYOUT), f"{note}({each:.1f} ms a cell)"])
 
 
 def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
-    """Seconds that the harness tells over those of the bare call, and forked over fresh."""
+    """Return the harness's seconds over those of the bare call, and forked over fresh."""
     (task,) = plan_cells(
         [load_registry().algorithm("cem")], [spherical_cap(faces)], {}, MeasurementSettings()
     )
-    told: dict[str, list[float]] = {"told / bare": [], "forked / fresh": []}
+    ratios: dict[str, list[float]] = {"reported / bare": [], "forked / fresh": []}
     shuffled = random.Random(0)
     with tempfile.TemporaryDirectory() as folder:
         forking = CellTimer(Path(folder), Options())
@@ -113,12 +107,12 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
         }
         for k in range(most_rounds):
             found = {way: ways[way]() for way in shuffled.sample(list(ways), len(ways))}
-            told["told / bare"].append(found["forked"] / found["bare"])
-            told["forked / fresh"].append(found["forked"] / found["fresh"])
+            ratios["reported / bare"].append(found["forked"] / found["bare"])
+            ratios["forked / fresh"].append(found["forked"] / found["fresh"])
             print(f"round {k + 1}: {found}", file=sys.stderr)
-            if k + 1 >= FEWEST_ROUNDS and all(map(is_narrow, told.values())):
+            if k + 1 >= FEWEST_ROUNDS and all(map(is_narrow, ratios.values())):
                 break
-    return told
+    return ratios
 
 
 def is_narrow(ratios: list[float]) -> bool:
@@ -150,7 +144,3 @@ def empty_cells(count: int) -> tuple[float, float]:
         records = run_tasks(tasks, Store(Path(folder)), timer=NoProcess)
     assert len(records) == len(tasks)
     return planned - start, perf_counter() - planned
-
-
-if __name__ == "__main__":
-    main()

@@ -1,29 +1,20 @@
-"""Who is fastest on how many surfaces? Draws the profile of a kept report from its records.
-
-python -m benchmarks.kept_profile [reports/paper reports/standard]
-
-A kept report has a row for each record and no run, so that what has changed in how a profile is
-made can still be applied to it.
-"""
+"""Who is fastest on how many surfaces? From the records of a kept report."""
 
 from __future__ import annotations
 
 import csv
 import json
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks.pages import ROOT
-from cembench.core.atomic import write_bytes, write_text
+from benchmarks.pages import ROOT, Section
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared_plots import declared_plot
 from cembench.report.plots import Plot, write_plot
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 from cembench.results.store import Store
-
-KEPT = ("reports/paper", "reports/standard")
 
 
 def evidence_of(folder: Path) -> Evidence:
@@ -68,27 +59,36 @@ def _record(row: dict[str, Any]) -> Record:
     )
 
 
-def main(folders: list[str]) -> None:
-    """Draw the profiles."""
-    for name in folders or KEPT:
-        plot = declared_plot(evidence_of(ROOT / name), "performance-profile")
-        if plot is not None:
-            keep(plot, ROOT / name)
-            print(f"{name}: {', '.join(panel.title for panel in plot.panels)}\n{plot.caption}")
+def kept_profile(
+    reports: Sequence[str] = ("reports/paper", "reports/standard"),
+) -> list[Section]:
+    """Draw the performance profile of kept reports from their records.
+
+    A kept report has a row for each record and no run, so that what has changed in how a profile is
+    made can still be applied to it.
+    """
+    plots = {
+        name: declared_plot(evidence_of(ROOT / name), "performance-profile") for name in reports
+    }
+    return [
+        Section(
+            [f"{name}: {', '.join(panel.title for panel in plot.panels)}\n{plot.caption}"],
+            files=files_of(plot, name),
+        )
+        for name, plot in plots.items()
+        if plot is not None
+    ]
 
 
-def keep(plot: Plot, folder: Path) -> None:
-    """Put a plot where the report has it: its picture and data, and its caption."""
-    with TemporaryDirectory() as made:
-        write_plot(plot, Path(made))
-        for suffix in ("png", "csv"):
-            drawn = Path(made) / "figures" / f"{plot.name}.{suffix}"
-            write_bytes(folder / "figures" / drawn.name, drawn.read_bytes())
-    page = folder / "report.md"
-    before, image, rest = page.read_text().partition(f"](figures/{plot.name}.png)\n\n")
+def files_of(plot: Plot, report: str) -> dict[str, bytes | str]:
+    """Return a plot's picture and data, and the report's page with its caption."""
+    with TemporaryDirectory() as folder:
+        write_plot(plot, Path(folder))
+        names = [f"figures/{plot.name}.{suffix}" for suffix in ("png", "csv")]
+        files: dict[str, bytes | str] = {
+            f"{report}/{name}": (Path(folder) / name).read_bytes() for name in names
+        }
+    page = (ROOT / report / "report.md").read_text()
+    before, image, rest = page.partition(f"](figures/{plot.name}.png)\n\n")
     _, data, after = rest.partition(" ([data]")
-    write_text(page, f"{before}{image}{plot.caption}{data}{after}")
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])
+    return files | {f"{report}/report.md": f"{before}{image}{plot.caption}{data}{after}"}

@@ -1,17 +1,7 @@
-"""Shorten a report to what the repository keeps: its page in Markdown, plots, tables and records.
-
-    cembench run ... -o results/real
-    cembench report results/real -o results/real-report
-    python -m benchmarks.kept_report results/real-report reports/real --hide /home/me/meshes
-
-Pages and pictures of every surface, and every figure in three forms, make a clone heavy; `cembench
-report` makes them again from a run. Records are kept without their histories and phases, and a
-folder that others do not have is named by its last part.
-"""
+"""The short form of a report that the repository keeps."""
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
 import re
@@ -19,7 +9,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.pages import ROOT
+from benchmarks.pages import ROOT, Section, Table
 from cembench.core.atomic import write_text
 
 #: Columns of records that a kept report leaves out: long ones that nothing of it shows.
@@ -48,8 +38,19 @@ def short_records(text: str) -> str:
     return lines.getvalue()
 
 
-def keep(report: Path, folder: Path, hidden: Sequence[Path] = ()) -> None:
-    """Write the short form of a report to a folder that is replaced; `hidden` are not named."""
+def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = ()) -> Section:
+    """Shorten a report to what the repository keeps: page, plots, tables and records.
+
+        cembench run ... -o results/real
+        cembench report results/real -o results/real-report
+        python -m benchmarks kept-report results/real-report reports/real --hide /home/me/meshes
+
+    Pages and pictures of every surface, and every figure in three forms, make a clone heavy;
+    `cembench report` makes them again from a run. Records are kept without their histories and
+    phases. The folder is replaced if it holds a report. A folder of `hide`, one that others do not
+    have, is named by its last part.
+    """
+    folder = folder.absolute()
     name = folder.relative_to(ROOT) if folder.is_relative_to(ROOT) else folder
     page = shortened((report / "report.md").read_text(encoding="utf-8"), name.as_posix())
     records = short_records((report / "records.csv").read_text(encoding="utf-8"))
@@ -64,24 +65,11 @@ def keep(report: Path, folder: Path, hidden: Sequence[Path] = ()) -> None:
     write_text(folder / "records.csv", records)
     for file in folder.rglob("*"):
         if file.suffix in (".md", ".csv"):
-            text = told = file.read_text(encoding="utf-8")
-            for path in hidden:
-                told = told.replace(str(path), path.name)
-            if told != text:
-                write_text(file, told)
-
-
-def main() -> None:
-    """Shorten the report that is named."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("report", type=Path, help="a folder made by `cembench report`")
-    parser.add_argument("folder", type=Path, help="where its short form goes, in reports/")
-    parser.add_argument(
-        "--hide", type=Path, action="append", default=[], help="a folder whose path is not shown"
-    )
-    asked = parser.parse_args()
-    keep(asked.report, asked.folder.absolute(), asked.hide)
-
-
-if __name__ == "__main__":
-    main()
+            text = shown = file.read_text(encoding="utf-8")
+            for path in hide:
+                shown = shown.replace(str(path), path.name)
+            if shown != text:
+                write_text(file, shown)
+    files = [file for file in sorted(folder.rglob("*")) if file.is_file()]
+    rows = [{"file": file.relative_to(folder), "bytes": file.stat().st_size} for file in files]
+    return Section([Table(rows, "| file | bytes |\n|---|---:|\n| {file} | {bytes:,} |")])

@@ -1,57 +1,42 @@
-"""How long does a morph of two surfaces of 200 k triangles take, and how much memory?
-
-In a fresh process with as many threads as asked for: maps (CEM), then alignment, registration and
-transport together, then each of 48 frames, without drawing. The stand-ins for Liu's faces are made
-first if the cache does not hold them, which takes minutes and is not counted::
-
-    python benchmarks/morph_pair.py
-    python benchmarks/morph_pair.py --surfaces liu-wry-face-stand-in liu-smile-face-stand-in
-"""
+"""How long does a morph of two surfaces of 200 k triangles take, and how much memory?"""
 
 from __future__ import annotations
 
-import argparse
-import json
-import statistics
-import subprocess
-import sys
-from time import perf_counter
+from collections.abc import Sequence
+from statistics import median
+from typing import Any
 
-from cembench.running.environment import for_measuring
+from benchmarks.measuring import in_fresh_process, in_turns
+from benchmarks.pages import Section, Table
 
 ROUNDS, FRAMES = 5, 48
+LAYOUT = """
+| faces | maps, s | registration, s | a frame, s | metrics, s | peak GiB | lambdas |
+|---|---:|---:|---:|---:|---:|---|
+| {faces} | {maps:.3f} | {registration:.3f} | {frame:.4f} | {metrics:.3f} | {peak_gib:.2f} \
+| {lambdas} |"""
 
 
-def main() -> None:
-    """Measure in a process of its own and print what came out."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    usual = ["liu-wry-face-stand-in", "liu-smile-face-stand-in"]
-    parser.add_argument("--surfaces", nargs="+", default=usual)
-    parser.add_argument("--faces", type=int, help="triangles; default: the rows' own")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--one", help=argparse.SUPPRESS)
-    arguments = parser.parse_args()
-    if arguments.one:
-        print(json.dumps(measure(**json.loads(arguments.one))))
-        return
-    job = {"names": arguments.surfaces, "faces": arguments.faces}
-    command = [sys.executable, __file__, "--one", json.dumps(job)]
-    environment = for_measuring(arguments.threads)
-    run = subprocess.run(command, capture_output=True, text=True, env=environment)
-    if run.returncode:
-        sys.exit(run.stderr)
-    found = json.loads(run.stdout)
-    print("faces          " + ", ".join(f"{faces:,}" for faces in found["faces"]))
-    print(f"maps           {found['maps']:.3f} s")
-    print(f"registration   {found['registration']:.3f} s (alignment, (34), transport)")
-    print(f"a frame        {found['frame']:.4f} s")
-    print(f"metrics        {found['metrics']:.3f} s")
-    print(f"peak memory    {found['peak_gib']:.2f} GiB")
-    print(f"lambdas        {found['lambdas']}")
+def morph_pair(
+    surfaces: Sequence[str] = ("liu-wry-face-stand-in", "liu-smile-face-stand-in"),
+    *,
+    faces: int | None = None,
+    threads: int = 2,
+) -> Section:
+    """Measure a morph of two surfaces: by default, of 200,000 triangles each.
+
+    In a fresh process with as many threads as asked for: maps (CEM), then alignment, (34) and
+    transport together ("registration"), then each of 48 frames, without drawing. The stand-ins for
+    Liu's faces are made first if the cache does not hold them, which takes minutes and is not
+    counted.
+    """
+    row = in_fresh_process(measure, list(surfaces), faces, threads=threads)
+    row["faces"] = ", ".join(f"{m:,}" for m in row["faces"])
+    return Section([Table([row], LAYOUT)])
 
 
-def measure(names: list[str], faces: int | None) -> dict[str, object]:
-    """Figures are medians over the rounds; the peak is that of the whole process."""
+def measure(names: list[str], faces: int | None) -> dict[str, Any]:
+    """Return medians over the rounds; the peak is that of the whole process."""
     import numpy as np
 
     from cembench.registry import load_registry
@@ -65,27 +50,20 @@ def measure(names: list[str], faces: int | None) -> dict[str, object]:
     known = [registry.surface(n).landmarks(m) for n, m in zip(names, meshes, strict=True)]
     landmarks = common_landmarks(meshes, known)
     cem = registry.algorithm("cem").function
-    seconds: dict[str, list[float]] = {"maps": [], "registration": [], "frame": [], "metrics": []}
-    for _ in range(ROUNDS):
-        began = perf_counter()
-        maps = [cem(mesh.fresh()).uv for mesh in meshes]
-        seconds["maps"].append(perf_counter() - began)
-        began = perf_counter()
-        found = morph([mesh.fresh() for mesh in meshes], maps, landmarks)
-        seconds["registration"].append(perf_counter() - began)
-        began = perf_counter()
-        frames = np.stack([found.at(time) for time in np.linspace(0, 1, FRAMES)])
-        seconds["frame"].append((perf_counter() - began) / len(frames))
-        began = perf_counter()
-        found.metrics(FRAMES)
-        seconds["metrics"].append(perf_counter() - began)
+    maps = [cem(mesh.fresh()).uv for mesh in meshes]
+    pair = morph([mesh.fresh() for mesh in meshes], maps, landmarks)
+    calls = {
+        "maps": lambda: [cem(mesh.fresh()) for mesh in meshes],
+        "registration": lambda: morph([mesh.fresh() for mesh in meshes], maps, landmarks),
+        "frame": lambda: np.stack([pair.at(time) for time in np.linspace(0, 1, FRAMES)]),
+        "metrics": lambda: pair.metrics(FRAMES),
+    }
+    timings = in_turns(calls, ROUNDS, warm_up=0)
+    seconds = {name: median(one.total for one in many) for name, many in timings.items()}
     return {
         "faces": [mesh.m for mesh in meshes],
-        **{name: statistics.median(values) for name, values in seconds.items()},
+        **seconds,
+        "frame": seconds["frame"] / FRAMES,
         "peak_gib": (peak_memory_bytes() or 0) / 2**30,
-        "lambdas": [[round(lam, 3) for lam in r.lambdas] for r in found.registrations],
+        "lambdas": [[round(lam, 3) for lam in r.lambdas] for r in pair.registrations],
     }
-
-
-if __name__ == "__main__":
-    main()

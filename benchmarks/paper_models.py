@@ -1,19 +1,12 @@
-"""The paper's seven public models: printed beside measured, and what numbering alone decides.
-
-Fills docs/paper_models.md, and the short table of README.md, from the models in a folder
-(`cembench fetch --group paper` prints one), known by their meshes whatever their files are called,
-and from other coarse disks there::
-
-    python -m benchmarks.paper_models FOLDER_OF_MESHES
-"""
+"""The paper's seven public models: printed beside measured, and what numbering alone decides."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from cembench.algorithms.cem import cem, map_from_triangle
@@ -21,7 +14,8 @@ from cembench.algorithms.fdm import fdm
 from cembench.algorithms.ldm import farthest_from_mean, ldm, map_numbered
 from cembench.algorithms.qiem import qiem
 
-from benchmarks.pages import ROOT, fill
+from benchmarks.measuring import progress
+from benchmarks.pages import Section, Table
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import AlgorithmFailed, MeshError
 from cembench.core.parameterization import Parameterization
@@ -32,7 +26,6 @@ from cembench.results.papers import find_paper
 from cembench.running.plan import paper_role_of
 
 CEM_PAPER = find_paper("cem")
-PAGE = ROOT / "docs/paper_models.md"
 #: The model whose maps fold by every method.
 FOLDED = "David Head"
 #: Coarse disks on which the numbering is studied besides, and how many choices are tried at most.
@@ -118,125 +111,121 @@ READINGS: tuple[tuple[str, str, Call], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class Row:
-    """One algorithm on one model: the three printed figures and those measured."""
+SHORT = f"""
+| E_C, mean, SD | {" | ".join(title for _, title, _ in AS_PRINTED)} |
+|---|{"---|" * len(AS_PRINTED)}
+| {{model}} | {" | ".join(f"{{{column}}}" for column, _, _ in AS_PRINTED)} |"""
+BESIDE = """
+| model | algorithm | printed E_C | mean | SD | here E_C | mean | SD | folds | digits |
+|---|---|---:|---:|---:|---:|---:|---:|---:|---|
+| {model} | {title} | {said[0]} | {said[1]} | {said[2]} | {here[0]} | {here[1]} | {here[2]} \
+| {folds} | {digits} |"""
+RANGES = """
+| surface | triangles | algorithm | choices | here | smallest E_C | median | largest |
+|---|---:|---|---:|---|---|---|---|
+| {surface} | {faces:,} | {algorithm} | {choices} | {here} | {smallest} | {median} | {largest} |"""
 
-    model: str
-    column: str
-    title: str
-    said: tuple[str, str, str]
-    found: Cells
 
-    @property
-    def agreeing(self) -> int:
-        """How many of the three figures agree to the printed digits."""
-        return sum(a == b for a, b in zip(self.said, self.found.shown(), strict=True))
+def paper_models(folder: Path) -> list[Section]:
+    """Measure the paper's seven public models, and what numbering alone decides.
+
+    For docs/paper_models.md, and the short table of README.md, from the models in a folder
+    (`cembench fetch --group paper` prints one), known by their meshes whatever their files are
+    called, and from other coarse disks there.
+    """
+    meshes = models(folder)
+    rows = measured(meshes, AS_PRINTED)
+    repaired = measured({FOLDED: meshes[FOLDED]}, AS_PRINTED, repair=True)
+    parts = ["## Printed beside measured", counted(rows), Table(rows, BESIDE)]
+    parts += ["Two other readings:", Table(measured(meshes, READINGS), BESIDE)]
+    parts += [f"{FOLDED} with its folds repaired, the default:", Table(repaired, BESIDE)]
+    parts += ["## What numbering decides", nefertiti(meshes["Nefertiti"])]
+    parts += [Table(list(ranges(folder)), RANGES)]
+    return [Section([short(rows)], "README.md"), Section(parts, "docs/paper_models.md")]
 
 
 def measured(
     meshes: Mapping[str, DiskMesh], runs: Sequence[tuple[str, str, Call]], *, repair: bool = False
-) -> list[Row]:
-    """Return what every call finds on every model."""
+) -> list[dict[str, Any]]:
+    """Return the three printed figures and those of every call, on every model."""
     rows = []
-    for model, mesh in meshes.items():
+    for model in progress(meshes):
         for column, title, call in runs:
-            found = cells(mesh, call(mesh.fresh(), model, repair))
-            rows.append(Row(model, column, title, printed(model, column), found))
-            print(model, title, flush=True)
+            figures = cells(meshes[model], call(meshes[model].fresh(), model, repair))
+            said, here = printed(model, column), figures.shown()
+            names = zip(("E_C", "mean", "SD"), said, here, strict=True)
+            differ = [name for name, a, b in names if a != b]
+            digits = f"not {', '.join(differ)}" if differ else "all agree"
+            rows.append({"model": model, "column": column, "title": title, "said": said,
+                         "here": here, "folds": figures.folds, "digits": digits})  # fmt: skip
     return rows
 
 
-def beside(rows: Sequence[Row]) -> Iterable[str]:
-    """Yield the lines of the table of printed beside measured figures."""
-    yield "| model | algorithm | printed E_C | mean | SD | here E_C | mean | SD | folds | digits |"
-    yield "|---|---|---:|---:|---:|---:|---:|---:|---:|---|"
-    for row in rows:
-        pairs = zip(("E_C", "mean", "SD"), row.said, row.found.shown(), strict=True)
-        differ = [name for name, a, b in pairs if a != b]
-        agreed = "all agree" if not differ else f"not {', '.join(differ)}"
-        yield (
-            f"| {row.model} | {row.title} | {' | '.join(row.said)} "
-            f"| {' | '.join(row.found.shown())} | {row.found.folds} | {agreed} |"
-        )
-
-
-def counted(rows: Sequence[Row]) -> str:
+def counted(rows: Sequence[Mapping[str, Any]]) -> str:
     """Return how many of the printed cells agree, by algorithm."""
-    total = sum(row.agreeing for row in rows)
-    by_title: dict[str, list[Row]] = {}
+    agreeing: dict[str, list[tuple[bool, ...]]] = {}
     for row in rows:
-        by_title.setdefault(row.title, []).append(row)
-    each = "; ".join(
-        f"{title} {sum(row.agreeing for row in of)} of {3 * len(of)}"
-        for title, of in by_title.items()
-    )
-    angles = sum(row.said[1:] == row.found.shown()[1:] for row in by_title["FDM"])
+        same = tuple(a == b for a, b in zip(row["said"], row["here"], strict=True))
+        agreeing.setdefault(row["title"], []).append(same)
+    counts = {title: sum(map(sum, of)) for title, of in agreeing.items()}
+    each = "; ".join(f"{title} {n} of {3 * len(agreeing[title])}" for title, n in counts.items())
+    angles = sum(all(same[1:]) for same in agreeing["FDM"])
     return (
-        f"{total} of {3 * len(rows)} cells agree to the printed digits: {each}. FDM's mean and SD "
-        f"agree on {angles} of {len(by_title['FDM'])} models."
+        f"{sum(counts.values())} of {3 * len(rows)} cells agree to the printed digits: {each}. "
+        f"FDM's mean and SD agree on {angles} of {len(agreeing['FDM'])} models."
     )
 
 
-def short(rows: Sequence[Row]) -> Iterable[str]:
-    """Yield the lines of a table by model: measured, and printed in brackets where it differs."""
-    titles = [title for _, title, _ in AS_PRINTED]
-    yield f"| E_C, mean, SD | {' | '.join(titles)} |"
-    yield f"|---|{'---|' * len(titles)}"
-    for model in dict.fromkeys(row.model for row in rows):
-        shown = {row.title: brackets(row) for row in rows if row.model == model}
-        yield f"| {model} | {' | '.join(shown[title] for title in titles)} |"
-
-
-def brackets(row: Row) -> str:
-    """Return the measured figures, each with the printed one in brackets where that differs."""
-    pairs = zip(row.said, row.found.shown(), strict=True)
-    return ", ".join(here if here == said else f"{here} ({said})" for said, here in pairs)
+def short(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return a table by model: measured, and printed in brackets where it differs."""
+    by_model: dict[str, dict[str, str]] = {}
+    for row in rows:
+        pairs = zip(row["said"], row["here"], strict=True)
+        shown = ", ".join(here if here == said else f"{here} ({said})" for said, here in pairs)
+        by_model.setdefault(row["model"], {"model": row["model"]})[row["column"]] = shown
+    return Table(list(by_model.values()), SHORT)
 
 
 def ldm_choices(mesh: DiskMesh) -> list[Cells]:
     """Return LDM's figures for every first boundary vertex, from the first copy, then the other."""
-    return [*ldm_from(mesh, mirrored=False), *ldm_from(mesh, mirrored=True)]
-
-
-def ldm_from(mesh: DiskMesh, *, mirrored: bool) -> list[Cells]:
-    """Return LDM's figures for every first boundary vertex, the triangle from one copy."""
-    found = []
-    for first in range(len(mesh.boundary)):
-        try:
-            found.append(cells(mesh, map_numbered(mesh.fresh(), first, mirrored=mirrored)))
-        except AlgorithmFailed:
-            continue
-    return found
+    ways = ((first, copy) for copy in (False, True) for first in range(len(mesh.boundary)))
+    return list(_maps(mesh, lambda disk, way: map_numbered(disk, way[0], mirrored=way[1]), ways))
 
 
 def cem_choices(mesh: DiskMesh) -> list[Cells]:
     """Return CEM's figures for the start's triangle, all of them or `MOST` at even steps."""
-    found = []
-    for triangle in np.unique(np.linspace(0, mesh.m - 1, MOST).astype(int)):
-        try:
-            found.append(cells(mesh, map_from_triangle(mesh.fresh(), int(triangle))))
-        except AlgorithmFailed:
-            continue
-    return found
+    triangles = np.unique(np.linspace(0, mesh.m - 1, MOST).astype(int))
+    return list(_maps(mesh, map_from_triangle, triangles.tolist()))
 
 
-def ranges(folder: Path) -> Iterable[str]:
-    """Yield the lines of the table of what numbering decides."""
-    yield "| surface | triangles | algorithm | choices | here | smallest E_C | median | largest |"
-    yield "|---|---:|---|---:|---|---|---|---|"
-    for file in COARSE:
+def _maps(mesh: DiskMesh, call: Callable[..., Parameterization], ways: Any) -> Iterator[Cells]:
+    for way in ways:
+        with suppress(AlgorithmFailed):
+            yield cells(mesh, call(mesh.fresh(), way))
+
+
+def ranges(folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield what numbering decides on each coarse disk."""
+    for file in progress(COARSE):
         mesh = read_mesh(folder / file)
-        usual: Mapping[str, tuple[Cells, list[Cells]]] = {
-            "LDM, first vertex and copy": (cells(mesh, ldm(mesh.fresh())), ldm_choices(mesh)),
-            "CEM, start triangle": (cells(mesh, cem(mesh.fresh())), cem_choices(mesh)),
-        }
-        for name, (here, found) in usual.items():
-            ordered = sorted(found, key=lambda one: one.energy)
-            three = (ordered[0], ordered[len(ordered) // 2], ordered[-1])
-            shown = " | ".join(" ".join(one.shown()) for one in (here, *three))
-            yield f"| {file} | {mesh.m:,} | {name} | {len(found)} | {shown} |"
-            print(file, name, flush=True)
+        for name, usual, choices in (
+            ("LDM, first vertex and copy", ldm, ldm_choices),
+            ("CEM, start triangle", cem, cem_choices),
+        ):
+            ordered = sorted(choices(mesh), key=lambda one: one.energy)
+            four = {
+                "here": cells(mesh, usual(mesh.fresh())),
+                "smallest": ordered[0],
+                "median": ordered[len(ordered) // 2],
+                "largest": ordered[-1],
+            }
+            yield {
+                "surface": file,
+                "faces": mesh.m,
+                "algorithm": name,
+                "choices": len(ordered),
+                **{key: " ".join(one.shown()) for key, one in four.items()},
+            }
 
 
 def nefertiti(mesh: DiskMesh) -> str:
@@ -264,23 +253,3 @@ def nefertiti(mesh: DiskMesh) -> str:
         f"{' '.join(cells(mesh, ldm(mesh.fresh())).shown())}. Each cell of the table is E_C, mean "
         "and SD."
     )
-
-
-def main() -> None:
-    """Measure, and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path)
-    folder = parser.parse_args().folder
-    meshes = models(folder)
-    rows = measured(meshes, AS_PRINTED)
-    repaired = measured({FOLDED: meshes[FOLDED]}, AS_PRINTED, repair=True)
-    fill(ROOT / "README.md", "paper_models", "\n".join(short(rows)))
-    parts = ["## Printed beside measured", "", counted(rows), "", *beside(rows), ""]
-    parts += ["Two other readings:", "", *beside(measured(meshes, READINGS)), ""]
-    parts += [f"{FOLDED} with its folds repaired, the default:", "", *beside(repaired), ""]
-    parts += ["## What numbering decides", "", nefertiti(meshes["Nefertiti"]), ""]
-    fill(PAGE, "paper_models", "\n".join([*parts, *ranges(folder)]))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,19 +1,12 @@
-"""Where does each algorithm spend its time, when factors are kept and when they are not?
-
-Prints a Markdown table, a line an algorithm and policy, the phases that matter as columns. Each
-line comes from a process of its own with one thread; seconds are those of the call with the
-median total::
-
-    python benchmarks/phases.py surface.ply
-    python benchmarks/phases.py --faces 276000 -a cem,fdm
-"""
+"""Where does each algorithm spend its time, when factors are kept and when they are not?"""
 
 from __future__ import annotations
 
-import argparse
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.pages import Section, Table
 from cembench.registry import load_registry
 from cembench.results.store import Store
 from cembench.running.local import run_tasks
@@ -25,58 +18,54 @@ from cembench.running.surfaces import generate_surface, kinds_of, load_file
 SHOWN = 0.05
 
 
-def main() -> None:
-    """Measure and print."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("mesh", type=Path, nargs="?", help="default: a spherical cap")
-    parser.add_argument("--faces", type=int, default=276_000)
-    parser.add_argument("-a", "--algorithms", help="comma-separated; default: all that take a disk")
-    parser.add_argument("--repeats", type=int, default=3)
-    parser.add_argument("--timeout", type=float, default=600.0)
-    arguments = parser.parse_args()
+def phases(
+    mesh: Sequence[Path] = (),
+    *,
+    faces: int = 276_000,
+    algorithms: Sequence[str] = (),
+    repeats: int = 3,
+    timeout: float = 600.0,
+) -> Section:
+    """Tabulate where each algorithm spends its time, under both policies of solving.
 
+    On a mesh, or else a spherical cap; by default, all algorithms that take a disk. Each line comes
+    from a process of its own with one thread; seconds are those of the call with the median total.
+    """
     registry = load_registry()
-    names = arguments.algorithms.split(",") if arguments.algorithms else registry.usual_algorithms
-    chosen = [registry.algorithm(name) for name in names]
-    if arguments.mesh:
-        surface = load_file(arguments.mesh, kinds_of(chosen)).mesh
+    chosen = [registry.algorithm(name) for name in algorithms or registry.usual_algorithms]
+    if mesh:
+        surface = load_file(mesh[0], kinds_of(chosen)).mesh
     else:
-        surface = generate_surface(registry, "spherical-cap", arguments.faces)
+        surface = generate_surface(registry, "spherical-cap", faces)
     tasks = [
         task
+        for algorithm in chosen
         for solves in ("reuse", "backslash")
         for task in plan_cells(
-            chosen, [surface], {}, MeasurementSettings(solves=solves, repeats=arguments.repeats)
+            [algorithm], [surface], {}, MeasurementSettings(solves=solves, repeats=repeats)
         )
     ]
     with tempfile.TemporaryDirectory() as folder:
-        records = run_tasks(tasks, Store(Path(folder)), Options(timeout=arguments.timeout))
-    lines = [
-        (task.algorithm, r.cell.solves, r.outcome) for task, r in zip(tasks, records, strict=True)
-    ]
-    lines.sort(key=lambda line: names.index(line[0].name))
-
+        records = run_tasks(tasks, Store(Path(folder)), Options(timeout=timeout))
+    ended = [one.outcome.phases for one in records]
     shown = sorted(
-        {
-            name
-            for _, _, outcome in lines
-            for name, seconds in outcome.phases.items()
-            if seconds > SHOWN * sum(outcome.phases.values())
-        }
+        {name for one in ended for name, s in one.items() if s > SHOWN * sum(one.values())}
     )
-    heading = ["algorithm", "solves", *shown, "rest", "total"]
-    print(f"{surface.name}: {surface.m:,} triangles, {surface.n:,} vertices; seconds\n")
-    print("| " + " | ".join(heading) + " |")
-    print("|---|---|" + "---:|" * (len(heading) - 2))
-    for algorithm, solves, outcome in lines:
-        if outcome.status != "ok":
-            print(f"| {algorithm.title} | {solves} | {outcome.status}: {outcome.cause} |")
-            continue
-        total = sum(outcome.phases.values())
-        figures = [outcome.phases.get(name, 0.0) for name in shown]
-        cells = [f"{x:.3f}" for x in (*figures, total - sum(figures), total)]
-        print("| " + " | ".join([algorithm.title, solves, *cells]) + " |")
-
-
-if __name__ == "__main__":
-    main()
+    rows = []
+    for task, record in zip(tasks, records, strict=True):
+        outcome, total = record.outcome, sum(record.outcome.phases.values())
+        row = {"title": task.algorithm.title, "solves": record.cell.solves}
+        if outcome.status == "ok":
+            seconds = {f"phase{k}": outcome.phases.get(name, 0.0) for k, name in enumerate(shown)}
+            row |= {**seconds, "rest": total - sum(seconds.values()), "total": total}
+        else:
+            row |= dict.fromkeys([*(f"phase{k}" for k in range(len(shown))), "rest", "total"])
+            row["solves"] += f" ({outcome.status}: {outcome.cause})"
+        rows.append(row)
+    cells = "".join(f" {{phase{k}:.3f}} |" for k in range(len(shown)))
+    layout = f"""
+| algorithm | solves |{"".join(f" {name} |" for name in shown)} rest | total |
+|---|---|{"---:|" * (len(shown) + 2)}
+| {{title}} | {{solves}} |{cells} {{rest:.3f}} | {{total:.3f}} |"""
+    about = f"{surface.name}: {surface.m:,} triangles, {surface.n:,} vertices; seconds"
+    return Section([about, Table(rows, layout)])

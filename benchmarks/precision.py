@@ -1,29 +1,29 @@
-"""Is the rule that measures until a figure is precise as seldom wrong as it says?
-
-Simulates two algorithms of one cost on machines that are noisy in five ways (``noise.py``), with
-the rule as it is: looks, shares of the 5 %, intervals of the ratio and of both cells' own seconds.
-Tells how often one was called faster or slower, and after how many rounds it was over::
-
-    python -m benchmarks.precision
-    python -m benchmarks.precision --runs 20000 --write-docs
-"""
+"""Is the rule that measures until a figure is precise as seldom wrong as it says?"""
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import dataclass
-from pathlib import Path
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtr
 
-from benchmarks import noise, pages
+from benchmarks import noise
+from benchmarks.pages import Section, Table
 from cembench.results.intervals import ERROR
 from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
 from cembench.results.signed_rank import cut, walsh_averages
 
-PAGE = pages.ROOT / "docs/measuring.md"
+LAYOUT = """
+| noise | precision | wrong verdicts | at any look | rounds: mean | median | precise |
+|---|---:|---:|---:|---:|---:|---:|
+| {noise} | {precision:.0%} | {wrong:.1%} | {ever_wrong:.1%} | {mean:.1f} | {median:.0f} \
+| {precise:.0%} |"""
+CORRECTED = """
+| noise | tables of 100 with a wrong verdict, corrected: at most |
+|---|---:|
+| {noise} | {wrong:.1%} |"""
 
 
 @dataclass(frozen=True)
@@ -87,44 +87,32 @@ def family_error(model: str, runs: int, rng: np.random.Generator, comparisons: i
     return float(claimed.mean() * comparisons)
 
 
-def table(runs: int) -> str:
-    """Return the Markdown of all models at three precisions."""
-    lines = [
-        "| noise | precision | wrong verdicts | at any look | rounds: mean | median | precise |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
-    for model in noise.MODELS:
-        for precision in (0.02, USUAL_PRECISION, 0.1):
-            found = simulate(model, runs, precision)
-            lines.append(
-                f"| {model} | {precision:.0%} | {found.wrong.mean():.1%} "
-                f"| {found.ever_wrong.mean():.1%} | {found.rounds.mean():.1f} "
-                f"| {np.median(found.rounds):.0f} | {found.precise.mean():.0%} |"
-            )
-    lines += [
-        "",
-        "| noise | tables of 100 with a wrong verdict, corrected: at most |",
-        "|---|---:|",
-    ]
+def precision(*, runs: int = 4000) -> Section:
+    """Count the wrong verdicts of the rule that measures until a figure is precise.
+
+    Simulates two algorithms of one cost on machines that are noisy in several ways (``noise.py``),
+    with the rule as it is: looks, shares of the 5 %, intervals of the ratio and of both cells' own
+    seconds. Counts how often one was called faster or slower, and after how many rounds it was
+    over.
+    """
+    rows, corrected = [], []
+    for model, width in product(noise.MODELS, (0.02, USUAL_PRECISION, 0.1)):
+        simulated = simulate(model, runs, width)
+        rows.append(
+            {
+                "noise": model,
+                "precision": width,
+                "wrong": simulated.wrong.mean(),
+                "ever_wrong": simulated.ever_wrong.mean(),
+                "mean": simulated.rounds.mean(),
+                "median": np.median(simulated.rounds),
+                "precise": simulated.precise.mean(),
+            }
+        )
     rng = np.random.default_rng(0)
     for model in noise.MODELS:
         chunks = [family_error(model, 50_000, rng) for _ in range(max(1, 40 * runs // 50_000))]
-        lines.append(f"| {model} | {np.mean(chunks):.1%} |")
-    told = f"{runs:,} simulated runs a line, at most {USUAL_MOST_ROUNDS} rounds; "
-    return "\n".join([*lines, "", f"{told}of the second table {40 * runs:,}."])
-
-
-def main() -> None:
-    """Print the table, or put it into the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--runs", type=int, default=4000)
-    parser.add_argument("--write-docs", action="store_true", help="fill docs/measuring.md")
-    chosen = parser.parse_args()
-    text = table(chosen.runs)
-    print(text)
-    if chosen.write_docs:
-        pages.fill(PAGE, Path(__file__).stem, text)
-
-
-if __name__ == "__main__":
-    main()
+        corrected.append({"noise": model, "wrong": np.mean(chunks)})
+    note = f"{runs:,} simulated runs a line, at most {USUAL_MOST_ROUNDS} rounds; "
+    note += f"of the second table {40 * runs:,}."
+    return Section([Table(rows, LAYOUT), Table(corrected, CORRECTED), note], "docs/measuring.md")

@@ -1,16 +1,9 @@
-"""Draw docs/qiem_steps.png: what each further step of QIEM's flow is worth on real surfaces.
-
-python -m benchmarks.qiem_picture MESH...
-
-The map that a user would get if the flow ended there is finished after every step: boundary on the
-circle, interior solved for. Rings mark where tolerances end the flow.
-"""
+"""What each further step of QIEM's flow is worth on real surfaces."""
 
 from __future__ import annotations
 
-import argparse
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,18 +12,18 @@ import numpy as np
 from cembench.algorithms import qiem as rules
 from cembench.algorithms.cem import cem
 
+from benchmarks.measuring import png, progress
+from benchmarks.pages import Section
 from benchmarks.qiem_steps import MOST_STEPS, ruled
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
-from cembench.core.atomic import write
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-PICTURE = Path(__file__).parents[1] / "docs/qiem_steps.png"
 #: First time step and growth of each curve; the first one is used.
 CURVES = ((0.1, 1.5), (1.0, 1.5), (0.1, 4.0))
 TOLERANCES = (1e-4, 1e-6, 1e-8)
@@ -86,17 +79,19 @@ def _finished(mesh: DiskMesh, L: Any, kept: Iterator[Any]) -> Iterator[float]:
         yield energy(mesh, harmonic_extension(L, mesh.boundary, rules.boundary_on_circle(mesh, S)))
 
 
-def main() -> None:
-    """Draw one panel per surface, and write the picture."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("meshes", nargs="+", type=Path)
-    asked = parser.parse_args()
-    rows = math.ceil(len(asked.meshes) / 3)
+def qiem_picture(meshes: Sequence[Path]) -> Section:
+    """Draw what each further step of QIEM's flow is worth on real surfaces.
+
+    The map that a user would get if the flow ended there is finished after every step: boundary on
+    the circle, interior solved for. Rings mark where tolerances end the flow.
+    """
+    lines = []
+    rows = math.ceil(len(meshes) / 3)
     size = (9.5, 3 * rows + 0.5)
     figure, axes = plt.subplots(rows, 3, figsize=size, squeeze=False, layout="constrained")
-    for axis in axes.flat[len(asked.meshes) :]:
+    for axis in axes.flat[len(meshes) :]:
         axis.set_axis_off()
-    for path, axis in zip(asked.meshes, axes.flat, strict=False):
+    for path, axis in zip(progress(meshes), axes.flat, strict=False):
         mesh = read_mesh(path)
         curves = [flow(mesh, first, growth) for first, growth in CURVES]
         end = curves[0][0][curves[0][1][min(TOLERANCES)]]
@@ -113,16 +108,12 @@ def main() -> None:
                 style = {"ms": 7, "mec": drawn.get_color(), "mfc": face}
                 axis.plot(steps, over[steps], "o", **style)
             settled = held[np.flatnonzero(np.abs(over[held] - 1) > SETTLED).max(initial=-1) + 1]
-            print(f"{path.stem}, {name}: within {SETTLED:.1%} from trial {settled}, ends: {ends}")
+            within = f"within {SETTLED:.1%} from trial {settled}"
+            lines.append(f"{path.stem}, {name}: {within}, ends: {ends}")
         axis.set_title(f"{path.stem.replace('_', ' ')}, {mesh.m:,} triangles", fontsize=9)
         axis.set_ylim(0.99, 1.2)
         axis.tick_params(labelsize=8)
     axes[0, 0].legend(fontsize=7)
     figure.supxlabel("trial steps of the flow, a factorisation each", fontsize=9)
     figure.supylabel("E_C over that of the converged flow", fontsize=9)
-    picture = {"format": "png", "dpi": 110, "metadata": {"Software": ""}}
-    write(PICTURE, lambda file: figure.savefig(file, **picture))
-
-
-if __name__ == "__main__":
-    main()
+    return Section(["\n".join(lines)], files={"docs/qiem_steps.png": png(figure, dpi=110)})

@@ -1,27 +1,17 @@
-"""How much do QIEM's own rules decide how it stands to CEM? A table for docs/algorithms.md.
-
-The paper says neither how the time step is chosen nor when the flow has converged. Here each of
-these rules is varied alone, and what it costs is counted: steps, factorisations, right-hand sides,
-and CPU seconds over CEM's in the same process. Run it as
-
-    python -m benchmarks.qiem_steps [--faces 3000] [--surface NAME ...]
-
-It fills the table of docs/algorithms.md, unless surfaces are named: then it only prints.
-"""
+"""How much do QIEM's own rules decide how it stands to CEM?"""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from statistics import median
 from time import process_time
 from typing import Any
 
 from cembench.algorithms import qiem as rules
 
-from benchmarks.pages import fill
+from benchmarks.measuring import progress
+from benchmarks.pages import Section, Table
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.work import Work, counting
@@ -29,7 +19,6 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
 from cembench.running.surfaces import generate_surface
 
-PAGE = Path(__file__).parents[1] / "docs/algorithms.md"
 SURFACES = tuple(
     f"{name}-stand-in"
     for name in ("nefertiti", "cowboy-hat", "chinese-vase", "foot", "stanford-bunny")
@@ -50,12 +39,26 @@ VARIANTS: tuple[dict[str, float], ...] = (
 )
 #: Enough for every variant; how many were needed is what the table tells.
 MOST_STEPS = 2000
-
-
-HEADING = """\
+LAYOUT = """
 | first dt | growth | stop | steps | factorisations | over CEM's | right-hand sides over CEM's \
 | CPU seconds over CEM's | E_C over CEM's |
-|---:|---:|---:|---:|---:|---:|---:|---:|---:|"""
+|---:|---:|---:|---:|---:|---:|---:|---:|---:|
+| {FIRST:g} | {GROWTH:g} | {tolerance:g} | {steps} | {numeric:g} | {ratio:.1f} | {solved:.2f} \
+| {cpu:.1f} | {energy:.4f} |"""
+
+
+def qiem_steps(surfaces: Sequence[str] = SURFACES, *, faces: int = 3000) -> Section:
+    """Measure how much QIEM's own rules decide how it stands to CEM.
+
+    The paper says neither how the time step is chosen nor when the flow has converged. Each of
+    these rules is varied alone, and what it costs is counted: steps, factorisations, right-hand
+    sides, and CPU seconds over CEM's in the same process; medians over generated surfaces.
+    """
+    registry = load_registry()
+    meshes = [generate_surface(registry, name, faces) for name in surfaces]
+    rows = [row(variant, meshes) for variant in progress(VARIANTS)]
+    note = f"{', '.join(surfaces)}, {faces:,} triangles each; medians over them."
+    return Section([note, Table(rows, LAYOUT)], "docs/algorithms.md")
 
 
 @contextmanager
@@ -76,63 +79,38 @@ def called(name: str, mesh: TriangleMesh, **how: Any) -> tuple[Work, int, float,
     for _ in range(2):
         with counting() as work:
             started = process_time()
-            found = function(mesh.fresh(), **how)
+            result = function(mesh.fresh(), **how)
             seconds.append(process_time() - started)
-    metrics = all_metrics(mesh, found.uv)
+    metrics = all_metrics(mesh, result.uv)
     energy = metrics["conformal_energy"] / metrics["image_area"]
-    return work, found.iterations, energy, seconds[-1]
+    return work, result.iterations, energy, seconds[-1]
 
 
-def row(variant: dict[str, float], meshes: list[TriangleMesh]) -> str:
-    """Return one line: medians over the surfaces."""
-    steps, factored, ratios, solved, cpu, energies = [], [], [], [], [], []
-    failed = 0
+def row(variant: dict[str, float], meshes: list[TriangleMesh]) -> dict[str, Any]:
+    """Return the medians of one set of rules over the surfaces."""
     constants = {k: v for k, v in variant.items() if k.isupper()}
-    tolerance = variant.get("tolerance", USUAL["tolerance"])
+    rule = {**USUAL, **variant}
+    steps, figures = [], []
     for mesh in meshes:
         base, _, best, base_cpu = called("cem", mesh)
-        try:
-            with ruled(**constants):
-                work, count, energy, used = called(
-                    "qiem", mesh, tolerance=tolerance, max_iterations=MOST_STEPS
-                )
-        except AlgorithmFailed:
-            failed += 1
-            continue
-        steps.append(count)
-        factored.append(work.numeric)
-        ratios.append(work.numeric / base.numeric)
-        solved.append(work.right_hand_sides / base.right_hand_sides)
-        cpu.append(used / base_cpu)
-        energies.append(energy / best)
-    rule = {**USUAL, **variant}
-    name = f"{rule['FIRST']:g} | {rule['GROWTH']:g} | {rule['tolerance']:g}"
+        with suppress(AlgorithmFailed), ruled(**constants):
+            work, count, energy, cpu = called(
+                "qiem", mesh, tolerance=rule["tolerance"], max_iterations=MOST_STEPS
+            )
+            steps.append(count)
+            figures.append(
+                {
+                    "numeric": work.numeric,
+                    "ratio": work.numeric / base.numeric,
+                    "solved": work.right_hand_sides / base.right_hand_sides,
+                    "cpu": cpu / base_cpu,
+                    "energy": energy / best,
+                }
+            )
     if not steps:
-        return f"| {name} | none converged | | | | | |"
+        names = ("numeric", "ratio", "solved", "cpu", "energy")
+        return {**rule, "steps": "none converged", **dict.fromkeys(names)}
+    failed = len(meshes) - len(steps)
     spread = f"{min(steps)} to {max(steps)}" + (f", {failed} failed" if failed else "")
-    return (
-        f"| {name} | {median(steps):g} ({spread}) | {median(factored):g} | {median(ratios):.1f} "
-        f"| {median(solved):.2f} | {median(cpu):.1f} | {median(energies):.4f} |"
-    )
-
-
-def main() -> None:
-    """Print the table."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("--faces", type=int, default=3000)
-    parser.add_argument("--surface", action="append", default=[])
-    asked = parser.parse_args()
-    registry = load_registry()
-    names = asked.surface or SURFACES
-    meshes = [generate_surface(registry, name, asked.faces) for name in names]
-    lines = []
-    for variant in VARIANTS:
-        lines.append(row(variant, meshes))
-        print(lines[-1], flush=True)
-    said = f"{', '.join(names)}, {asked.faces:,} triangles each; medians over them."
-    if not asked.surface:
-        fill(PAGE, "qiem_steps", "\n".join([said, "", HEADING, *lines]))
-
-
-if __name__ == "__main__":
-    main()
+    middle = {name: median(one[name] for one in figures) for name in figures[0]}
+    return {**rule, "steps": f"{median(steps):g} ({spread})", **middle}

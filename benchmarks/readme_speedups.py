@@ -1,24 +1,15 @@
-"""How much faster is CEM? Fills README's table from the tables of kept reports.
-
-python -m benchmarks.readme_speedups
-python -m benchmarks.readme_speedups --report reports/paper --print
-
-Averages have a 95 % interval over surfaces and rounds (hierarchical bootstrap, as in the report's
-table of certainty) where most cells have the rounds for one.
-"""
+"""How much faster is CEM? From the tables of kept reports."""
 
 from __future__ import annotations
 
-import argparse
 import csv
 import json
 from collections import Counter
 from pathlib import Path
 
-from benchmarks.pages import ROOT, fill
+from benchmarks.pages import ROOT, Section, Table
 from cembench.results.many import arithmetic, geometric, rate_interval
 
-README = ROOT / "README.md"
 #: A policy of solving, the table of its averages, and the kept report that README quotes.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
 REPORTS = {"reuse": ROOT / "reports/standard", "backslash": ROOT / "reports/paper"}
@@ -68,51 +59,44 @@ def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
     return f" ({found.low:.1f} to {found.high:.1f})" if found else ""
 
 
-def table(report: Path | None = None) -> str:
-    """Return README's table in Markdown, from the tables of kept reports and their records.
+def readme_speedups(*, report: Path | None = None) -> Section:
+    """Tabulate how much faster CEM is, from the tables of kept reports and their records.
 
-    Without a report each policy has the one that README quotes.
+    Averages have a 95 % interval over surfaces and rounds (hierarchical bootstrap, as in the
+    report's table of certainty) where most cells have the rounds for one. Without a report each
+    policy has the one that README quotes.
     """
     folders = {policy: report or kept for policy, kept in REPORTS.items()}
-    there = {policy: folders[policy] / "tables" / file for policy, file in POLICIES.items()}
-    found = {policy: averages(file) for policy, file in there.items() if file.exists()}
-    if not found:
+    files = {policy: folders[policy] / "tables" / file for policy, file in POLICIES.items()}
+    by_policy = {policy: averages(file) for policy, file in files.items() if file.exists()}
+    if not by_policy:
         raise SystemExit(f"{report}/tables holds no {' or '.join(POLICIES.values())}.")
-    heads = [f"`{policy}`: mean | geometric" for policy in found]
-    lines = [
-        f"| CEM against | printed: mean | geometric | {' | '.join(heads)} |",
-        "|---|" + "---:|" * (2 + 2 * len(found)),
+    heads = [f"`{policy}`: mean | geometric" for policy in by_policy]
+    columns = " | ".join(f"{{{policy}[0]}} | {{{policy}[1]}}" for policy in by_policy)
+    layout = f"""
+| CEM against | printed: mean | geometric | {" | ".join(heads)} |
+|---|{"---:|" * (2 + 2 * len(heads))}
+| {{name}} | {{printed[0]:.1f}} | {{printed[1]:.1f}} | {columns} |"""
+    first = next(iter(by_policy.values()))
+    rows = [
+        {
+            "name": name,
+            "printed": [float(first[reading][f"{name} printed, all"]) for reading in AVERAGES],
+            **{
+                policy: [
+                    f"{float(here[reading][f'{name} here']):.1f}"
+                    + interval(folders[policy] / "records.csv", name.lower(), policy, reading)
+                    for reading in AVERAGES
+                ]
+                for policy, here in by_policy.items()
+            },
+        }
+        for name in ("QIEM", "FDM", "LDM")
     ]
-    printed = next(iter(found.values()))
-    for name in ("QIEM", "FDM", "LDM"):
-        cells = [f"{float(printed[r][f'{name} printed, all']):.1f}" for r in (MEAN, GEOMETRIC)]
-        for policy, rows in found.items():
-            for reading in (MEAN, GEOMETRIC):
-                told = f"{float(rows[reading][f'{name} here']):.1f}"
-                records = folders[policy] / "records.csv"
-                cells.append(told + interval(records, name.lower(), policy, reading))
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    return Section([Table(rows, layout)], "README.md")
 
 
 def _rows(file: Path) -> list[dict[str, str]]:
     csv.field_size_limit(2**31 - 1)
     with file.open(encoding="utf-8", newline="") as lines:
         return list(csv.DictReader(lines))
-
-
-def main() -> None:
-    """Fill the page, or print its table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--report", type=Path, help="one report instead of those of README")
-    parser.add_argument("--print", action="store_true", help="print the table, change nothing")
-    chosen = parser.parse_args()
-    text = table(chosen.report)
-    if chosen.print:
-        print(text)
-    else:
-        fill(README, Path(__file__).stem, text)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,13 +1,7 @@
-"""Draw docs/real.png: how often, how well and how fast algorithms map the real disks.
-
-python -m benchmarks.real_picture [REPORT]
-
-Everything is taken from the records of a kept report (default: reports/real).
-"""
+"""How often, how well and how fast algorithms map the real disks."""
 
 from __future__ import annotations
 
-import argparse
 import csv
 from collections import defaultdict
 from pathlib import Path
@@ -16,13 +10,12 @@ import matplotlib as mpl
 import numpy as np
 from scipy.stats import binomtest
 
-from benchmarks.pages import ROOT
-from cembench.core.atomic import write
+from benchmarks.measuring import png
+from benchmarks.pages import ROOT, Section
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-PICTURE = ROOT / "docs/real.png"
 TARGETS = {"disk": "#0072B2", "free boundary": "#D55E00"}
 #: Ranges are drawn between these shares of the surfaces.
 SHARES = (10, 50, 90)
@@ -50,11 +43,9 @@ def over_best(rows: dict[str, list[dict[str, str]]], column: str) -> dict[str, l
     return {name: [f / best[s] for s, f in figures.items()] for name, figures in valid.items()}
 
 
-def main() -> None:
-    """Draw the three panels."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n", 1)[0])
-    parser.add_argument("report", nargs="?", type=Path, default=ROOT / "reports/real")
-    rows = by_algorithm(parser.parse_args().report / "records.csv")
+def real_picture(*, report: Path = ROOT / "reports/real") -> Section:
+    """Draw how often, how well and how fast algorithms map the real disks, from a kept report."""
+    rows = by_algorithm(report / "records.csv")
     errors = over_best(rows, "angle_error_mean_deg")
     seconds = over_best(rows, "seconds")
     names = sorted(rows, key=lambda name: -float(np.median(errors[name])))
@@ -83,9 +74,4 @@ def main() -> None:
     for target, colour in TARGETS.items():
         axes[0].plot([], [], "o", color=colour, ms=5, label=target)
     axes[0].legend(fontsize=8, loc="lower left")
-    picture = {"format": "png", "dpi": 110, "metadata": {"Software": ""}}
-    write(PICTURE, lambda file: figure.savefig(file, **picture))
-
-
-if __name__ == "__main__":
-    main()
+    return Section([], files={"docs/real.png": png(figure, dpi=110)})

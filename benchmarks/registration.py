@@ -1,35 +1,23 @@
-"""How good is the registration of Section 6? Error against the true correspondence of faces.
-
-Pairs of faces of the ICT face model, whose correspondence is known at every vertex: other people,
-other expressions of one person, and both. Each is registered by the paper's method (Moebius
-alignment, then (34)) with 0, 3, 6 and 20 landmarks, and by Moebius maps alone. The table, the
-figure and the figures of every pair are written by one command::
-
-    CEMBENCH_ICT_FACE=folder python -m benchmarks.registration
-
-The two faces of a pair have different triangles (8,000 and 9,000), so that no method gains from
-equal meshes. What the triangles alone cost is measured too: the first face registered to itself.
-"""
+"""How good is the registration of Section 6? Error against the true correspondence of faces."""
 
 from __future__ import annotations
 
-import argparse
 import csv
 import io
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import matplotlib as mpl
 import numpy as np
 from cembench.surfaces.ict_face import LANDMARKS, ict_face, landmarks_of, sample, triangulation
 from cembench.surfaces.ict_model import load_model
+from matplotlib.figure import Figure
 from scipy import optimize
 
-from benchmarks.pages import ROOT, fill
+from benchmarks.measuring import png, progress
+from benchmarks.pages import Section, Table
 from cembench.conformal.moebius import Moebius
 from cembench.conformal.planar import signed_areas
-from cembench.core.atomic import write, write_text
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.results.intervals import median_interval
@@ -42,9 +30,7 @@ from cembench.workflows.parameterize import parameterize
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-PAGE = ROOT / "docs/registration.md"
-FIGURE = ROOT / "docs/registration.png"
-PAIRS = ROOT / "docs/registration.csv"
+PAGE, FIGURE, PAIRS = (f"docs/registration.{suffix}" for suffix in ("md", "png", "csv"))
 #: Triangles of the first and of the second face of a pair.
 FACES = (8_000, 9_000)
 COUNTS = (0, 3, 6, 20)
@@ -59,6 +45,40 @@ KINDS = {
 #: the first landmark to the centre and turns; "oracle" is fitted to the true correspondence of all
 #: vertices of the face, which nobody knows. "floor" is the face on itself.
 PLAIN, FITTED, PAPER, ORACLE, FLOOR = "Moebius", "Moebius, fitted", "(34)", "oracle", "floor"
+TITLES = {
+    PLAIN: "Moebius, as the paper aligns",
+    FITTED: "Moebius, least squares",
+    PAPER: "the paper's: Moebius, then (34)",
+    ORACLE: "best Moebius map, fitted to the truth",
+    FLOOR: "the face registered to itself, on other triangles",
+}
+MEDIANS = f"""
+| method | landmarks | all | {" | ".join(KINDS.values())} | fails |
+|---|---:|---|---|---|---|---:|
+| {{title}} | {{landmarks}} | {{all}} | {
+    " | ".join(f"{{{kind}}}" for kind in KINDS)
+} | {{fails}} |"""
+CHANGES = """
+| landmarks | against | median change | (34) better on |
+|---:|---|---|---:|
+| {landmarks} | {against} | {change} | {better} |"""
+
+
+def registration(*, pairs: int = 30, algorithm: str = "cem") -> Section:
+    """Measure the error of registration against the true correspondence of faces.
+
+    Pairs of faces of the ICT face model, whose correspondence is known at every vertex: other
+    people, other expressions of one person, and both. Each is mapped to the disk by an algorithm
+    and registered by the paper's method (Moebius alignment, then (34)) with 0, 3, 6 and 20
+    landmarks, and by Moebius maps alone. ``CEMBENCH_ICT_FACE`` names the model's folder.
+
+    The two faces of a pair have different triangles (8,000 and 9,000), so that no method gains from
+    equal meshes. What the triangles alone cost is measured too: the first face registered to
+    itself.
+    """
+    rows, modes = measured(pairs, algorithm)
+    files = {FIGURE: png(draw(rows), dpi=130), PAIRS: csv_of(rows)}
+    return Section(parts(rows, modes), PAGE, files)
 
 
 @dataclass(frozen=True)
@@ -203,19 +223,16 @@ def specimens(pairs: int) -> list[tuple[str, tuple[int, str], tuple[int, str]]]:
     return found
 
 
-def measured(
-    pairs: int, algorithm: str, tell: Callable[[str], object] = print
-) -> tuple[list[Row], int]:
+def measured(pairs: int, algorithm: str) -> tuple[list[Row], int]:
     """Return a row for every pair and method, and how many identity modes there were."""
     rows = []
-    for k, (kind, one, another) in enumerate(specimens(pairs)):
+    for k, (kind, one, another) in enumerate(progress(specimens(pairs))):
         first, itself = (face(*one, faces, algorithm) for faces in FACES)
         other = face(*another, FACES[1], algorithm)
         found = errors_of_pair(first, other, itself)
         rows += [
             Row(k, kind, method, count, found.get((method, count))) for method, count in METHODS
         ]
-        tell(f"pair {k + 1} of {pairs}")
     return rows, len(load_model().identities)
 
 
@@ -229,41 +246,31 @@ METHODS = (
 )
 
 
-def table(rows: Sequence[Row], modes: int) -> str:
-    """Return the tables in Markdown: medians with 95 % intervals, and what (34) adds."""
+def parts(rows: Sequence[Row], modes: int) -> list[Table | str]:
+    """Return medians with 95 % intervals, and what (34) adds."""
     pairs = len({row.pair for row in rows})
-    lines = [
-        f"{pairs} pairs ({modes} of 100 identity modes); median error in percent of the distance "
-        "between the outer corners of the eyes, with the 95 % interval of the median; fails: pairs "
-        "without a map.",
-        "",
-        f"| method | landmarks | all | {' | '.join(KINDS.values())} | fails |",
-        "|---|---:|---|---|---|---|---:|",
-    ]
+    medians, changes = [], []
     for method, count in METHODS:
         mine = [row for row in rows if (row.method, row.landmarks) == (method, count)]
-        cells = [_cell(mine), *(_cell([r for r in mine if r.kind == kind]) for kind in KINDS)]
-        fails = sum(row.error is None for row in mine)
-        shown = "" if method in (ORACLE, FLOOR) else count
-        lines.append(f"| {TITLES[method]} | {shown} | {' | '.join(cells)} | {fails or ''} |")
-    lines += ["", "What (34) changes, pair by pair (error of (34) less that of the other):", ""]
-    lines += ["| landmarks | against | median change | (34) better on |", "|---:|---|---|---:|"]
+        by_kind = {kind: _cell([r for r in mine if r.kind == kind]) for kind in KINDS}
+        fails = sum(row.error is None for row in mine) or ""
+        landmarks = "" if method in (ORACLE, FLOOR) else count
+        medians.append({"title": TITLES[method], "landmarks": landmarks, "all": _cell(mine),
+                        **by_kind, "fails": fails})  # fmt: skip
     for count in COUNTS[1:]:
-        for against, there in ((PLAIN, count), (FITTED, count), (PLAIN, 0)):
-            change = differences(rows, (PAPER, count), (against, there))
-            name = "Moebius by curvature" if not there else TITLES[against]
+        for against, landmarks in ((PLAIN, count), (FITTED, count), (PLAIN, 0)):
+            change = differences(rows, (PAPER, count), (against, landmarks))
+            name = TITLES[against] if landmarks else "Moebius by curvature"
             better = f"{sum(c < 0 for c in change)} of {len(change)}"
-            lines.append(f"| {count} | {name} | {_interval(change, '+.2f')} | {better} |")
-    return "\n".join(lines)
-
-
-TITLES: Mapping[str, str] = {
-    PLAIN: "Moebius, as the paper aligns",
-    FITTED: "Moebius, least squares",
-    PAPER: "the paper's: Moebius, then (34)",
-    ORACLE: "best Moebius map, fitted to the truth",
-    FLOOR: "the face registered to itself, on other triangles",
-}
+            changes.append({"landmarks": count, "against": name, "better": better,
+                            "change": _interval(change, "+.2f")})  # fmt: skip
+    about = (
+        f"{pairs} pairs ({modes} of 100 identity modes); median error in percent of the distance "
+        "between the outer corners of the eyes, with the 95 % interval of the median; fails: pairs "
+        "without a map."
+    )
+    then = "What (34) changes, pair by pair (error of (34) less that of the other):"
+    return [about, Table(medians, MEDIANS), then, Table(changes, CHANGES)]
 
 
 def differences(rows: Sequence[Row], one: tuple[str, int], other: tuple[str, int]) -> list[float]:
@@ -290,7 +297,7 @@ def _interval(values: Sequence[float], form: str) -> str:
     return f"{middle} [{around.low:{form}}, {around.high:{form}}]"
 
 
-def draw(rows: Sequence[Row], path: Path) -> None:
+def draw(rows: Sequence[Row]) -> Figure:
     """Draw the error of every pair by method, medians with their intervals on top."""
     figure, axes = plt.subplots(figsize=(8.4, 4.4))
     colours = {PLAIN: "tab:orange", FITTED: "tab:green", PAPER: "tab:blue"}
@@ -325,8 +332,7 @@ def draw(rows: Sequence[Row], path: Path) -> None:
     axes.grid(axis="y", alpha=0.3)
     axes.legend(frameon=False, fontsize=8, loc="upper left", bbox_to_anchor=(0, -0.1), ncols=2)
     figure.tight_layout()
-    write(path, lambda file: figure.savefig(file, format="png", dpi=130, metadata={"Software": ""}))
-    plt.close(figure)
+    return figure
 
 
 def csv_of(rows: Sequence[Row]) -> str:
@@ -338,19 +344,3 @@ def csv_of(rows: Sequence[Row]) -> str:
         error = "" if row.error is None else f"{row.error:.{DIGITS}f}"
         writer.writerow((row.pair, row.kind, row.method, row.landmarks, error))
     return text.getvalue()
-
-
-def main() -> None:
-    """Measure, draw, and fill the page."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--pairs", type=int, default=30)
-    parser.add_argument("--algorithm", default="cem", help="the map to the disk")
-    chosen = parser.parse_args()
-    rows, modes = measured(chosen.pairs, chosen.algorithm)
-    write_text(PAIRS, csv_of(rows))
-    draw(rows, FIGURE)
-    fill(PAGE, "registration", table(rows, modes))
-
-
-if __name__ == "__main__":
-    main()

@@ -16,7 +16,7 @@ ALLOWED = {
     "cembench/core/atomic.py": "it is the place",
     "cembench/core/folders.py:publish": "moves files that were flushed and checked as drafts",
     "cembench/workflows/morphing/writers.py:write_meshes": "moves checked drafts",
-    "cembench/results/samples.py:_append": "a journal grows by a line; a cut one is dropped",
+    "cembench/results/samples.py:append_line": "a journal grows by a line; a cut one is dropped",
     "cembench/running/local.py": "between processes, in the scratch folder",
     "cembench/running/external/exchange.py:write_input": "a program's own folder, temporary",
     "cembench/running/external/call.py:_ended": "what a program prints, in a temporary folder",

@@ -81,7 +81,7 @@ class Samples:
     def _entries(self) -> list[Entry]:
         if not is_there(self.journal):
             return []
-        lines = _whole_lines(read_bytes(self.journal, self._run)).splitlines()
+        lines = whole_lines(read_bytes(self.journal, self._run)).splitlines()
         try:
             return [Entry.model_validate_json(line) for line in lines]
         except ValidationError as error:
@@ -90,17 +90,23 @@ class Samples:
             ) from error
 
     def _append(self, entry: Entry) -> None:
-        try:
-            self.journal.parent.mkdir(parents=True, exist_ok=True)
-            handle = open_file(self.journal, self._run, os.O_RDWR | os.O_CREAT | os.O_APPEND)
-            with os.fdopen(handle, "rb+") as file:
-                file.truncate(len(_whole_lines(file.read())))
-                file.write(entry.model_dump_json(exclude_none=True).encode() + b"\n")
-        except OSError as error:
-            raise unwritable(self.journal, error) from error
+        append_line(self.journal, self._run, entry.model_dump_json(exclude_none=True))
 
 
-def _whole_lines(text: bytes) -> bytes:
+def append_line(journal: Path, root: Path, line: str) -> None:
+    """Append a line to a journal below `root`, in the place of one that a kill cut short."""
+    try:
+        journal.parent.mkdir(parents=True, exist_ok=True)
+        handle = open_file(journal, root, os.O_RDWR | os.O_CREAT | os.O_APPEND)
+        with os.fdopen(handle, "rb+") as file:
+            file.truncate(len(whole_lines(file.read())))
+            file.write(line.encode() + b"\n")
+    except OSError as error:
+        raise unwritable(journal, error) from error
+
+
+def whole_lines(text: bytes) -> bytes:
+    """Return a journal's bytes without a line that a kill cut short."""
     return text[: text.rfind(b"\n") + 1]
 
 

@@ -15,7 +15,7 @@ from cembench.conformal.laplacian import laplacian_of_weights
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.files import read_mesh
 from cembench.mesh.intrinsic import Triangulation
-from fuzz.hard_meshes import hard_mesh
+from tests.campaign.hard_meshes import hard_mesh
 from tests.hard_surfaces import hard_surface
 from tests.real_meshes import DISKS, real_mesh
 

@@ -23,7 +23,7 @@ def test_what_is_called_different_is_counted_with_its_interval(tmp_path):
     assert (found["speedups_compared"], found["speedups_overlapping"]) == (3, 1)
     assert found["largest_difference"] == pytest.approx(1 / 3)
     (tmp_path / "busy.json").write_text(json.dumps(found))
-    told = aa.tell(tmp_path)
+    told = str(aa.section(tmp_path))
     assert "| beside a busy neighbour | 3 | 3 | 1 (33.3%) |" in told
     assert "| quiet |" not in told
 

@@ -1,11 +1,9 @@
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from benchmarks.field import PAGE, cell, disks, figures, seconds_table, tables, timed
+from benchmarks.field import cell, disks, field, figures, tables
+from benchmarks.field_seconds import costs_on, field_seconds, table
 from cembench import DiskMesh
 from cembench.mesh.files import write_mesh
 from cembench.registry import load_registry
@@ -36,30 +34,24 @@ def test_tables_have_a_row_a_surface_and_a_column_an_algorithm(tmp_path):
     assert np.array_equal(found.F, mesh.F)
     known = [ALGORITHMS["bff"], ALGORITHMS["scp"]]
     kept = {name: {"triangles": mesh.m, "maps": {a.name: figures(a, mesh) for a in known}}}
-    text = "\n".join(tables(kept, known))
+    text = "\n".join(map(str, tables(kept, known)))
     assert text.count("| one.obj |") == 8
     assert "| surface | triangles | bff |" in text
     assert "| surface | triangles | scp |" in text
 
 
-def test_the_cost_is_told_beside_direct_cem_s_and_a_refusal_is_a_dash(tmp_path):
-    write_mesh(tmp_path / "chinese_lion.obj", DiskMesh.from_arrays(*gallery.flat_rectangle(2, 6)))
+def test_the_cost_is_given_beside_direct_cem_s_and_a_refusal_is_a_dash():
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(2, 6))
     known = [ALGORITHMS[name] for name in ("direct-cem", "harmonic-circle", "cetm")]
-    costs = timed(tmp_path, known, 60.0)
-    assert list(costs) == ["chinese_lion.obj"]
-    assert costs["chinese_lion.obj"]["direct-cem"]["seconds"] > 0
-    costs["chinese_lion.obj"]["harmonic-circle"] = {"seconds": 0.1234, "ratio": 0.5}
-    costs["chinese_lion.obj"]["cetm"] = None
-    lines = seconds_table(costs, known).splitlines()
-    assert lines[0] == "| algorithm | target | chinese_lion.obj, s | / direct-cem |"
+    costs = costs_on(mesh, known, 60.0)
+    assert costs["direct-cem"][0] > 0
+    costs |= {"harmonic-circle": (0.1234, 0.5), "cetm": None}
+    lines = str(table({"lion.obj": costs}, known)).splitlines()
+    assert lines[0] == "| algorithm | target | lion.obj, s | / direct-cem |"
     assert lines[3:] == ["| `harmonic-circle` | disk | 0.123 | 0.50 |", "| `cetm` | disk | - | - |"]
 
 
-@pytest.mark.parametrize("more", [[], ["--seconds"]])
-def test_without_a_surface_the_page_stays_as_it_is(more, tmp_path):
-    before = PAGE.read_bytes()
-    command = [sys.executable, "-m", "benchmarks.field", str(tmp_path), *more]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert ended.returncode == 1
-    assert "stays as it is" in ended.stderr
-    assert PAGE.read_bytes() == before
+@pytest.mark.parametrize("study", [field, field_seconds])
+def test_a_folder_without_a_surface_is_refused(study, tmp_path):
+    with pytest.raises(SystemExit, match="has no"):
+        study(tmp_path)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.kept_report import LEFT_OUT, keep, short_records, shortened
+from benchmarks.kept_report import LEFT_OUT, kept_report, short_records, shortened
 from benchmarks.pages import ROOT
 
 
@@ -30,10 +30,10 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     kept.mkdir()
     (kept / "old.png").write_text("old")
     with pytest.raises(SystemExit, match="holds no report to replace"):
-        keep(report, kept)
+        kept_report(report, kept)
     (kept / "report.md").write_text("old")
     (report / "tables/t.csv").write_text("/home/me/meshes/a.obj")
-    keep(report, kept, [Path("/home/me/meshes")])
+    kept_report(report, kept, hide=[Path("/home/me/meshes")])
     assert (kept / "tables/t.csv").read_text() == "meshes/a.obj"
     files = {file.relative_to(kept).as_posix() for file in kept.rglob("*") if file.is_file()}
     assert files == {"report.md", "records.csv", "figures/a.png", "tables/t.csv"}

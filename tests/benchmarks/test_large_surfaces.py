@@ -1,12 +1,15 @@
 """The table of large surfaces is made of what fresh processes measured."""
 
-from benchmarks.large_surfaces import in_fresh_process, line
+from benchmarks.large_surfaces import LAYOUT, measure, row
+from benchmarks.measuring import in_fresh_process
+from benchmarks.pages import Table
 
 
 def test_a_small_surface_fills_a_line():
-    one = in_fresh_process("600", "direct-cem", "cvxopt", 2)
+    one = in_fresh_process(measure, "600", "cvxopt", "direct-cem", threads=2)
     assert 0 < one["factoring"] < one["seconds"]
-    assert one["entries"] > one["faces"] / 2
-    cells = line("600", "cvxopt", 2, [one]).split("|")
-    assert [cell.strip() for cell in cells[1:5]] == ["spherical cap", str(one["faces"]), "AMD", "2"]
-    assert "METIS" in line("some/lion.ply@2", "cvxopt-metis", 1, [one])
+    assert one["million_entries"] * 1e6 > one["faces"] / 2
+    rows = [row("600", "cvxopt", 2, [one]), row("some/lion.ply@2", "cvxopt-metis", 1, [one])]
+    cap, lion = str(Table(rows, LAYOUT)).splitlines()[2:]
+    assert cap.startswith(f"| spherical cap | {one['faces']} | AMD | 2 |")
+    assert lion.startswith(f"| lion.ply@2 | {one['faces']} | METIS | 1 |")

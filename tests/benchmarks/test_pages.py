@@ -2,24 +2,32 @@
 
 import re
 import shutil
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
 
 from benchmarks import readme_speedups
-from benchmarks.pages import ROOT, filled, marks
+from benchmarks.__main__ import main, parser_of, studies
+from benchmarks.pages import ROOT, Section, Table, filled, marks
+
+
+def speedups(report=None):
+    return str(readme_speedups.readme_speedups(report=report))
 
 
 def test_readme_says_what_the_kept_report_says():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert filled(readme, "readme_speedups", readme_speedups.table()) == readme
+    assert filled(readme, "readme_speedups", speedups()) == readme
 
 
 def test_another_report_gives_another_table(tmp_path):
     shutil.copytree(ROOT / "reports/paper/tables", tmp_path / "tables")
     averages = tmp_path / "tables/averages.csv"
     averages.write_text(averages.read_text().replace("15.944080083282037", "7.25"))
-    assert "| QIEM | 8.5 | 6.8 | 7.2 |" in readme_speedups.table(tmp_path)
+    assert "| QIEM | 8.5 | 6.8 | 7.2 |" in speedups(tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -37,7 +45,7 @@ def test_the_rounds_of_the_records_give_the_averages_of_the_tables(report, polic
 
 
 def test_averages_have_intervals_where_cells_have_six_rounds():
-    text = readme_speedups.table(ROOT / "reports/standard")
+    text = speedups(ROOT / "reports/standard")
     lines = text.splitlines()
     assert "backslash" not in lines[0]
     for line in lines[2:]:
@@ -45,23 +53,22 @@ def test_averages_have_intervals_where_cells_have_six_rounds():
             figure, low, high = map(float, re.findall(r"[\d.]+", cell))
             assert low <= figure <= high
             assert low < high
-    assert "(" not in readme_speedups.table(ROOT / "reports/paper")
+    assert "(" not in speedups(ROOT / "reports/paper")
 
 
 def test_a_report_without_averages_is_refused(tmp_path):
     with pytest.raises(SystemExit, match=r"holds no averages\.csv"):
-        readme_speedups.table(tmp_path)
+        speedups(tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("page", "maker"),
-    [
-        ("README.md", "readme_speedups"),
-        ("docs/surfaces.md", "surfaces_page"),
-        ("docs/paper_models.md", "cem_stopping_rules"),
-        ("docs/algorithms.md", "qiem_steps"),
-    ],
-)
+def pages():
+    """Every page with a study's marks, and the study."""
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]:
+        for name in re.findall(r"<!-- made by benchmarks/(\w+)\.py -->", page.read_text()):
+            yield page.relative_to(ROOT), name
+
+
+@pytest.mark.parametrize(("page", "maker"), list(pages()))
 def test_only_what_is_between_the_marks_is_replaced(page, maker):
     text = (ROOT / page).read_text(encoding="utf-8")
     new = filled(text, maker, "another")
@@ -69,8 +76,65 @@ def test_only_what_is_between_the_marks_is_replaced(page, maker):
     assert new.split(begin)[0] == text.split(begin)[0]
     assert new.split(end)[1] == text.split(end)[1]
     assert new.split(begin)[1].split(end)[0].strip() == "another"
+    assert maker in studies()
 
 
 def test_a_page_without_marks_is_refused():
     with pytest.raises(SystemExit, match="lacks the marks"):
         filled("no marks", "readme_speedups", "")
+
+
+def test_a_row_without_a_value_has_a_dash_and_the_frame_keeps_the_figures():
+    layout = "| a | b |\n|---|---:|\n| {a} | {b[x y]:.1f} |"
+    table = Table([{"a": "one", "b": {"x y": 1.25}}, {"a": "two", "b": {"x y": None}}], layout)
+    assert str(table).splitlines()[2:] == ["| one | 1.2 |", "| two | - |"]
+    assert table.frame["b.x y"].tolist()[0] == 1.25
+
+
+def test_a_signature_becomes_a_command_line():
+    def study(
+        surfaces: Sequence[str] = ("1",),
+        *,
+        rounds: int = 5,
+        folder: Path | None = None,
+        clock: Literal["wall", "cpu"] = "wall",
+        holes: Sequence[int] = (1, 2),
+        fast: bool = False,
+    ):
+        """Study."""
+
+    asked = parser_of(study).parse_args(["a", "b", "--holes", "3", "4", "--folder", "x", "--fast"])
+    assert vars(asked) == {
+        **{"surfaces": ["a", "b"], "rounds": 5, "folder": Path("x"), "clock": "wall"},
+        **{"holes": [3, 4], "fast": True},
+    }
+    assert parser_of(study).parse_args([]).surfaces == ("1",)
+    with pytest.raises(SystemExit):
+        parser_of(study).parse_args(["--clock", "sun"])
+
+
+def test_every_study_is_listed_with_what_it_does_and_has_a_command_line(capsys):
+    main([])
+    listed = capsys.readouterr().out
+    for name, summary in studies().items():
+        assert summary.endswith((".", ":"))
+        assert f"{name} " in listed
+
+
+def test_an_unknown_study_is_refused_with_the_known_ones():
+    with pytest.raises(SystemExit, match=r"no study 'limits'; there are aa, .*limit"):
+        main(["limits"])
+
+
+def test_a_study_is_printed_and_its_tables_are_written_where_asked(tmp_path, capsys):
+    main(["readme-speedups", "--report", "reports/paper", "--save", str(tmp_path / "out")])
+    assert "| QIEM |" in capsys.readouterr().out
+    assert "QIEM" in (tmp_path / "out/table-1.csv").read_text()
+
+
+def test_a_section_writes_its_files(monkeypatch, tmp_path):
+    monkeypatch.setattr("benchmarks.pages.ROOT", tmp_path)
+    (tmp_path / "page.md").write_text("\n".join(["before", *marks("limit"), "after"]))
+    Section(["text"], "page.md", {"a.csv": "1", "b.png": b"2"}).write("limit")
+    assert "-->\n\ntext\n\n<!--" in (tmp_path / "page.md").read_text()
+    assert (tmp_path / "a.csv").read_text() + (tmp_path / "b.png").read_text() == "12"

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 
 from benchmarks import registration
-from benchmarks.pages import filled
-from benchmarks.registration import FITTED, METHODS, PAPER, PLAIN, Row, differences, fitted, table
+from benchmarks.pages import ROOT, Section, filled
+from benchmarks.registration import FITTED, METHODS, PAPER, PLAIN, Row, differences, fitted, parts
 from cembench.workflows.morphing.align import to_centre
 
 
+def table(rows, modes):
+    return str(Section(parts(rows, modes)))
+
+
 def rows_of_page():
-    with registration.PAIRS.open(encoding="utf-8") as file:
+    with (ROOT / registration.PAIRS).open(encoding="utf-8") as file:
         for row in csv.DictReader(file):
             error = float(row["error_percent"]) if row["error_percent"] else None
             place = int(row["pair"]), row["kind"], row["method"], int(row["landmarks"])
@@ -22,7 +26,7 @@ def rows_of_page():
 def test_the_page_says_what_the_pairs_say():
     rows = list(rows_of_page())
     assert len(rows) == 30 * len(METHODS)
-    page = registration.PAGE.read_text(encoding="utf-8")
+    page = (ROOT / registration.PAGE).read_text(encoding="utf-8")
     assert filled(page, "registration", table(rows, 4)) == page
 
 

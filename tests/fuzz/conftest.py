@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from fuzz.journal import Entry
+from tests.campaign.journal import Entry
 
 ROOT = Path(__file__).parents[2]
 
 
 def run_campaign(out, *arguments):
-    command = [sys.executable, "-m", "fuzz", "--out", out, "--slots", "1", "--seed", "1"]
+    command = [sys.executable, "-m", "tests.campaign", "--out", out, "--slots", "1", "--seed", "1"]
     return subprocess.run(
         [*map(str, command), *map(str, arguments)],
         cwd=ROOT,

@@ -4,12 +4,12 @@ import json
 
 import pytest
 
-from fuzz import campaign, kills, project, summary
-from fuzz.campaign import Part, Targets, parts
-from fuzz.hard_meshes import FAMILIES as MESH_FAMILIES
-from fuzz.journal import Entry, Journal, WrongFolder
-from fuzz.limited import Ending, Limits
-from fuzz.seed_files import FAMILIES as FILE_FAMILIES
+from tests.campaign import campaign, kills, project, summary
+from tests.campaign.campaign import Part, Targets, parts
+from tests.campaign.hard_meshes import FAMILIES as MESH_FAMILIES
+from tests.campaign.journal import Entry, Journal, WrongFolder
+from tests.campaign.limited import Ending, Limits
+from tests.campaign.seed_files import FAMILIES as FILE_FAMILIES
 from tests.fuzz.conftest import entries_of, run_campaign
 
 ABOUT = {"seed": 1, "sources": "abc"}

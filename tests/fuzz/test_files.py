@@ -8,11 +8,11 @@ import pytest
 
 from cembench import MeshError, TriangleMesh
 from cembench.mesh.files import read_mesh, write_mesh
-from fuzz.files import judge_file
-from fuzz.mutations import MUTATIONS, mutate
-from fuzz.reading import READERS, Damaged
-from fuzz.seed_files import FAMILIES, seed_file
 from tests import gallery
+from tests.campaign.files import judge_file
+from tests.campaign.mutations import MUTATIONS, mutate
+from tests.campaign.reading import READERS, Damaged
+from tests.campaign.seed_files import FAMILIES, seed_file
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n"
 

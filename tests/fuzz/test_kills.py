@@ -4,9 +4,9 @@ import sys
 
 import pytest
 
-from fuzz import kills
-from fuzz.decoys import harmed, plant, snapshot
-from fuzz.kills import PLANS, Plan, judge_kill, prepare, undisturbed
+from tests.campaign import kills
+from tests.campaign.decoys import harmed, plant, snapshot
+from tests.campaign.kills import PLANS, Plan, judge_kill, prepare, undisturbed
 
 REAL = {plan.name: plan for plan in reversed(PLANS)}
 

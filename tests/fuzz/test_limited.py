@@ -3,7 +3,7 @@ import signal
 
 import pytest
 
-from fuzz.limited import Limits, run_cases
+from tests.campaign.limited import Limits, run_cases
 
 pytestmark = pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 

@@ -9,11 +9,11 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench import DiskMesh, HoledMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
-from fuzz.exact import circles_out_of_place, faults_of_map, overlaps
-from fuzz.hard_meshes import FAMILIES, hard_mesh
-from fuzz.meshes import judge_mesh
-from fuzz.slow_metrics import conformal_energy, mean_angle_error
 from tests import gallery
+from tests.campaign.exact import circles_out_of_place, faults_of_map, overlaps
+from tests.campaign.hard_meshes import FAMILIES, hard_mesh
+from tests.campaign.meshes import judge_mesh
+from tests.campaign.slow_metrics import conformal_energy, mean_angle_error
 
 ALGORITHMS = load_registry().algorithms
 

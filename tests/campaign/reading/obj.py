@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fuzz.reading.content import Content, Damaged, Point, integer, real
+from tests.campaign.reading.content import Content, Damaged, Point, integer, real
 
 
 def read_obj(data: bytes) -> Content:

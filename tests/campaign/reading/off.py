@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fuzz.reading.content import Content, Damaged, integer, real
+from tests.campaign.reading.content import Content, Damaged, integer, real
 
 _KEYWORD = re.compile(r"(ST)?C?N?OFF")
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-SOURCES = ("cembench", "algorithms", "fuzz", "meshes_gen", "papers")
+from cembench.results.samples import append_line, whole_lines
+
+SOURCES = ("cembench", "algorithms", "meshes_gen", "papers", "tests/campaign")
 
 
 @dataclass(frozen=True)
@@ -49,19 +50,19 @@ class Journal:
     """
 
     def __init__(self, folder: Path, about: dict[str, object]) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
         self.path = folder / "journal.jsonl"
         self.about = about
         self.entries: list[Entry] = []
-        lines = self._whole_lines()
-        if not lines:
-            self._append(about)
-        elif json.loads(lines[0]) != about:
+        data = self.path.read_bytes() if self.path.exists() else b""
+        first, *others = whole_lines(data).splitlines() or [b""]
+        if not first:
+            append_line(self.path, folder, json.dumps(about))
+        elif json.loads(first) != about:
             raise WrongFolder(
-                f"{self.path} is of another campaign ({lines[0]}); this one is {json.dumps(about)}."
-                " Name another folder with --out."
+                f"{self.path} is of another campaign ({first.decode()}); this one is "
+                f"{json.dumps(about)}. Name another folder with --out."
             )
-        self.entries += [Entry(**json.loads(line)) for line in lines[1:]]
+        self.entries += [Entry(**json.loads(line)) for line in others]
         self._done = {entry.id for entry in self.entries}
 
     def __contains__(self, id: str) -> bool:
@@ -69,22 +70,9 @@ class Journal:
 
     def add(self, entry: Entry) -> None:
         """Write down what became of a case."""
-        self._append(asdict(entry))
+        append_line(self.path, self.path.parent, json.dumps(asdict(entry)))
         self.entries.append(entry)
         self._done.add(entry.id)
-
-    def _whole_lines(self) -> list[str]:
-        """Return the lines that are whole, and take away one that a kill cut short."""
-        data = self.path.read_bytes() if self.path.exists() else b""
-        whole = data[: data.rfind(b"\n") + 1]
-        if whole != data:
-            os.truncate(self.path, len(whole))
-        return whole.decode().splitlines()
-
-    def _append(self, content: dict[str, object]) -> None:
-        with self.path.open("ab") as file:
-            file.write(json.dumps(content).encode() + b"\n")
-            file.flush()
 
 
 def fingerprint(root: Path) -> str:

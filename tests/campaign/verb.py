@@ -7,8 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from fuzz import project
-from fuzz.verdict import Verdict
+from tests.campaign import project
+from tests.campaign.verdict import Verdict
 
 
 def judge_verb(path: Path, read: Verdict) -> Verdict:

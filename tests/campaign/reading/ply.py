@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from fuzz.reading.content import Content, Damaged, finite, integer, real
+from tests.campaign.reading.content import Content, Damaged, finite, integer, real
 
 _SIZES = {
     **dict.fromkeys(("char", "int8"), "b"),

@@ -5,12 +5,12 @@ breaks its specification they raise :class:`Damaged`; where the specification sa
 lenient, and each leniency is named in the reader's docstring.
 """
 
-from fuzz.reading.content import Content, Damaged
-from fuzz.reading.mat import read_mat
-from fuzz.reading.obj import read_obj
-from fuzz.reading.off import read_off
-from fuzz.reading.ply import read_ply
-from fuzz.reading.stl import read_stl
+from tests.campaign.reading.content import Content, Damaged
+from tests.campaign.reading.mat import read_mat
+from tests.campaign.reading.obj import read_obj
+from tests.campaign.reading.off import read_off
+from tests.campaign.reading.ply import read_ply
+from tests.campaign.reading.stl import read_stl
 
 __all__ = ["READERS", "Content", "Damaged"]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from fuzz.journal import Entry
+from tests.campaign.journal import Entry
 
 #: Title of a table, the part it is of, and what its rows are.
 TABLES: tuple[tuple[str, str, str, Callable[[Entry], str]], ...] = (
@@ -71,7 +71,7 @@ def write_page(path: Path, entries: Sequence[Entry], about: dict[str, object]) -
         "# Robustness",
         "",
         "What `make fuzz` tried, and what became of it. This page is written by the command:",
-        "`python -m fuzz --write-docs`.",
+        "`python -m tests.campaign --write-docs`.",
         "",
         f"{datetime.date.today().isoformat()}, commit {_commit()}, seed {about['seed']}. "
         f"**{len(entries):,} cases, {wrong:,} faults.**",

@@ -12,16 +12,16 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from fuzz import kills, project
-from fuzz.files import file_case, judge_file
-from fuzz.hard_meshes import FAMILIES as MESH_FAMILIES
-from fuzz.hard_meshes import hard_mesh
-from fuzz.journal import Entry, Journal
-from fuzz.kills import PLANS, kill_case
-from fuzz.limited import Ending, Limits, run_cases
-from fuzz.meshes import MeshCase, judge_case
-from fuzz.seed_files import FAMILIES as FILE_FAMILIES
-from fuzz.verb import judge_verb
+from tests.campaign import kills, project
+from tests.campaign.files import file_case, judge_file
+from tests.campaign.hard_meshes import FAMILIES as MESH_FAMILIES
+from tests.campaign.hard_meshes import hard_mesh
+from tests.campaign.journal import Entry, Journal
+from tests.campaign.kills import PLANS, kill_case
+from tests.campaign.limited import Ending, Limits, run_cases
+from tests.campaign.meshes import MeshCase, judge_case
+from tests.campaign.seed_files import FAMILIES as FILE_FAMILIES
+from tests.campaign.verb import judge_verb
 
 #: Of so many files, one is also given to the verb `map`.
 VERB_EVERY = 20
@@ -129,7 +129,7 @@ def _keep(part: Part[C], case: C, entry: Entry, journal: Journal) -> None:
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     part.keep(case, place)
-    command = f"python -m fuzz --seed {journal.about['seed']} --replay {entry.id}"
+    command = f"python -m tests.campaign --seed {journal.about['seed']} --replay {entry.id}"
     (place / "about.txt").write_text(f"{command}\n\n{entry.fault}: {entry.detail}\n")
 
 

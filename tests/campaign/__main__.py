@@ -1,13 +1,9 @@
-"""The command line: ``python -m fuzz``."""
+"""The command line: ``python -m tests.campaign``."""
 
 from __future__ import annotations
 
 import gc
 import os
-
-for _variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-    os.environ[_variable] = "1"  # before numpy loads: a pool of threads does not survive a fork
-
 import tempfile
 import time
 from pathlib import Path
@@ -17,11 +13,11 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from fuzz import campaign, summary
-from fuzz.journal import Entry, Journal, WrongFolder, fingerprint
-from fuzz.limited import run_cases
+from tests.campaign import campaign, summary
+from tests.campaign.journal import Entry, Journal, WrongFolder, fingerprint
+from tests.campaign.limited import run_cases
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 
 def main(

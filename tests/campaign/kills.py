@@ -22,9 +22,9 @@ from pathlib import Path
 
 import psutil
 
-from fuzz import serving
-from fuzz.decoys import harmed, plant, snapshot
-from fuzz.verdict import Verdict
+from tests.campaign import serving
+from tests.campaign.decoys import harmed, plant, snapshot
+from tests.campaign.verdict import Verdict
 
 #: Elapsed seconds that a call may take before it counts as a hang, and a killed one's children.
 PATIENCE, SOON = 300.0, 20.0
@@ -205,7 +205,7 @@ def _environment(prepared: Path, folder: Path, temporary: Path, url: str) -> dic
     paths = [str(prepared / "site"), *filter(None, os.environ.get("PYTHONPATH", "").split(":"))]
     return {
         **os.environ,
-        "PYTHONPATH": os.pathsep.join([*paths, str(Path(__file__).parents[1])]),
+        "PYTHONPATH": os.pathsep.join([*paths, str(Path(__file__).parents[2])]),
         "PYTHONDONTWRITEBYTECODE": "1",
         "TMPDIR": str(temporary),
         "CEMBENCH_CACHE": str(folder / "cache"),

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fuzz import project
-from fuzz.exact import circles_out_of_place, faults_of_map, overlaps
-from fuzz.hard_meshes import hard_mesh
-from fuzz.project import Algorithm, CembenchError, TriangleMesh
-from fuzz.slow_metrics import conformal_energy, mean_angle_error
-from fuzz.verdict import Verdict
+from tests.campaign import project
+from tests.campaign.exact import circles_out_of_place, faults_of_map, overlaps
+from tests.campaign.hard_meshes import hard_mesh
+from tests.campaign.project import Algorithm, CembenchError, TriangleMesh
+from tests.campaign.slow_metrics import conformal_energy, mean_angle_error
+from tests.campaign.verdict import Verdict
 
 #: Of so many meshes, one has its figures computed again.
 EVERY = 4

@@ -6,7 +6,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 
-from fuzz.reading.content import Content, Damaged, finite
+from tests.campaign.reading.content import Content, Damaged, finite
 
 _TYPES = {1: "b", 2: "B", 3: "h", 4: "H", 5: "i", 6: "I", 7: "f", 9: "d", 12: "q", 13: "Q"}
 _MATRIX, _COMPRESSED = 14, 15

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from fuzz.reading.content import Content, Damaged, Point, finite, real
+from tests.campaign.reading.content import Content, Damaged, Point, finite, real
 
 
 def read_stl(data: bytes) -> Content:

@@ -10,11 +10,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fuzz.mutations import mutate
-from fuzz.project import CembenchError
-from fuzz.reading import READERS, Content, Damaged
-from fuzz.seed_files import FAMILIES, seed_file
-from fuzz.verdict import Verdict
+from tests.campaign.mutations import mutate
+from tests.campaign.project import CembenchError
+from tests.campaign.reading import READERS, Content, Damaged
+from tests.campaign.seed_files import FAMILIES, seed_file
+from tests.campaign.verdict import Verdict
 
 #: The share of files that stay legal: these must be read.
 LEGAL = 0.08
