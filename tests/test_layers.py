@@ -73,10 +73,10 @@ BUDGETS = {
     "results": 4_000,
     "running": 7_150,
     "drawing": 1_750,
-    "report": 7_950,
-    "validation": 2_400,
+    "report": 7_900,
+    "validation": 2_250,
     "workflows": 6_100,
-    "commands": 4_100,
+    "commands": 4_000,
 }
 
 
