@@ -78,7 +78,7 @@ BUDGETS = {
     "report": 7_970,
     "validation": 2_400,
     "workflows": 6_100,
-    "commands": 4_100,
+    "commands": 4_000,
 }
 
 

@@ -63,6 +63,11 @@ def _star(record: Record) -> str:
     return "" if record.target == DISK else " *"
 
 
+def named(record: Record) -> str:
+    """Return an algorithm's name with marks for another target and for external code."""
+    return _with_mark(record.cell.algorithm + _star(record), record)
+
+
 def _ending(record: Record) -> str:
     folds = record.outcome.metrics.get("flipped_triangles")
     return f"{folds:,} folds" if folds else record.outcome.status
@@ -76,7 +81,7 @@ _NAMES: Mapping[str, Callable[[Mapping[str, Any], Record], str]] = {
     "starred": lambda row, record: row["label"] + _star(record),
     "marked": lambda row, record: _with_mark(row["label"], record),
     "called": lambda _, record: _with_mark(record.cell.algorithm, record),
-    "named": lambda _, record: _with_mark(record.cell.algorithm + _star(record), record),
+    "named": lambda _, record: named(record),
     "target": lambda _, record: record.target,
     "solves": lambda _, record: record.cell.solves,
     "status": lambda _, record: record.outcome.status,

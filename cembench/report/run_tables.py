@@ -8,7 +8,7 @@ from dataclasses import replace
 from statistics import median, quantiles
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.declared import declared_table
+from cembench.report.declared import declared_table, named
 from cembench.report.document import (
     Column,
     Item,
@@ -29,7 +29,7 @@ from cembench.results.comparison import (
     references,
     seconds_interval,
 )
-from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.external_words import marks_explained, seconds_words
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.many import corrected
@@ -80,14 +80,14 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         return None
     title = f"Speedup of {reference} over the others: t / t_{reference} - 1"
     several = len({record.cell.solves for record, _ in compared}) > 1
-    named = [
-        (record.cell.mesh, _named(record), f" ({record.cell.solves})" if several else "", found)
+    compared_by_name = [
+        (record.cell.mesh, named(record), f" ({record.cell.solves})" if several else "", found)
         for record, found in compared
     ]
     if all(found.verdict == FEW_ROUNDS for _, found in compared):
-        names = list(dict.fromkeys(name for _, name, _, _ in named))
+        names = list(dict.fromkeys(name for _, name, _, _ in compared_by_name))
         lines: dict[str, dict[str, float]] = {}
-        for mesh, name, policy, found in named:
+        for mesh, name, policy, found in compared_by_name:
             lines.setdefault(mesh + policy, {})[name] = found.speedup
         note = (
             f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
@@ -106,16 +106,10 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         ],
         [
             [mesh, name + policy, one.speedup, _interval(one.speedup_interval, " to "), one.verdict]
-            for (mesh, name, policy, _), one in zip(named, together, strict=True)
+            for (mesh, name, policy, _), one in zip(compared_by_name, together, strict=True)
         ],
         notes=tuple(_corrected_words([found for _, found in compared])),
     )
-
-
-def _named(record: Record) -> str:
-    """Return an algorithm's name with marks for another target and for external code."""
-    marks = ("" if record.target == "disk" else "*") + mark_of(record)
-    return f"{record.cell.algorithm} {marks}".rstrip()
 
 
 def _interval(interval: Interval | None, to: str) -> Value:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +15,6 @@ from cembench.results.exhibits import (
     exhibit_folder,
     write_exhibit,
 )
-from cembench.workflows.theory import Check
 from cembench.workflows.theory_facts import LOOKS, theory_facts
 from cembench.workflows.theory_plot import write_theory_plot
 
@@ -53,7 +52,7 @@ def examine_theory(
                 alternative=_summary(facts),
             ),
         ),
-        tables=_tables(found.premises, found.statements, facts),
+        tables=tuple(_tables(facts)),
         facts=facts,
     )
     write_exhibit(run, exhibit)
@@ -78,32 +77,17 @@ def _summary(facts: dict[str, Any]) -> str:
     return words + speed
 
 
-def _tables(
-    given: Sequence[Check], said: Sequence[Check], facts: dict[str, Any]
-) -> tuple[ExhibitTable, ...]:
-
-    def of(title: str, checks: Sequence[Check]) -> ExhibitTable:
-        rows = tuple(
-            (c.name, c.source, "yes" if c.holds else "NO", c.figure, c.meaning) for c in checks
-        )
-        return ExhibitTable(
-            title=title,
-            columns=("what", "where", "holds", "figure", "meaning"),
-            rows=rows,
-            forms={"figure": ".3g"},
-            details=("meaning",),
-        )
-
+def _tables(facts: dict[str, Any]) -> Iterator[ExhibitTable]:
+    checks = {"name": ("what", ""), "source": ("where", ""), "holds": ("holds", "")}
+    checks |= {"figure": ("figure", ".3g"), "meaning": ("meaning", "")}
+    for part in ("premises", "statements"):
+        rows = [{**check, "holds": "yes" if check["holds"] else "NO"} for check in facts[part]]
+        yield ExhibitTable.of(part.capitalize(), checks, rows, details=("meaning",))
     looks = {f"after_{k}": (f"after {k}", ".6f") for k in LOOKS} | {"last": ("last", ".6f")}
-    energies = {"name": ("iteration", ""), **looks, "iterations": ("iterations", "d")}
-    return (
-        of("Premises", given),
-        of("Statements", said),
-        ExhibitTable.of(
-            "Conformal energy E_C", energies, facts["energies"], details=("iterations",)
-        ),
-        _certificate_table(facts["certificate"]),
-    )
+    columns = {"name": ("iteration", ""), **looks, "iterations": ("iterations", "d")}
+    title = "Conformal energy E_C"
+    yield ExhibitTable.of(title, columns, facts["energies"], details=("iterations",))
+    yield _certificate_table(facts["certificate"])
 
 
 def _certificate_table(found: dict[str, Any]) -> ExhibitTable:

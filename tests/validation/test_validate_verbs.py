@@ -54,7 +54,7 @@ def test_a_wrong_one_is_invalid_and_the_stages_behind_are_not_reached(here):
 def test_a_fault_is_printed_with_what_is_allowed_and_what_to_do(here):
     code, out, _ = here("single", "--checks-only", "-o", "there")
     assert code == 1
-    assert "BAD returns a map: invalid on uneven hemi-ellipsoid: uv is complex64" in " ".join(
+    assert "returns a map fault invalid on uneven hemi-ellipsoid: uv is complex64" in " ".join(
         out.split()
     )
     assert "allowed: " in out

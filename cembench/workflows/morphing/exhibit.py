@@ -101,13 +101,6 @@ _REGISTRATION = {
 }
 
 
-#: What is said of the path: the heading and the format of each.
-_PATH = {
-    "largest_acceleration_share": ("largest acceleration of a vertex", ".3f"),
-    "largest_step_share": ("largest step between frames", ".4f"),
-}
-
-
 def morph_tables(figures: dict[str, Any]) -> tuple[ExhibitTable, ExhibitTable]:
     """Return the metrics of the registrations, one row per surface, and those of the path."""
     rows = [{**row, "steps": len(row["lambdas"])} for row in figures["registrations"]]
@@ -121,5 +114,9 @@ def morph_tables(figures: dict[str, Any]) -> tuple[ExhibitTable, ExhibitTable]:
             "landmarks, or a triangle of almost no area, whose dilatation is not finite.",
         ),
     )
+    path = {
+        "largest_acceleration_share": ("largest acceleration of a vertex", ".3f"),
+        "largest_step_share": ("largest step between frames", ".4f"),
+    }
     note = "In sizes of the first surface; the time from the first to the last is 1."
-    return registrations, ExhibitTable.of("Smoothness of the path", _PATH, [figures], notes=(note,))
+    return registrations, ExhibitTable.of("Smoothness of the path", path, [figures], notes=(note,))
