@@ -8,6 +8,7 @@ whose content does not match its declarations never becomes a soup: its reader r
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -244,6 +245,18 @@ def in_single_precision(points: Points, format_name: str) -> NDArray[np.float32]
             f"holds numbers up to {largest:.3g}; scale the surface, or write OBJ."
         )
     return points.astype("<f4")
+
+
+def numbers_of(text: bytes, dtype: type = np.float64) -> NDArray[Any] | None:
+    """Return the numbers of a text in order; None if it holds anything else."""
+    if not text.strip():
+        return np.empty(0, dtype)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # older versions of numpy warn instead of raising
+            return np.fromstring(text.strip(), dtype, sep=" ")
+    except (ValueError, DeprecationWarning):
+        return None
 
 
 def words_of(line: str) -> list[str]:

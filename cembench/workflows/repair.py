@@ -7,20 +7,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
 from cembench.mesh.defects import located
 from cembench.mesh.files import read_soup
 from cembench.mesh.repair import Components
 from cembench.mesh.repair import repair as repair_arrays
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.running.surfaces import SurfaceInput, soup_of
+from cembench.running.surfaces import SurfaceInput, prepared, soup_of
 
-#: Kinds of repaired surfaces, the most special first.
-_KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh, TriangleMesh)
+#: Kinds of repaired surfaces; every one is of the first.
+_KINDS: tuple[type[TriangleMesh], ...] = (TriangleMesh, DiskMesh, HoledMesh)
 
 
 @dataclass(frozen=True)
@@ -109,17 +107,8 @@ def repair(
         found = repair_arrays(
             soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
         )
-        meshes = [_mesh(V, F, soup.name) for V, F in found.surfaces]
+        soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in found.surfaces]
+        meshes = [prepared(one, _KINDS).mesh for one in soups]
     except MeshError as error:
         raise located(error, path) from None
     return Repair(tuple(meshes), found.counts, soup.notices)
-
-
-def _mesh(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> TriangleMesh:
-    """Return the mesh of the most special kind that fits these arrays."""
-    for kind in _KINDS[:-1]:
-        try:
-            return kind.from_arrays(V, F, name=name)
-        except MeshError:
-            continue
-    return _KINDS[-1].from_arrays(V, F, name=name)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import io
 import re
-import warnings
 from array import array
 from collections.abc import Iterator
 from pathlib import Path
@@ -28,6 +27,7 @@ from cembench.mesh.soup import (
     Soup,
     complex_of,
     damaged,
+    numbers_of,
     refuse_underscores,
     shown,
     words_of,
@@ -85,14 +85,8 @@ def _read_plain(content: bytes) -> Soup | None:
     if b"/" in faces:
         faces = re.sub(rb"/[0-9/]*+", b"", faces)
     faces = faces.replace(b"f", b" ")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # older versions of numpy warn instead of raising
-            V = np.fromstring(points.replace(b"v", b" "), sep=" ")
-            corners = np.fromstring(faces, dtype=np.int64, sep=" ")
-    except (ValueError, DeprecationWarning):
-        return None
-    if len(V) != 3 * points.count(b"\n"):
+    V, corners = numbers_of(points.replace(b"v", b" ")), numbers_of(faces, np.int64)
+    if V is None or corners is None or len(V) != 3 * points.count(b"\n"):
         return None
     letters = np.frombuffer(faces, np.uint8)
     starts = np.flatnonzero((letters[:-1] <= ord(" ")) & (letters[1:] > ord(" ")))

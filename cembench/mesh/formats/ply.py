@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 import struct
-import warnings
 from array import array
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -29,6 +28,7 @@ from cembench.mesh.soup import (
     complex_of,
     damaged,
     in_single_precision,
+    numbers_of,
     shown,
 )
 
@@ -258,15 +258,9 @@ def _repeated(names: list[str]) -> list[str]:
 
 def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
     """Return the numbers of a text in order."""
-    text = body.tobytes().strip()
-    if not text:
-        return np.empty(0)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # older versions of numpy warn instead of raising
-            return np.fromstring(text, sep=" ")
-    except (ValueError, DeprecationWarning):
-        pass
+    numbers = numbers_of(body.tobytes())
+    if numbers is not None:
+        return numbers
     for number, line in enumerate(body.tobytes().decode("latin-1").splitlines(), header_lines + 1):
         for word in line.split():
             if not _is_number(word):
