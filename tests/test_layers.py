@@ -71,7 +71,7 @@ BUDGETS = {
     "conformal": 5_000,
     "registry": 870,
     "results": 4_000,
-    "running": 7_000,
+    "running": 7_050,
     "drawing": 1_750,
     "report": 7_950,
     "validation": 2_400,
