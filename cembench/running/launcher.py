@@ -162,8 +162,10 @@ class Launcher:
     def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
         """Run a judge forked from its server; return how it ended, None if it cannot be forked."""
         server = judges_server(self.number)
-        ending = server and self._run_by(server, job, limits, log, alone=True)
-        if server is not None and ending is None:
+        if server is None:
+            return None
+        ending = self._run_by(server, job, limits, log, alone=True)
+        if ending is None:
             judges_server.cache_clear()
             server.close()
         return ending

@@ -249,12 +249,18 @@ class _ClusterRun:
             connected = sorted(self.client.nthreads())
             new = [worker for worker in connected if worker not in self.environments]
             described = (
-                self.client.run(describe_worker, workers=new, on_error="ignore") if new else {}
+                self.client.run(describe_worker, workers=new, on_error="return") if new else {}
             )
         except (OSError, TimeoutError) as error:
             raise self._scheduler_gone() from error
         for worker, environment in described.items():
-            self._add_worker(worker, environment)
+            if not isinstance(environment, Exception):
+                self._add_worker(worker, environment)
+            elif not isinstance(environment, OSError):  # which means that it is gone again
+                raise ClusterError(
+                    f"the worker {worker} cannot measure: {environment}. Install the same version "
+                    "of cembench on all machines."
+                )
         connected = [worker for worker in connected if worker in self.environments]
         if connected != self.workers:
             for worker in set(self.workers) - set(connected):

@@ -126,6 +126,15 @@ def test_machines_with_other_software_can_be_refused(client, tmp_path, monkeypat
     assert Store(tmp_path).finished() == []
 
 
+def test_a_worker_without_cembench_ends_the_run_and_says_so(client, tmp_path, monkeypatch):
+    def fails():
+        raise ModuleNotFoundError("No module named 'cembench'")
+
+    monkeypatch.setattr(module, "describe_worker", fails)
+    with pytest.raises(ClusterError, match=r"cannot measure: No module named .*\. Install"):
+        run_on_cluster(tasks_of("good"), Store(tmp_path), client)
+
+
 def test_other_software_is_named(client, tmp_path, monkeypatch):
     true = recorder.describe_environment()
     monkeypatch.setattr(recorder, "describe_environment", lambda: true | {"python": "2.7"})
