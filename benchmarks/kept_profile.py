@@ -13,8 +13,13 @@ from benchmarks.pages import ROOT, Section
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared_plots import declared_plot
 from cembench.report.plots import Plot, write_plot
-from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.records import Record
 from cembench.results.store import Store
+
+#: What a profile needs of a cell, its mesh and its record.
+CELL = ("algorithm", "mesh", "mesh_hash", "solves", "backend", "threads")
+MESH = (*("vertices", "faces", "boundary_vertices", "non_delaunay_share", "paper_row", "origin"),)
+RECORD = ("title", "target", "environment", "started_at")
 
 
 def evidence_of(folder: Path) -> Evidence:
@@ -25,38 +30,16 @@ def evidence_of(folder: Path) -> Evidence:
 
 
 def _record(row: dict[str, Any]) -> Record:
-    seconds = float(row["seconds"]) if row["seconds"] else None
-    error = row["angle_error_mean_deg"]
-    return Record(
-        cell=Cell(
-            algorithm=row["algorithm"],
-            parameters=json.loads(row["parameters"] or "{}"),
-            code_hash=row["key"],
-            mesh=row["mesh"],
-            mesh_hash=row["mesh_hash"],
-            solves=row["solves"],
-            backend=row["backend"],
-            threads=int(row["threads"]),
-        ),
-        title=row["title"],
-        target=row["target"],
-        mesh=MeshFacts(
-            vertices=int(row["vertices"]),
-            faces=int(row["faces"]),
-            boundary_vertices=int(row["boundary_vertices"]),
-            non_delaunay_share=float(row["non_delaunay_share"]),
-            paper_row=row["paper_row"],
-            origin=row["origin"],
-        ),
-        outcome=Outcome(
-            status=row["status"],
-            cause=row["cause"] or None,
-            rounds=(Round(sitting="kept", calls=(seconds,), phases={}),) if seconds else (),
-            metrics={"angle_error_mean_deg": float(error)} if error else {},
-        ),
-        environment=row["environment"],
-        started_at=row["started_at"],
-    )
+    cell, mesh, own = ({name: row[name] for name in names} for names in (CELL, MESH, RECORD))
+    cell |= {"parameters": json.loads(row["parameters"] or "{}"), "code_hash": row["key"]}
+    seconds, error = row["seconds"], row["angle_error_mean_deg"]
+    outcome = {
+        "status": row["status"],
+        "cause": row["cause"] or None,
+        "rounds": [{"sitting": "kept", "calls": [seconds], "phases": {}}] if seconds else [],
+        "metrics": {"angle_error_mean_deg": error} if error else {},
+    }
+    return Record.model_validate({**own, "cell": cell, "mesh": mesh, "outcome": outcome})
 
 
 def kept_profile(
