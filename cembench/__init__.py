@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
     from cembench.workflows.cut import cut
     from cembench.workflows.holes import holes
+    from cembench.workflows.map_files import map_files
     from cembench.workflows.morph_surfaces import morph
     from cembench.workflows.parameterize import Result, parameterize
     from cembench.workflows.repair import Repair, repair
@@ -64,6 +65,7 @@ _PLACES = {
     "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
     "cembench.workflows.cut": ("cut",),
     "cembench.workflows.holes": ("holes",),
+    "cembench.workflows.map_files": ("map_files",),
     "cembench.workflows.morph_surfaces": ("morph",),
     "cembench.workflows.parameterize": ("Result", "parameterize"),
     "cembench.workflows.repair": ("Repair", "repair"),
@@ -100,6 +102,7 @@ __all__ = [
     "holes",
     "list_algorithms",
     "list_surfaces",
+    "map_files",
     "morph",
     "parameterize",
     "read_mesh",

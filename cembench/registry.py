@@ -21,7 +21,6 @@ import typing
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field, fields, replace
-from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FrameType, ModuleType
@@ -32,6 +31,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from cembench.core.errors import ParameterError, RegistryError, describe_error
+from cembench.core.names import unknown
 from cembench.core.parameterization import MapStep
 from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
 from cembench.mesh.datasets import Dataset
@@ -634,11 +634,7 @@ COMMAND = "command:"
 
 def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
     if name not in known:
-        near = get_close_matches(name, known) or [one for one in known if one.startswith(name)]
-        raise RegistryError(
-            f"unknown {kind} {name!r}; known: {', '.join(sorted(known)) or 'none'}."
-            + (f" Did you mean {' or '.join(near)}?" if name and near else "")
-        )
+        raise RegistryError(unknown(kind, name, known))
     return known[name]
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import errno
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
@@ -20,6 +21,7 @@ from rich.status import Status
 from rich.text import Text
 
 from cembench.core.errors import ParameterError
+from cembench.core.reporter import Reporter
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
@@ -102,16 +104,34 @@ def print_notices(meshes: Iterable[TriangleMesh]) -> None:
             note(f"{mesh.name}: {notice}")
 
 
+class Shown(Reporter):
+    """Shows what a function of the API is doing on standard error."""
+
+    @contextmanager
+    def busy(self, text: str) -> Iterator[Callable[[str], object]]:
+        """Show a spinner."""
+        with err.status(text, spinner="line") as status:
+            yield status.update
+
+    def note(self, text: str) -> None:
+        """Print a remark."""
+        note(text)
+
+    def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
+        """Show a bar for each download on a terminal."""
+        from cembench.commands.fetch import bars
+
+        return bars(list(datasets))
+
+
+SHOWN = Shown()
+
+
 def registry_with(plugins: Sequence[str]) -> Registry:
     """Load the registry with the user's plug-ins, behind a spinner that names them."""
-    from cembench.registry import load_registry
+    from cembench.workflows.settings import registry_with as loaded
 
-    if not plugins:
-        return load_registry()
-    from cembench.running.plugins import load_with_plugins
-
-    with err.status(f"importing {', '.join(plugins)}", spinner="line"):
-        return load_with_plugins(plugins)
+    return loaded(plugins, SHOWN)
 
 
 def split(names: list[str]) -> list[str]:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from difflib import get_close_matches
 
 #: Common file systems allow 255 bytes per file name; two names and a key share them.
 LONGEST = 100
@@ -42,6 +43,18 @@ def file_name(name: str, longest: int = LONGEST) -> str:
         return name
     readable = re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("._")
     return f"{readable[: longest - DIGITS - 1]}~{digest(name)[:DIGITS]}"
+
+
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return a message for an unknown name, with the known ones and those that are spelled alike.
+
+    >>> unknown("metric", "image_aera", ["dirichlet_energy", "image_area"])
+    "unknown metric 'image_aera'; known: dirichlet_energy, image_area. Did you mean image_area?"
+    """
+    known = sorted(known)
+    near = get_close_matches(name, known) or [one for one in known if one.startswith(name)]
+    asked = f" Did you mean {' or '.join(near)}?" if name and near else ""
+    return f"unknown {kind} {name!r}; known: {', '.join(known) or 'none'}.{asked}"
 
 
 def slug(name: str, longest: int = LONGEST) -> str:

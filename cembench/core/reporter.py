@@ -1,0 +1,25 @@
+"""What a function of the API reports while it works."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+
+class Reporter:
+    """Receives what a function is doing; this one ignores it, the command line shows it."""
+
+    def busy(self, text: str) -> AbstractContextManager[Callable[[str], object]]:
+        """Show a text during a block, which can replace it by calling what it gets."""
+        return nullcontext(lambda text: None)
+
+    def note(self, text: str) -> None:
+        """Show a remark."""
+
+    def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
+        """Show downloads during a block, which gets a function of a dataset to its progress."""
+        return nullcontext(lambda dataset: None)
+
+
+SILENT = Reporter()
