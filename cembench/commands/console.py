@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import json
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
@@ -107,6 +108,11 @@ def print_notices(meshes: Iterable[TriangleMesh]) -> None:
 class Shown(Reporter):
     """Shows what a function of the API is doing on standard error."""
 
+    @property
+    def command(self) -> str:
+        """The command that was typed."""
+        return shlex.join(["cembench", *sys.argv[1:]])
+
     @contextmanager
     def busy(self, text: str) -> Iterator[Callable[[str], object]]:
         """Show a spinner."""
@@ -122,6 +128,15 @@ class Shown(Reporter):
         from cembench.commands.fetch import bars
 
         return bars(list(datasets))
+
+    @contextmanager
+    def watching(self, cells: int, *, on_cluster: bool = False) -> Iterator[Any]:
+        """Show a live table on a terminal, and lines elsewhere; Ctrl-C says how to resume."""
+        from cembench.commands.ending import resumable
+        from cembench.commands.progress import progress_on
+
+        with resumable(), progress_on(err, cells, on_cluster=on_cluster) as progress:
+            yield progress
 
 
 SHOWN = Shown()

@@ -68,15 +68,15 @@ class Argument:
 
     def check(self, given: Any) -> None:
         """Raise :class:`ParameterError` if a value is not allowed; None always is."""
+        if given is None or (self.range is None and not self.choices):
+            return
         if self.range is not None:
             integer = float not in self.kinds
             allowed = f"{'an integer' if integer else 'a number'} {self.range}"
         else:
             allowed = f"one of {', '.join(map(repr, self.choices))}"
         for value in given if self.many and not isinstance(given, str) else (given,):
-            if value is None or (self.range is None and not self.choices):
-                continue
-            if not (value in self.choices or self._is_in_range(value)):
+            if value is not None and not (value in self.choices or self._is_in_range(value)):
                 raise ParameterError.about(
                     "{given} is not allowed; write {allowed}.",
                     given=Setting(self.name, repr(value)),

@@ -10,6 +10,11 @@ from typing import Any
 class Reporter:
     """Receives what a function is doing; this one ignores it, the command line shows it."""
 
+    @property
+    def command(self) -> str:
+        """The command that makes this call; empty in Python."""
+        return ""
+
     def busy(self, text: str) -> AbstractContextManager[Callable[[str], object]]:
         """Show a text during a block, which can replace it by calling what it gets."""
         return nullcontext(lambda text: None)
@@ -20,6 +25,10 @@ class Reporter:
     def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
         """Show downloads during a block, which gets a function of a dataset to its progress."""
         return nullcontext(lambda dataset: None)
+
+    def watching(self, cells: int, *, on_cluster: bool = False) -> AbstractContextManager[Any]:
+        """Show the progress of so many cells during a block, which gets a watcher or None."""
+        return nullcontext()
 
 
 SILENT = Reporter()
