@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from cembench.workflows.morph_surfaces import morph
     from cembench.workflows.parameterize import Result, parameterize
     from cembench.workflows.repair import Repair, repair
-    from cembench.workflows.theory_facts import theory
+    from cembench.workflows.theory_verb import theory
     from cembench.workflows.validate import validate
 
 #: Where each public name lies.
@@ -69,7 +69,7 @@ _PLACES = {
     "cembench.workflows.morph_surfaces": ("morph",),
     "cembench.workflows.parameterize": ("Result", "parameterize"),
     "cembench.workflows.repair": ("Repair", "repair"),
-    "cembench.workflows.theory_facts": ("theory",),
+    "cembench.workflows.theory_verb": ("theory",),
     "cembench.workflows.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}

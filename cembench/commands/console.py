@@ -12,7 +12,7 @@ import json
 import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
@@ -119,6 +119,10 @@ class Shown(Reporter):
         with err.status(text, spinner="line") as status:
             yield status.update
 
+    def step(self, text: str) -> None:
+        """Print a line."""
+        err.print(f"{text} ...", style="dim")
+
     def note(self, text: str) -> None:
         """Print a remark."""
         note(text)
@@ -130,12 +134,15 @@ class Shown(Reporter):
         return bars(list(datasets))
 
     @contextmanager
-    def watching(self, cells: int, *, on_cluster: bool = False) -> Iterator[Any]:
+    def watching(
+        self, cells: int, *, on_cluster: bool = False, resumes: bool = True
+    ) -> Iterator[Any]:
         """Show a live table on a terminal, and lines elsewhere; Ctrl-C says how to resume."""
         from cembench.commands.ending import resumable
         from cembench.commands.progress import progress_on
 
-        with resumable(), progress_on(err, cells, on_cluster=on_cluster) as progress:
+        stopping = resumable() if resumes else nullcontext()
+        with stopping, progress_on(err, cells, on_cluster=on_cluster) as progress:
             yield progress
 
 

@@ -19,6 +19,9 @@ class Reporter:
         """Show a text during a block, which can replace it by calling what it gets."""
         return nullcontext(lambda text: None)
 
+    def step(self, text: str) -> None:
+        """Show what begins."""
+
     def note(self, text: str) -> None:
         """Show a remark."""
 
@@ -26,8 +29,13 @@ class Reporter:
         """Show downloads during a block, which gets a function of a dataset to its progress."""
         return nullcontext(lambda dataset: None)
 
-    def watching(self, cells: int, *, on_cluster: bool = False) -> AbstractContextManager[Any]:
-        """Show the progress of so many cells during a block, which gets a watcher or None."""
+    def watching(
+        self, cells: int, *, on_cluster: bool = False, resumes: bool = True
+    ) -> AbstractContextManager[Any]:
+        """Show the progress of so many cells during a block, which gets a watcher or None.
+
+        `resumes` says whether the same call resumes the work if it is stopped.
+        """
         return nullcontext()
 
 

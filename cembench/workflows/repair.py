@@ -6,22 +6,17 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cembench.core.arguments import Range, checked
 from cembench.core.errors import MeshError
-from cembench.core.notices import Notice
-from cembench.mesh.defects import as_arrays, located
-from cembench.mesh.reading import read_soup
-from cembench.mesh.repair import Components
-from cembench.mesh.repair import repair as repair_arrays
-from cembench.mesh.soup import Soup
-from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.workflows.surface_input import SurfaceInput, pair_of_arrays
+from cembench.workflows.settings import MOST_FACES
 
-#: Kinds of repaired surfaces, the most special first.
-_KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh, TriangleMesh)
+if TYPE_CHECKING:
+    from cembench.core.notices import Notice
+    from cembench.mesh.soup import Soup
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.workflows.surface_input import SurfaceInput
 
 
 @dataclass(frozen=True)
@@ -57,26 +52,31 @@ class Repair:
         return self.meshes[0]
 
 
+@checked
 def repair(
     surface: SurfaceInput,
     *,
-    weld: float = 0.0,
-    fill_holes: int = 0,
-    components: Components = "largest",
+    weld: Annotated[float, Range(0.0, 1e60)] = 0.0,
+    fill_holes: Annotated[int, Range(0, MOST_FACES)] = 0,
+    components: Literal["largest", "all"] = "largest",
 ) -> Repair:
     """Repair a surface into an oriented manifold, and count every step.
+
+    Steps, in order: faces with missing vertices dropped, polygons cut into triangles, coincident
+    vertices welded, degenerate and duplicate triangles fixed or dropped, non-manifold edges and
+    vertices split, triangles oriented consistently, components chosen, ears dropped, holes filled,
+    isolated vertices removed. docs/repair.md describes each step.
 
     Parameters
     ----------
     surface : path, pair of arrays (V, F), or mesh
         V is (n, 3) and may hold NaN, F is (m, 3) and counts from 0.
     weld : float
-        Vertices up to this distance apart, in the surface's units, are merged; 0 merges only
-        those that coincide exactly.
+        Weld vertices up to this distance apart, in the surface's units; 0: equal ones only.
     fill_holes : int
-        Boundary loops of at most this many edges are filled, except the longest of a component.
-    components : "largest" or "all"
-        The connected components to keep.
+        Fill holes of at most N edges; the longest boundary loop of a component stays open.
+    components : {"largest", "all"}
+        Keep the component with the most triangles, or all of them.
 
     Returns
     -------
@@ -103,19 +103,31 @@ def repair(
     'DiskMesh'
 
     """
+    from cembench.mesh.defects import located
+    from cembench.mesh.repair import repair as repair_arrays
+    from cembench.workflows.surface_input import mesh_of_arrays
+
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
     soup = _soup(surface)
     try:
         found = repair_arrays(
             soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
         )
-        meshes = [_mesh(V, F, soup.name) for V, F in found.surfaces]
+        meshes = [mesh_of_arrays(V, F, soup.name) for V, F in found.surfaces]
     except MeshError as error:
         raise located(error, path) from None
     return Repair(tuple(meshes), found.counts, soup.notices)
 
 
 def _soup(surface: SurfaceInput) -> Soup:
+    import numpy as np
+
+    from cembench.mesh.defects import as_arrays
+    from cembench.mesh.reading import read_soup
+    from cembench.mesh.soup import Soup
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.workflows.surface_input import pair_of_arrays
+
     if isinstance(surface, str | os.PathLike):
         return read_soup(surface)
     if isinstance(surface, TriangleMesh):
@@ -123,13 +135,3 @@ def _soup(surface: SurfaceInput) -> Soup:
     else:
         (V, F), name = as_arrays(*pair_of_arrays(surface)), "mesh"
     return Soup(V, F.ravel(), np.full(len(F), 3), name)
-
-
-def _mesh(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> TriangleMesh:
-    """Return the mesh of the most special kind that fits these arrays."""
-    for kind in _KINDS[:-1]:
-        try:
-            return kind.from_arrays(V, F, name=name)
-        except MeshError:
-            continue
-    return _KINDS[-1].from_arrays(V, F, name=name)

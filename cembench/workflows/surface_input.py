@@ -7,7 +7,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from numpy.typing import ArrayLike
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError
 from cembench.mesh.files import read_mesh
@@ -85,3 +86,9 @@ def _first(
         except MeshError:
             continue
     return make(kinds[0])
+
+
+def mesh_of_arrays(V: NDArray[np.float64], F: NDArray[np.int64], name: str) -> TriangleMesh:
+    """Return the mesh of the most special kind that fits these arrays, or a plain one."""
+    kinds: tuple[type[TriangleMesh], ...] = (TriangleMesh, *KINDS)
+    return _first(kinds, lambda kind: kind.from_arrays(V, F, name=name))
