@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     budget="--budget TIME",
     solves="--solves NAME",
     cluster="--cluster PLACE",
-    surfaces="--surfaces NAME",
 )
 def run(
     call: Call,
@@ -36,6 +35,9 @@ def run(
     mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
     dataset: Annotated[
         list[str], typer.Option("--dataset", help="Public surfaces (see `fetch`), comma-separated.")
+    ] = [],  # noqa: B006
+    surfaces: Annotated[
+        list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
     ] = [],  # noqa: B006
     command: Command = None,
     program: Settings = [],  # noqa: B006
@@ -48,7 +50,7 @@ def run(
     given = call.keywords
     declared, named = declared_command(command, program)
     measured = call(
-        surfaces=[*mesh, *split(dataset), *given["surfaces"]],
+        surfaces=[*mesh, *split(dataset), *split(surfaces)],
         algorithms=[*(given["algorithms"] or ()), *named] or None,
         plugins=[*given["plugins"], *declared],
         out=output,

@@ -42,7 +42,11 @@ Call = partial[Any]
 
 
 def from_api(
-    function: Callable[..., Any], *, without: Sequence[str] = (), **options: str
+    function: Callable[..., Any],
+    *,
+    without: Sequence[str] = (),
+    only: Sequence[str] | None = None,
+    **options: str,
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that makes a command of a function of the API.
 
@@ -52,6 +56,9 @@ def from_api(
         The function of the API.
     without : sequence of str
         Its arguments that are no options.
+    only : sequence of str, optional
+        The arguments that are options of a command that does more than the function, and so has a
+        text of its own; default: all others.
     **options
         For an argument, its options where they do not follow from its name, and what its value is
         called in the help: ``output="-o --output FILE"``.
@@ -69,7 +76,7 @@ def from_api(
         arguments = {
             name: argument
             for name, argument in arguments_of(function).items()
-            if name not in {*without, *own}
+            if name not in {*without, *own} and (only is None or name in only)
         }
         spelled = {name: words for name, words in (USUAL | options).items() if name in arguments}
         names = {k: words.split()[0] for k, words in spelled.items() if words[0] == "-"}
@@ -95,7 +102,7 @@ def from_api(
         arguments_first = sorted([*parameters, *more], key=_is_option)
         command.__signature__ = inspect.Signature(arguments_first)  # type: ignore[attr-defined]
         command.__name__, command.__module__ = body.__name__, body.__module__
-        command.__doc__ = words(summary_of(function))
+        command.__doc__ = words(summary_of(function)) if only is None else body.__doc__
         command.body, command.function = body, function  # type: ignore[attr-defined]
         return command
 
@@ -133,7 +140,7 @@ def _option_of(
     if kind in (int, float) and argument.range is not None:
         more |= {"min": argument.range.least, "max": argument.range.most}
     if kind is float:
-        more["callback"] = _finite
+        more["callback"] = finite
     is_list = not _is_single(argument)
     default = argument.default
     if is_list and default is not inspect.Parameter.empty:
@@ -170,7 +177,8 @@ def _value(argument: Argument, given: Any) -> Any:
     return items or argument.default
 
 
-def _finite(value: float | None) -> float | None:
+def finite(value: float | None) -> float | None:
+    """Raise on NaN, which passes any comparison with a bound."""
     if value is not None and math.isnan(value):
         raise typer.BadParameter("nan is not allowed; write a number within the range.")
     return value
