@@ -95,7 +95,8 @@ def warn(message: str) -> None:
 
 def note(message: str, style: str = "yellow") -> None:
     """Print a remark on standard error."""
-    err.print(f"note: {message}", style=style, soft_wrap=True)
+    if not out.quiet:
+        err.print(f"note: {message}", style=style, soft_wrap=True)
 
 
 def print_notices(meshes: Iterable[TriangleMesh]) -> None:
@@ -103,6 +104,16 @@ def print_notices(meshes: Iterable[TriangleMesh]) -> None:
     for mesh in meshes:
         for notice in mesh.notices:
             note(f"{mesh.name}: {notice}")
+
+
+@contextmanager
+def hushed(quiet: bool) -> Iterator[None]:
+    """Print nothing but errors and JSON in this block, if `quiet`."""
+    out.quiet = quiet
+    try:
+        yield
+    finally:
+        out.quiet = False
 
 
 class Shown(Reporter):
@@ -116,12 +127,16 @@ class Shown(Reporter):
     @contextmanager
     def busy(self, text: str) -> Iterator[Callable[[str], object]]:
         """Show a spinner."""
+        if out.quiet:
+            yield lambda text: None
+            return
         with err.status(text, spinner="line") as status:
             yield status.update
 
     def step(self, text: str) -> None:
         """Print a line."""
-        err.print(f"{text} ...", style="dim")
+        if not out.quiet:
+            err.print(f"{text} ...", style="dim")
 
     def note(self, text: str) -> None:
         """Print a remark."""
@@ -142,6 +157,10 @@ class Shown(Reporter):
         from cembench.commands.progress import progress_on
 
         stopping = resumable() if resumes else nullcontext()
+        if out.quiet:
+            with stopping:
+                yield None
+            return
         with stopping, progress_on(err, cells, on_cluster=on_cluster) as progress:
             yield progress
 

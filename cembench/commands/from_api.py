@@ -19,11 +19,12 @@ import typer
 from rich.markup import escape
 from typer.models import ArgumentInfo
 
-from cembench.commands.console import assignments, split
+from cembench.commands.console import assignments, hushed, split
 from cembench.core.arguments import Argument, arguments_of, summary_of
 from cembench.core.errors import CembenchError
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
+_QUIET = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, and --json.")]
 #: The options of arguments that several functions have, and what their values are called.
 USUAL = {
     "algorithm": "-a --algorithm",
@@ -93,13 +94,15 @@ def from_api(
                 taken = {
                     name: _value(argument, given.pop(name)) for name, argument in arguments.items()
                 }
-                body(partial(function, **taken), **given)
+                with hushed(given.pop("quiet")):
+                    body(partial(function, **taken), **given)
             except CembenchError as error:
                 error.reword(NAMES | names)
                 raise
 
         more = [p.replace(kind=_KEYWORD) for p in [*own.values()][1:]]
-        arguments_first = sorted([*parameters, *more], key=_is_option)
+        quiet = inspect.Parameter("quiet", _KEYWORD, default=False, annotation=_QUIET)
+        arguments_first = sorted([*parameters, *more, quiet], key=_is_option)
         command.__signature__ = inspect.Signature(arguments_first)  # type: ignore[attr-defined]
         command.__name__, command.__module__ = body.__name__, body.__module__
         command.__doc__ = words(summary_of(function)) if only is None else body.__doc__

@@ -121,7 +121,7 @@ def _few_figures(record: Record) -> list[tuple[str, str]]:
         rows.append(("quality", figures))
     if outcome.median_seconds is not None:
         rows.append(("seconds", f"{outcome.median_seconds:.3f}"))
-    if outcome.folded_before_repair is not None:
+    if outcome.folded_before_repair:
         rows.append(("folded before repair", str(outcome.folded_before_repair)))
     return rows + [("note", str(note)) for note in outcome.notes]
 

@@ -96,6 +96,7 @@ def morph(
                 write_films(found, films, frames, chosen_views, size, tell)
         if run is not None:
             words = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
+            words += ["-a", given["algorithm"]]
             words += [] if given["faces"] is None else ["--faces", str(given["faces"])]
             command = f"cembench morph {' '.join(words)} --run {run}"
             rows = rows_of_paper(load_registry(given["plugins"]), surfaces)

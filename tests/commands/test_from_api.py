@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import sys
 
 import pytest
 import typer
@@ -102,7 +103,8 @@ def test_the_call_and_the_command_give_the_same(verb, cli, cap):
 
 def test_the_map_of_a_file_is_that_of_parameterize(cli, cap):
     (mapped,) = cembench.map_files([cap])
-    assert dict(mapped.record.outcome.metrics) == dict(cembench.parameterize(cap).metrics)
+    expected = dict(cembench.parameterize(cap).metrics)
+    assert dict(mapped.record.outcome.metrics) == pytest.approx(expected, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -185,3 +187,35 @@ def test_vertices_and_faces_may_be_two_arguments():
         cembench.parameterize(mesh, "cem", algorithm="lscm")
     with pytest.raises(KeyError, match="Did you mean conformal_energy"):
         result.metrics["conformal_enrgy"]
+
+
+def test_quiet_prints_errors_only(cli, cap):
+    assert cli("map", cap, "-q") == (0, "", "")
+    code, out, err = cli("map", cap, "-q", "-a", "cme")
+    assert (code, out) == (2, "")
+    assert "Did you mean" in err
+
+
+def test_map_prints_few_lines_and_all_of_them_on_request(cli, cap):
+    few, all_of_them = (cli("map", cap, "-o", f"{name}.obj", *more)[1] for name, more in MORE)
+    assert len(few.splitlines()) == 5
+    assert len(all_of_them.splitlines()) > 10
+
+
+MORE = (("a", ()), ("b", ("-v",)))
+
+
+def test_ctrl_c_while_the_command_line_is_loaded_ends_with_a_line(monkeypatch, capsys):
+    from cembench.__main__ import main
+
+    class Interrupts:
+        def find_spec(self, name, path=None, target=None):
+            if name == "cembench.commands.cli":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "cembench.commands.cli")
+    monkeypatch.setattr(sys, "meta_path", [Interrupts(), *sys.meta_path])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 130
+    assert capsys.readouterr().err == "Stopped.\n"
