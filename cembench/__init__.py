@@ -37,10 +37,11 @@ if TYPE_CHECKING:
     from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
     from cembench.workflows.cut import cut
     from cembench.workflows.holes import holes
+    from cembench.workflows.map_files import map_files
     from cembench.workflows.morph_surfaces import morph
     from cembench.workflows.parameterize import Result, parameterize
     from cembench.workflows.repair import Repair, repair
-    from cembench.workflows.theory_facts import theory
+    from cembench.workflows.theory_verb import theory
     from cembench.workflows.validate import validate
 
 #: Where each public name lies.
@@ -66,10 +67,11 @@ _PLACES = {
     "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
     "cembench.workflows.cut": ("cut",),
     "cembench.workflows.holes": ("holes",),
+    "cembench.workflows.map_files": ("map_files",),
     "cembench.workflows.morph_surfaces": ("morph",),
     "cembench.workflows.parameterize": ("Result", "parameterize"),
     "cembench.workflows.repair": ("Repair", "repair"),
-    "cembench.workflows.theory_facts": ("theory",),
+    "cembench.workflows.theory_verb": ("theory",),
     "cembench.workflows.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -103,6 +105,7 @@ __all__ = [
     "list_algorithms",
     "list_surfaces",
     "load_surface",
+    "map_files",
     "morph",
     "parameterize",
     "read_mesh",

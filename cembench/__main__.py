@@ -1,6 +1,20 @@
-"""Run the command line: ``python -m cembench``."""
+"""``python -m cembench``: the command line, which a Ctrl-C while it is loaded ends with a line."""
 
-from cembench.commands.cli import main
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Load and run the command line."""
+    try:
+        from cembench.commands.cli import main as run
+
+        run()
+    except KeyboardInterrupt:
+        sys.stderr.write("Stopped.\n")
+        sys.exit(130)
+
 
 if __name__ == "__main__":
     main()

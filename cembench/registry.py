@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from cembench.core.errors import ParameterError, RegistryError, describe_error
-from cembench.core.names import did_you_mean
+from cembench.core.names import unknown
 from cembench.core.parameterization import MapStep
 from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
 from cembench.mesh.datasets import Dataset
@@ -634,10 +634,7 @@ COMMAND = "command:"
 
 def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
     if name not in known:
-        raise RegistryError(
-            f"unknown {kind} {name!r}; known: {', '.join(sorted(known)) or 'none'}."
-            + did_you_mean(name, known)
-        )
+        raise RegistryError(unknown(kind, name, known))
     return known[name]
 
 

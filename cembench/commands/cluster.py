@@ -1,96 +1,18 @@
-"""Runs on a cluster: what ``run --cluster`` starts, shows and estimates."""
+"""Runs on a cluster: what they are expected to take."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from cembench.commands.console import err, out, warn
-from cembench.commands.ending import resumable
+from cembench.commands.console import out
 
 if TYPE_CHECKING:
-    from cembench.results.records import Record
-    from cembench.results.store import Store
-    from cembench.running.cluster.connect import ClusterPlace
     from cembench.running.estimate import Estimate
-    from cembench.running.options import Options
     from cembench.running.plan import Task
 
-Cluster = Annotated[
-    str | None,
-    typer.Option(
-        "--cluster",
-        help="Measure on local:N workers, on those of tls://HOST:PORT, or on "
-        "slurm:partition=cpu,cores=16,machines=10: see docs/cluster.md.",
-    ),
-]
-SameEnvironment = Annotated[
-    bool,
-    typer.Option(
-        "--same-environment", help="Of a cluster, leave out machines with other software."
-    ),
-]
 #: For so many machines hours are estimated.
 ESTIMATED_FOR = (1, 10, 100)
-
-
-def place_of(given: str | None, *, same_environment: bool) -> ClusterPlace | None:
-    """Parse ``--cluster`` before anything else; return None without it.
-
-    Raises
-    ------
-    ParameterError
-        It cannot be read, or ``--same-environment`` stands alone.
-    MissingExtra
-        dask is not installed.
-
-    """
-    from cembench.core.errors import ParameterError
-    from cembench.core.extras import Extra, require
-    from cembench.running.cluster.connect import MODULES, parse_cluster
-
-    if given is None:
-        if same_environment:
-            raise ParameterError("--same-environment is of --cluster: name one, or leave it out.")
-        return None
-    where = parse_cluster(given)
-    require(Extra.CLUSTER, "--cluster", *MODULES[where.kind])
-    if where.is_open:
-        warn(
-            f"{where.address} asks nobody who they are: whoever reaches it runs programs as the "
-            "users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off it."
-        )
-    return where
-
-
-def measure(
-    tasks: Sequence[Task],
-    store: Store,
-    options: Options,
-    where: ClusterPlace,
-    *,
-    faces: int | None,
-    same_environment: bool,
-) -> list[Record]:
-    """Run the tasks on a cluster, with a live table on a terminal."""
-    from cembench.commands.progress import progress_on
-    from cembench.running.cluster.client import run_on_cluster
-    from cembench.running.cluster.connect import connected
-
-    with resumable(), progress_on(err, len(tasks), on_cluster=True) as progress:
-        progress.shows("starting workers" if where.kind != "address" else "connecting")
-        with connected(where) as client:
-            return run_on_cluster(
-                tasks,
-                store,
-                client,
-                options,
-                progress,
-                faces=faces,
-                same_environment=same_environment,
-            )
 
 
 def hours(

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import errno
 import json
+import shlex
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
@@ -20,6 +22,7 @@ from rich.status import Status
 from rich.text import Text
 
 from cembench.core.errors import ParameterError
+from cembench.core.reporter import Reporter
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
@@ -92,7 +95,8 @@ def warn(message: str) -> None:
 
 def note(message: str, style: str = "yellow") -> None:
     """Print a remark on standard error."""
-    err.print(f"note: {message}", style=style, soft_wrap=True)
+    if not out.quiet:
+        err.print(f"note: {message}", style=style, soft_wrap=True)
 
 
 def print_notices(meshes: Iterable[TriangleMesh]) -> None:
@@ -102,16 +106,73 @@ def print_notices(meshes: Iterable[TriangleMesh]) -> None:
             note(f"{mesh.name}: {notice}")
 
 
+@contextmanager
+def hushed(quiet: bool) -> Iterator[None]:
+    """Print nothing but errors and JSON in this block, if `quiet`."""
+    out.quiet = quiet
+    try:
+        yield
+    finally:
+        out.quiet = False
+
+
+class Shown(Reporter):
+    """Shows what a function of the API is doing on standard error."""
+
+    @property
+    def command(self) -> str:
+        """The command that was typed."""
+        return shlex.join(["cembench", *sys.argv[1:]])
+
+    @contextmanager
+    def busy(self, text: str) -> Iterator[Callable[[str], object]]:
+        """Show a spinner."""
+        if out.quiet:
+            yield lambda text: None
+            return
+        with err.status(text, spinner="line") as status:
+            yield status.update
+
+    def step(self, text: str) -> None:
+        """Print a line."""
+        if not out.quiet:
+            err.print(f"{text} ...", style="dim")
+
+    def note(self, text: str) -> None:
+        """Print a remark."""
+        note(text)
+
+    def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
+        """Show a bar for each download on a terminal."""
+        from cembench.commands.fetch import bars
+
+        return bars(list(datasets))
+
+    @contextmanager
+    def watching(
+        self, cells: int, *, on_cluster: bool = False, resumes: bool = True
+    ) -> Iterator[Any]:
+        """Show a live table on a terminal, and lines elsewhere; Ctrl-C says how to resume."""
+        from cembench.commands.ending import resumable
+        from cembench.commands.progress import progress_on
+
+        stopping = resumable() if resumes else nullcontext()
+        if out.quiet:
+            with stopping:
+                yield None
+            return
+        with stopping, progress_on(err, cells, on_cluster=on_cluster) as progress:
+            yield progress
+
+
+SHOWN = Shown()
+
+
 def registry_with(plugins: Sequence[str]) -> Registry:
     """Load the registry with the user's plug-ins, behind a spinner that names them."""
-    from cembench.registry import load_registry
+    from cembench.workflows.settings import registry_with as loaded
 
-    if not plugins:
-        return load_registry()
-    from cembench.running.plugins import load_with_plugins
-
-    with err.status(f"importing {', '.join(plugins)}", spinner="line"):
-        return load_with_plugins(plugins)
+    return loaded(plugins, SHOWN)
 
 
 def split(names: list[str]) -> list[str]:

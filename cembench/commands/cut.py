@@ -8,42 +8,45 @@ from typing import Annotated
 import typer
 
 from cembench.commands.console import Json, err, note, out, print_json
-from cembench.commands.options import Repair
+from cembench.commands.from_api import Call, from_api
 from cembench.commands.repair import print_steps
 from cembench.core.errors import MeshError
+from cembench.workflows.cut import cut as cut_surface
 
 
+@from_api(cut_surface, without=("surface", "through"))
 def cut(
+    call: Call,
     mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
     output: Annotated[
-        Path, typer.Option("-o", "--output", help="File for the disk: OBJ, OFF or PLY.")
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            help="File for the disk: OBJ, OFF or PLY; OUTPUT_seam.csv beside it gives, for each "
+            "vertex of the disk, the vertex of the surface that it is a copy of.",
+        ),
     ],
     between: Annotated[
         tuple[int, int] | None,
         typer.Option(metavar="A B", help="Two vertices that the cut must reach, counted from 0."),
     ] = None,
-    mend: Repair = False,
+    mend: Annotated[
+        bool, typer.Option("--repair", help="Repair the file first, like `cembench repair`.")
+    ] = False,
     force: Annotated[
         bool,
         typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv."),
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Cut a surface open along short curves until it is a disk, and write it.
-
-    A closed surface without handles is cut between two points far from each
-    other, a surface with handles along a short cut graph; holes are joined to the
-    cut. OUTPUT_seam.csv gives, for each vertex of the disk, the vertex of the
-    surface that it is a copy of. `cembench map --cut` cuts, maps, and writes the
-    UVs for the uncut surface.
-    """
+    """Write the disk and its seam, and print the length of the cut."""
     from cembench.core.notices import NoticeKind
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.mesh.cut import write_seam
     from cembench.mesh.files import check_writable_format, write_mesh
-    from cembench.workflows.cut import cut as cut_open
-    from cembench.workflows.repair import repair as mended
+    from cembench.workflows.repair import repair
 
     check_writable_format(output, with_uv=False)
     if output.suffix.lower() == ".stl":
@@ -56,8 +59,8 @@ def cut(
     refuse_inputs(output, [mesh], force=force)
     refuse_present([seam], force=force)
     with err.status("cutting", spinner="line"):
-        repaired = mended(mesh) if mend else None
-        disk = cut_open(repaired.mesh if repaired else mesh, through=between or ())
+        repaired = repair(mesh) if mend else None
+        disk = call(repaired.mesh if repaired else mesh, through=between or ())
     write_mesh(output, disk.mesh)
     write_seam(seam, disk)
     if as_json:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.console import Json, complain, err, out, print_json
-from cembench.commands.options import LONGEST, finite
+from cembench.commands.from_api import finite
+from cembench.workflows.settings import LONGEST
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cembench.commands.console import Json, complain, err, out, print_json, registry_with, split
-from cembench.commands.ending import resumable
+from cembench.commands.console import SHOWN, Json, complain, out, print_json, registry_with, split
 from cembench.commands.external import Command, Settings, declared_command
-from cembench.commands.options import MOST_FACES, Memory, Plugins, Repeats, Timeout, memory_bytes
+from cembench.commands.from_api import Call, finite, from_api
+from cembench.workflows.benchmark import benchmark
+from cembench.workflows.settings import LONGEST, MOST_FACES
 
 if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry
@@ -31,30 +32,34 @@ FACES = 5000
 DISKS = ("cem", "direct-cem", "harmonic-circle")
 
 
+@from_api(benchmark, only=("algorithms", "mesh_dir", "plugins", "memory_bytes"))
 def peers(
+    call: Call,
     *,
-    mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006 - typer copies defaults
-    mesh_dir: Annotated[
-        list[Path], typer.Option("--mesh-dir", help="All mesh files in a folder.")
-    ] = [],  # noqa: B006
     surfaces: Annotated[
         list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
-    ] = [],  # noqa: B006
+    ] = [],  # noqa: B006 - typer copies defaults
+    mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
     faces: Annotated[
         int, typer.Option(min=24, max=MOST_FACES, help="Number of triangles of generated surfaces.")
     ] = FACES,
-    algorithms: Annotated[
-        list[str],
-        typer.Option(
-            "-a", "--algorithms", help="Algorithms and peers, comma-separated (default: all)."
-        ),
-    ] = [],  # noqa: B006
-    plugin: Plugins = [],  # noqa: B006
     command: Command = None,
     program: Settings = [],  # noqa: B006
-    repeats: Repeats = 1,
-    timeout: Timeout = 120.0,
-    memory: Memory = None,
+    rounds: Annotated[
+        int,
+        typer.Option(
+            *("--rounds", "--repeats"),
+            min=1,
+            max=10_000,
+            help="Number of rounds; fewer than 6 give no interval.",
+        ),
+    ] = 1,
+    timeout: Annotated[
+        float,
+        typer.Option(
+            min=0.1, max=LONGEST, callback=finite, help="Time limit of a call, in seconds."
+        ),
+    ] = 120.0,
     output: Annotated[
         Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
     ] = Path("results/peers"),
@@ -67,35 +72,35 @@ def peers(
     fails or maps badly is a result: the exit code is 1 only if one of our
     algorithms fails.
     """
-    from cembench.commands.progress import progress_on
     from cembench.commands.report import make_report
     from cembench.core import folders
     from cembench.results import run_folder
     from cembench.results.record_rows import rows
-    from cembench.results.store import Store
     from cembench.running.external.present import missing
-    from cembench.running.local import run_tasks
-    from cembench.running.options import Options
-    from cembench.running.plan import MeasurementSettings, gather_surfaces, mesh_files, plan_cells
 
     run_folder.check(output)
     folders.check(output / "report", "report")
+    given = call.keywords
     declared, named = declared_command(command, program)
-    plugins = [*plugin, *declared]
+    plugins = [*given["plugins"], *declared]
     registry = registry_with(plugins)
-    wanted = [registry.algorithm(name) for name in [*split(algorithms), *named]]
-    chosen = wanted if split(algorithms) else [*_usual(registry), *wanted]
+    asked = list(given["algorithms"] or ())
+    wanted = [registry.algorithm(name) for name in [*asked, *named]]
+    chosen = wanted if asked else [*_usual(registry), *wanted]
     lacking = {a.name: why for a in chosen if (why := missing(a))}
-    chosen = [a for a in chosen if a.name not in lacking]
-    files = [*mesh, *(file for folder in mesh_dir for file in mesh_files(folder))]
-    generated = split(surfaces) or ([] if files else list(USUAL))
-    with err.status("reading surfaces", spinner="line"):
-        found, standing = gather_surfaces(registry, chosen, files, generated, faces)
-    how = MeasurementSettings(repeats=repeats)
-    tasks = plan_cells(chosen, found, {}, how, plugins, standing)
-    options = Options(timeout=timeout, memory_bytes=memory_bytes(memory))
-    with resumable(), progress_on(err, len(tasks)) as progress:
-        records = run_tasks(tasks, Store(output), options, progress)
+    measured = call(
+        [*mesh, *(split(surfaces) or ([] if mesh or given["mesh_dir"] else USUAL))],
+        [a.name for a in chosen if a.name not in lacking],
+        faces=faces,
+        plugins=plugins,
+        rounds=rounds,
+        timeout=timeout,
+        pairing="separate",
+        budget=None,
+        out=output,
+        reporter=SHOWN,
+    )
+    records = measured.asked
     _, folder = make_report(output, None, f"cembench peers -o {output}")
     if as_json:
         page = str(folder / "index.html")

@@ -12,13 +12,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from cembench.commands.console import err
-from cembench.commands.ending import resumable
 from cembench.report.render.terminal import status_style
 from cembench.results.records import Record
-from cembench.results.store import Store
-from cembench.running.local import run_tasks
-from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.watcher import Step, Watcher
 
@@ -215,12 +210,6 @@ def progress_on(console: Console, cells: int, *, on_cluster: bool = False) -> Pl
     if console.is_terminal:
         return LiveProgress(console, cells)
     return (PlainOnCluster if on_cluster else PlainProgress)(console, cells)
-
-
-def run_with_progress(tasks: Sequence[Task], store: Store, options: Options) -> list[Record]:
-    """Run the tasks on this machine, with progress on standard error."""
-    with resumable(), progress_on(err, len(tasks)) as progress:
-        return run_tasks(tasks, store, options, progress)
 
 
 def rounds_left(step: Step) -> int:

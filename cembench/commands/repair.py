@@ -3,59 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from cembench.commands.console import Json, err, note, out, print_json
-from cembench.commands.options import FillHoles, Weld
+from cembench.commands.console import SHOWN, Json, note, out, print_json
+from cembench.commands.from_api import Call, from_api
+from cembench.workflows.repair import repair as repair_surface
 
 
-class Keep(StrEnum):
-    """The connected components to keep."""
-
-    largest = "largest"
-    all = "all"
-
-
+@from_api(
+    repair_surface,
+    without=("surface",),
+    weld="--weld TOLERANCE",
+    fill_holes="--fill-holes N",
+)
 def repair(
+    call: Call,
     mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
     output: Annotated[
         Path,
-        typer.Option("-o", "--output", help="File for the repaired surface: OBJ, OFF, PLY or STL."),
+        typer.Option(
+            "-o",
+            "--output",
+            help="File for the repaired surface: OBJ, OFF, PLY or STL; of several components, one "
+            "file each.",
+        ),
     ],
-    weld: Weld = None,
-    fill_holes: FillHoles = 0,
-    components: Annotated[
-        Keep,
-        typer.Option(help="Keep the component with the most triangles, or write a file for each."),
-    ] = Keep.largest,
     force: Annotated[
         bool,
         typer.Option("--force", help="Overwrite the input, or existing files OUT_1, OUT_2, ..."),
     ] = False,
     as_json: Json = False,
 ) -> None:
-    """Repair a surface, print what was done, and write it.
-
-    Steps, in order: faces with missing vertices dropped, polygons cut into
-    triangles, coincident vertices welded, degenerate and duplicate triangles
-    fixed or dropped, non-manifold edges and vertices split, triangles oriented
-    consistently, components chosen, ears dropped, holes filled, isolated vertices
-    removed. docs/repair.md describes each step.
-    """
+    """Write the repaired surfaces, and print what was done."""
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.mesh.files import check_writable_format, write_mesh
     from cembench.mesh.topology import genus
-    from cembench.workflows.repair import repair as mended
 
     check_writable_format(output, with_uv=False)
     refuse_inputs(output, [mesh], force=force)
-    with err.status("repairing", spinner="line"):
-        found = mended(mesh, weld=weld, fill_holes=fill_holes, components=components.value)
+    with SHOWN.busy("repairing"):
+        found = call(mesh)
     files = [output]
     if len(found.meshes) > 1:
         files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(found.meshes) + 1)]

@@ -10,11 +10,12 @@ import typer
 
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import report as report_verbs
-from cembench.commands.console import Json, complain, err, print_json
+from cembench.commands.console import SHOWN, Json, complain, err, print_json
 from cembench.commands.ending import resumable
-from cembench.commands.options import Fresh, budget_seconds, memory_bytes
+from cembench.commands.options import Fresh
 from cembench.core.extras import Extra, require
 from cembench.results.profiles import Profile
+from cembench.workflows.settings import budget_seconds, bytes_of
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
@@ -47,7 +48,6 @@ def reproduce(
     stand-ins. It takes about five minutes. What the folder already holds is not
     measured again. The report is written to the same folder.
     """
-    from cembench.commands.progress import run_with_progress
     from cembench.core import folders
     from cembench.registry import load_registry
     from cembench.results import run_folder
@@ -56,6 +56,7 @@ def reproduce(
     from cembench.results.record_rows import rows
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
+    from cembench.running.local import run_tasks
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 
@@ -63,9 +64,9 @@ def reproduce(
     run_folder.check(output)
     folders.check(output / "report", "report")
     options = Options(
-        memory_bytes=memory_bytes(None),
+        memory_bytes=bytes_of(None),
         fresh=fresh,
-        budget=budget_seconds(budget, None),
+        budget=budget_seconds(budget),
         whole_surfaces=True,
         jobs=usable_cores(),
     )
@@ -75,7 +76,8 @@ def reproduce(
         surfaces, roles = _surfaces(registry, chosen, offline=offline)
     settings = MeasurementSettings.until_precise(USUAL_PRECISION)
     tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles)
-    records = run_with_progress(tasks, Store(output), options)
+    with SHOWN.watching(len(tasks)) as progress:
+        records = run_tasks(tasks, Store(output), options, progress)
     command = f"cembench reproduce -o {output}"
     report, folder = report_verbs.make_report(output, None, command)
     if as_json:
@@ -124,7 +126,7 @@ def _made(registry: Registry, names: Sequence[str]) -> list[TriangleMesh]:
     from cembench.running.environment import usable_cores
     from cembench.workflows.reproduce import STAND_IN_BYTES, make_stand_ins
 
-    jobs = min(usable_cores(), memory_bytes(None) // STAND_IN_BYTES)
+    jobs = min(usable_cores(), bytes_of(None) // STAND_IN_BYTES)
     with err.status("making stand-ins", spinner="line") as status:
 
         def made(name: str, done: int, total: int) -> None:

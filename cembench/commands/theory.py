@@ -8,38 +8,30 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cembench.commands.console import Json, err, out, print_json
+from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
+from cembench.workflows.theory_verb import theory as examine
 
 if TYPE_CHECKING:
     from cembench.results.exhibits import Exhibit
 
 
+@from_api(examine, without=("surface",))
 def theory(
+    call: Call,
     meshes: Annotated[
         list[str],
         typer.Argument(metavar="MESH...", help="Mesh file, or a name from `list surfaces`."),
     ],
     *,
-    iterations: Annotated[
-        int,
-        typer.Option(
-            min=20, max=1_000_000, help="Iterations of (23) and (30), run without a stopping rule."
-        ),
-    ] = 200,
     faces: Faces = None,
     run: Annotated[
         Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
     ] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """Test the statements of the paper's Section 4 on a surface.
-
-    Tested are the premises (Definition 1, signs of the weights), Theorem 2,
-    Corollary 1, Remark 2, Theorem 3 and Remark 3; the spectrum of K and the speed
-    of the iteration are shown too. The exit code is 1 if a statement fails
-    although all premises hold. docs/theory.md explains the figures.
-    """
+    """Print what was tested; exit with 1 if a statement fails although all premises hold."""
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry
     from cembench.results import run_folder
@@ -51,6 +43,7 @@ def theory(
     registry = load_registry()
     surfaces = [load_surface(name, (DiskMesh,), faces=faces, registry=registry) for name in meshes]
     found: list[Exhibit] = []
+    iterations = call.keywords["iterations"]
 
     rival = registry.algorithms.get(RIVAL)
     size = "" if faces is None else f" --faces {faces}"

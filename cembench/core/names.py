@@ -56,6 +56,18 @@ def file_name(name: str, longest: int = LONGEST) -> str:
     return f"{readable[: longest - DIGITS - 1]}~{digest(name)[:DIGITS]}"
 
 
+def unknown(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return a message for an unknown name, with the known ones and those that are spelled alike.
+
+    >>> unknown("metric", "image_aera", ["dirichlet_energy", "image_area"])
+    "unknown metric 'image_aera'; known: dirichlet_energy, image_area. Did you mean image_area?"
+    """
+    known = sorted(known)
+    near = get_close_matches(name, known) or [one for one in known if one.startswith(name)]
+    asked = f" Did you mean {' or '.join(near)}?" if name and near else ""
+    return f"unknown {kind} {name!r}; known: {', '.join(known) or 'none'}.{asked}"
+
+
 def slug(name: str, longest: int = LONGEST) -> str:
     """Return a name of lower-case letters, digits and hyphens, of at most `longest` characters.
 

@@ -189,10 +189,26 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table
     return Table.of("plan", "", [SURFACE, ALGORITHM, solves, *costs_columns, basis], rows)
 
 
-def figures_table(record: Record) -> Table:
-    """Return all figures of one record, one row each."""
+def figures_table(record: Record, *, full: bool = True) -> Table:
+    """Return the figures of one record, one row each: all of them, or those most looked at."""
     columns = [Column("", numeric=False)] * 2
-    return Table.of("record", "", columns, list(_figures(record)))
+    return Table.of("record", "", columns, list((_figures if full else _few_figures)(record)))
+
+
+def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
+    facts, outcome = record.mesh, record.outcome
+    size = f"{facts.vertices:,} vertices, {facts.faces:,} triangles"
+    yield "surface", f"{record.cell.mesh}: {size}"
+    yield "algorithm", f"{record.title} ({record.target})"
+    if outcome.metrics.get("angle_error_mean_deg") is not None:
+        angles, folds = (outcome.metrics[n] for n in ("angle_error_mean_deg", "flipped_triangles"))
+        shown = f"{angles:.2f} degrees mean angle error, {folds} folds"
+        yield "quality", f"{shown}; -v prints all figures"
+    if outcome.median_seconds is not None:
+        yield "seconds", f"{outcome.median_seconds:.3f}"
+    if outcome.folded_before_repair:
+        yield "folded before repair", str(outcome.folded_before_repair)
+    yield from (("note", str(note)) for note in outcome.notes)
 
 
 def _figures(record: Record) -> Iterator[tuple[str, str]]:

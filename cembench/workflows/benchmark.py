@@ -3,42 +3,60 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
-from cembench.linear_algebra.backends import default_backend
-from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Registry, load_registry
-from cembench.results.looks import USUAL_PRECISION
-from cembench.results.record_rows import REFERENCE
-from cembench.results.records import Record
-from cembench.results.store import Store
-from cembench.running.local import run_tasks
-from cembench.running.options import DEFAULT_TIMEOUT, USUAL_BUDGET, Options
-from cembench.running.pairing import Pairing
-from cembench.running.plan import (
-    MeasurementSettings,
-    PaperRole,
-    Task,
-    paper_role_of,
-    paper_roles,
-    plan_cells,
-)
-from cembench.running.surfaces import SurfaceInput, is_generated, kinds_of, load_surface
+from cembench.core.reporter import SILENT, Reporter
+from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
+from cembench.running.options import Options
+from cembench.running.surfaces import SurfaceInput
 from cembench.running.watcher import Watcher
 from cembench.workflows.notebook import html_table
+from cembench.workflows.settings import (
+    AnyPath,
+    Backend,
+    Faces,
+    Rounds,
+    Seed,
+    Solves,
+    Threads,
+    Timeout,
+    budget_seconds,
+    bytes_of,
+    installed_backend,
+    precision_share,
+    registry_with,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
     from distributed import Client
 
     from cembench.report.document import Report
+    from cembench.results.records import Record
+    from cembench.running.surfaces import SurfaceInput
+    from cembench.running.watcher import Watcher
+    from cembench.workflows.plan_benchmark import Plan
+
+#: Columns of :meth:`Run.table`.
+FEW = (
+    "mesh",
+    "algorithm",
+    "solves",
+    "status",
+    "seconds",
+    "seconds_low",
+    "seconds_high",
+    "speedup",
+    "conformal_energy",
+    "angle_error_mean_deg",
+    "flipped_triangles",
+)
 
 
 @dataclass(frozen=True)
@@ -60,6 +78,10 @@ class Run:
     """
 
     folder: Path
+    #: The records of the cells that were asked for, in their order.
+    asked: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    #: What was planned: the cells, and what each is expected to cost.
+    plan: Plan | None = field(default=None, compare=False, repr=False)
 
     def records(self) -> list[Record]:
         """Return every record.
@@ -75,15 +97,19 @@ class Run:
             The folder is not a run, or one of its records is damaged.
 
         """
+        from cembench.results.store import Store
+
         return Store(self.folder).records()
 
-    def table(self, reference: str = "cem") -> pd.DataFrame:
+    def table(self, reference: str = "cem", *, full: bool = False) -> pd.DataFrame:
         """Return a table with one row per cell.
 
         Parameters
         ----------
         reference : str
             The algorithm whose speedup over the others is included.
+        full : bool
+            Whether to return all columns, about eighty, instead of those most looked at.
 
         Returns
         -------
@@ -99,7 +125,8 @@ class Run:
         require(Extra.TABLES, "a DataFrame")
         import pandas as pd
 
-        return pd.DataFrame(self.rows(reference))
+        table = pd.DataFrame(self.rows(reference))
+        return table if full else table[[name for name in FEW if name in table]]
 
     def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
         """Return the data of :meth:`table` as one dictionary per cell.
@@ -135,7 +162,7 @@ class Run:
 
         """
         columns = ["mesh", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
-        table = self.table(reference)
+        table = self.table(reference, full=True)
         compared = table[table["reference"].notna()]
         return compared[[*columns, "verdict"]].reset_index(drop=True)
 
@@ -186,78 +213,128 @@ class Run:
         return html_table(lines, heads)
 
 
+@checked
 def benchmark(
-    surfaces: Iterable[SurfaceInput],
+    surfaces: Iterable[SurfaceInput] = (),
     algorithms: Sequence[str] | None = None,
     *,
-    precision: float = USUAL_PRECISION,
-    rounds: int | None = None,
-    budget: float | None = USUAL_BUDGET,
-    reference: str = REFERENCE,
-    out: str | os.PathLike[str] | None = None,
+    profile: Literal["quick", "standard", "paper"] | None = None,
+    mesh_dir: Sequence[AnyPath] = (),
+    sets: Sequence[str] = (),
+    limit: Annotated[int, Range(1, 1_000_000)] | None = None,
+    faces: Faces | None = None,
+    repair: bool = False,
     parameters: Mapping[str, Any] | None = None,
-    solves: Sequence[str] = ("reuse",),
-    backend: str | None = None,
-    threads: int = 1,
-    timeout: float = DEFAULT_TIMEOUT,
-    memory_bytes: int | None = None,
-    seed: int = 0,
-    pairing: Pairing = "auto",
     plugins: Sequence[str] = (),
-    watcher: Watcher | None = None,
+    precision: float | str | None = None,
+    rounds: Rounds | None = None,
+    max_rounds: Annotated[int, Range(LOOKS[1], LOOKS[-1])] = USUAL_MOST_ROUNDS,
+    budget: float | str | None = "auto",
+    pairing: Literal["auto", "separate", "process"] = "auto",
+    repeat_busy: Annotated[int, Range(0, 10)] = 0,
+    jobs: Annotated[int, Range(1, 256)] | None = None,
+    seed: Seed = 0,
+    timeout: Timeout = 600.0,
+    memory_bytes: int | str | None = None,
+    solves: Sequence[Solves] = ("reuse",),
+    backend: Backend | None = None,
+    threads: Threads = 1,
+    reference: str | None = None,
     cluster: Client | str | None = None,
+    same_environment: bool = False,
+    out: AnyPath | None = None,
+    fresh: bool = False,
+    rerun_failed: bool = False,
+    dry_run: bool = False,
+    watcher: Watcher | None = None,
+    reporter: Reporter = SILENT,
 ) -> Run:
-    """Benchmark algorithms on surfaces, with fresh processes for every round.
+    """Measure algorithms on surfaces, with fresh processes for every round.
+
+    Rounds continue until the figures are precise (`precision`); wide intervals get more rounds.
+    Each result is saved at once, and what the folder already holds is not measured again.
+    docs/measuring.md explains what is timed and what an interval means.
 
     Parameters
     ----------
     surfaces : iterable of meshes, paths, names or pairs of arrays (V, F)
         V is (n, 3), F is (m, 3) and counts from 0. Surfaces given as arrays are named
-        ``surface-1``, ``surface-2``, ...
+        ``surface-1``, ``surface-2``, ... Names are those of generated surfaces, or of public ones,
+        which are fetched.
     algorithms : sequence of str, optional
-        Names from :func:`cembench.list_algorithms`; default: every usual algorithm that takes at
-        least one of the surfaces.
-    precision : float
-        Target half-width of the 95 % intervals, relative to the figure, for the seconds of each
-        cell and for their ratio to the reference. Rounds continue until it is reached.
-    rounds : int, optional
-        Fixed number of rounds, instead of a precision; fewer than six give no interval.
-    budget : float, optional
-        Seconds that the run may take: the cheapest cells get their first seven rounds first, and
-        one round of each is always made. None: no limit.
-    reference : str
-        The algorithm with which the others are compared.
-    out : path, optional
-        The run's folder; what it already holds is not measured again. Default: a new temporary
-        folder, see :attr:`Run.folder`.
+        Names of algorithms (see :func:`cembench.list_algorithms`), or all. Default: the usual ones,
+        or the paper's four for the profile quick.
+    profile : {"quick", "standard", "paper"}, optional
+        The paper's models: the 8 smallest, those up to 210 k faces, or all 20.
+    mesh_dir : sequence of paths
+        All mesh files in a folder but NPZ; those that cannot be used are left out.
+    sets : sequence of str
+        Many surfaces: real-disks, real-holes, closed, stress, ict-faces, ict-faces-holes,
+        thingi10k, a folder, or an archive. One round each, unless `rounds` or `precision` is given.
+    limit : int, optional
+        Surfaces of each of the `sets`, at most.
+    faces : int, optional
+        Number of triangles of generated surfaces.
+    repair : bool
+        Repair the mesh files first, like :func:`cembench.repair`.
     parameters : mapping, optional
-        Parameters of the algorithms: ``name`` sets it for every algorithm that has it,
-        ``algorithm.name`` for one.
-    solves : sequence of "reuse" and "backslash"
-        The linear-algebra policies: reuse a factorisation while its matrix is unchanged, or
-        factor at every solve.
-    backend : str
-        The library that factors matrices: cvxopt, cvxopt-metis, superlu or pardiso; default:
-        cvxopt if it is installed, else superlu.
-    threads : int
-        Threads of the numerical libraries.
-    timeout : float
-        Time limit of a call, in seconds.
-    memory_bytes : int, optional
-        Memory limit of a process and its children, in bytes.
-    seed : int
-        Seed of the random order within a round.
-    pairing : "auto", "separate" or "process"
-        Whether the algorithms of a surface share a process in each round, besides having one each:
-        ratios within a process scatter less on some machines. "auto" does where this machine's
-        scatter promises narrower ratios in the same time. Not on a cluster.
+        Parameters of the algorithms: NAME sets it for every algorithm that has it, ALGORITHM.NAME
+        for one.
     plugins : sequence of str
         Python files or ``module:name`` with more algorithms.
+    precision : float or str, optional
+        Measure until the half-width of the 95 % intervals, of the seconds and of their ratios to
+        the reference, is at most this share, e.g. 5% or 0.05 (default: 5%).
+    rounds : int, optional
+        Fixed number of rounds, instead of `precision`; fewer than 6 give no interval.
+    max_rounds : int
+        Maximum number of rounds with `precision`.
+    budget : float or str, optional
+        Time of the run, in seconds or as 30m. While it lasts cells get rounds, the cheapest their
+        first 7 before others; each has one. auto: 105s for the profile quick, 1h for standard, 4h
+        for paper, else 30m. None in Python: no limit.
+    pairing : {"auto", "separate", "process"}
+        Besides a process for each cell, a round may have one that the algorithms of a surface
+        share, where processes differ more than calls (process). auto: where this machine's scatter
+        promises narrower ratios in the same time. Not on a cluster.
+    repeat_busy : int
+        Repeat a process up to so many times if the machine was busy with other work.
+    jobs : int, optional
+        Number of checks run in parallel; timed rounds always run alone (default: 1; with `sets`,
+        the number of cores).
+    seed : int
+        Seed of the random order within a round.
+    timeout : float
+        Time limit of a call, in seconds.
+    memory_bytes : int or str, optional
+        Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
+    solves : sequence of "reuse" and "backslash"
+        Reuse factorisations, factor at every solve, or both.
+    backend : str, optional
+        The library that factors matrices (default: cvxopt if it is installed, else superlu).
+        cvxopt-metis suits large meshes.
+    threads : int
+        Threads of the numerical libraries.
+    reference : str, optional
+        Show this algorithm's speedup over the others (default: cem).
+    cluster : str, optional
+        Measure on local:N workers, on those of tls://HOST:PORT, or on
+        slurm:partition=cpu,cores=16,machines=10: see docs/cluster.md. In Python also a
+        ``distributed.Client``.
+    same_environment : bool
+        Of a cluster, leave out machines with other software.
+    out : path, optional
+        The run's folder; an existing run is resumed. Default in Python: a new temporary folder.
+    fresh : bool
+        Measure again what is already recorded.
+    rerun_failed : bool
+        Measure again the cells that did not end ok.
+    dry_run : bool
+        Plan the cells and estimate their cost; measure nothing.
     watcher : Watcher, optional
-        Receives progress events.
-    cluster : distributed.Client or str, optional
-        Measure on the workers of this client, or where ``cembench run --cluster`` would:
-        ``"local:2"``, ``"tcp://HOST:8786"``. See ``docs/cluster.md``.
+        Receives the progress of the cells.
+    reporter : Reporter
+        Receives what is being done.
 
     Returns
     -------
@@ -269,9 +346,9 @@ def benchmark(
     MeshError
         A surface is unknown or damaged, or no algorithm takes it.
     RegistryError
-        An algorithm is unknown, or a plug-in cannot be loaded.
+        An algorithm or a surface is unknown, or a plug-in cannot be loaded.
     ParameterError
-        A parameter is unknown or out of range.
+        An argument is out of range, or excludes another.
     RecordError
         The folder is not a run, or cannot be written to.
     ClusterError
@@ -289,70 +366,108 @@ def benchmark(
     ['ok']
 
     """
-    registry = load_registry(plugins)
+    import tempfile
+
+    from cembench.results import run_folder
+    from cembench.results.exhibits import write_exhibit
+    from cembench.results.profiles import Profile, algorithms_of, surfaces_of
+    from cembench.results.record_rows import REFERENCE
+    from cembench.results.store import Store
+    from cembench.running.environment import usable_cores
+    from cembench.running.external.present import missing
+    from cembench.running.plan import MeasurementSettings, plan_cells
+    from cembench.workflows.plan_benchmark import (
+        Plan,
+        check_cluster,
+        check_reference,
+        chosen_algorithms,
+        gather_sets,
+        read_surfaces,
+    )
+    from cembench.workflows.sets import exhibit_of
+
     given = list(surfaces)
-    if not given:
-        raise ParameterError("there is no surface to measure on; give at least one.")
-    if rounds is not None and rounds < 1:
-        raise ParameterError(f"rounds={rounds!r} is not allowed; write an integer of at least 1.")
-    if pairing not in get_args(Pairing):
-        raise ParameterError(
-            f"pairing={pairing!r} is not allowed; write one of {', '.join(get_args(Pairing))}."
+    if out is not None:
+        run_folder.check(Path(out))
+    check_cluster(cluster, pairing, reporter)
+    if same_environment and cluster is None:
+        raise ParameterError.about("{same_environment} is of {cluster}: name one, or leave it out.")
+    if rounds is not None and precision is not None:
+        raise ParameterError.about(
+            "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of "
+            "them."
         )
-    if pairing == "process" and cluster is not None:
-        raise ParameterError('pairing="process" is for runs on this machine; leave `cluster` out.')
-    if not 0 < precision < 1:
-        raise ParameterError(
-            f"precision={precision!r} is not allowed; write a share between 0 and 1, e.g. 0.05."
+    if sets and rounds is None and precision is None:
+        rounds = 1
+    share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)
+    options = Options(
+        timeout,
+        None if cluster is not None and memory_bytes is None else bytes_of(memory_bytes),
+        fresh,
+        rerun_failed,
+        seed,
+        reference=reference or REFERENCE,
+        most_rounds=max_rounds,
+        budget=_usual_budget(profile)
+        if budget == "auto"
+        else None
+        if budget is None
+        else budget_seconds(budget),
+        pairing=pairing,
+        repeat_busy=repeat_busy,
+        jobs=jobs or (usable_cores() if sets else 1),
+    )
+    library = installed_backend(backend)
+    registry = registry_with(plugins, reporter)
+    usual = algorithms_of(Profile(profile), registry) if profile else registry.usual_algorithms
+    chosen = chosen_algorithms(registry, algorithms, usual)
+    check_reference(reference, chosen)
+    for algorithm in chosen:
+        if why := missing(algorithm):
+            reporter.note(f"{algorithm.name} is not available: {why}.")
+    given += surfaces_of(Profile(profile), registry) if profile else []
+    if not given and not mesh_dir and not sets:
+        raise ParameterError.about(
+            "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
+            "{sets}; `cembench list surfaces` and `cembench fetch` list names."
         )
-    chosen = [registry.algorithm(name) for name in algorithms or registry.usual_algorithms]
-    kinds = kinds_of(chosen)
-    meshes: list[TriangleMesh] = []
-    roles: dict[str, PaperRole] = {}
-    for number, one in enumerate(given, start=1):
-        mesh = load_surface(one, kinds, registry=registry)
-        if isinstance(one, tuple | list):
-            mesh = mesh.renamed(f"surface-{number}")
-        meshes.append(mesh)
-        roles[mesh.name] = _role(registry, one, mesh)
-    if algorithms is None:
-        chosen = [a for a in chosen if any(isinstance(mesh, a.mesh_type) for mesh in meshes)]
+    if limit is not None and not sets:
+        raise ParameterError.about("{limit} needs {sets}: add one, or leave {limit} out.")
+    if repair and sets:
+        raise ParameterError.about(
+            "{repair} works with single files and with {mesh_dir}: repair the files of a set with "
+            "`cembench repair`, or leave it out."
+        )
+    with reporter.busy("reading surfaces"):
+        meshes, roles = read_surfaces(
+            *(given, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair
+        )
+    many = gather_sets(sets, registry, chosen, limit, reporter) if sets else None
+    if many is not None:
+        meshes, roles = [*meshes, *many.meshes], {**roles, **many.roles}
     tasks = []
-    for policy in solves:
-        goal = None if rounds is not None else precision
-        settings = MeasurementSettings(
-            policy, backend or default_backend(), threads, rounds or 0, goal
-        )
+    for policy in dict.fromkeys(solves):
+        settings = MeasurementSettings(policy, library, threads, rounds or 0, share)
         tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
     folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
-    options = Options(
-        timeout, memory_bytes, seed=seed, reference=reference, budget=budget, pairing=pairing
-    )
-    if cluster is None:
-        run_tasks(tasks, Store(folder), options, watcher)
+    plan = Plan(tasks, Store(folder), options, cluster)
+    if dry_run:
+        return Run(folder, plan=plan)
+    if many is not None:
+        write_exhibit(folder, exhibit_of(many, sets, reporter.command))
     else:
-        _on_cluster(tasks, Store(folder), options, watcher, cluster)
-    return Run(folder)
+        for mesh in meshes:
+            for notice in mesh.notices:
+                reporter.note(f"{mesh.name}: {notice}")
+    with reporter.watching(len(tasks), on_cluster=cluster is not None) as shown:
+        records = plan.measure(watcher or shown, faces=faces, same_environment=same_environment)
+    return Run(folder, tuple(records), plan)
 
 
-def _on_cluster(
-    tasks: Sequence[Task],
-    store: Store,
-    options: Options,
-    watcher: Watcher | None,
-    cluster: Client | str,
-) -> None:
-    require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
-    from cembench.running.cluster.client import run_on_cluster
-    from cembench.running.cluster.connect import connected, parse_cluster
+def _usual_budget(profile: str | None) -> float:
+    """Return the seconds after which cells get no more rounds: those of the profile, if any."""
+    from cembench.results.papers import usual_paper
+    from cembench.running.options import USUAL_BUDGET
 
-    where = connected(parse_cluster(cluster)) if isinstance(cluster, str) else nullcontext(cluster)
-    with where as client:
-        run_on_cluster(tasks, store, client, options, watcher)
-
-
-def _role(registry: Registry, given: SurfaceInput, mesh: TriangleMesh) -> PaperRole:
-    """Return the row of the paper's tables that a surface is, or stands in for, if any."""
-    if is_generated(given, registry):
-        return paper_roles(registry, [given]).get(given, PaperRole())
-    return paper_role_of(registry, mesh)
+    budgets = {str(name): seconds for name, seconds in usual_paper().profiles.budgets.items()}
+    return budgets.get(profile, USUAL_BUDGET) if profile else USUAL_BUDGET

@@ -5,16 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cembench.core.errors import MeshError
-from cembench.mesh.cut import Cut, cut_open
-from cembench.mesh.defects import located
-from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.running.surfaces import SurfaceInput, load_surface
+
+if TYPE_CHECKING:
+    from cembench.mesh.cut import Cut
+    from cembench.running.surfaces import SurfaceInput
 
 
 def cut(surface: SurfaceInput, *, through: Sequence[int] = ()) -> Cut:
     """Cut a surface open along short curves until it is a disk.
+
+    A closed surface without handles is cut between two points far from each other, a surface with
+    handles along a short cut graph; holes are joined to the cut.
 
     Parameters
     ----------
@@ -48,6 +52,11 @@ def cut(surface: SurfaceInput, *, through: Sequence[int] = ()) -> Cut:
     (7, 4, 2)
 
     """
+    from cembench.mesh.cut import cut_open
+    from cembench.mesh.defects import located
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.running.surfaces import load_surface
+
     mesh = load_surface(surface, (TriangleMesh,))
     try:
         return cut_open(mesh, through)

@@ -1,324 +1,204 @@
-"""Write maps to files for other programs: surfaces, texture coordinates and textures."""
+"""Map the surfaces of mesh files, each in a process of its own, and write them with their UVs."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
+from cembench.core.arguments import Range, checked
+from cembench.core.errors import ParameterError
+from cembench.core.reporter import SILENT, Reporter
+from cembench.workflows.settings import (
+    AnyPath,
+    Backend,
+    Placement,
+    Solves,
+    Threads,
+    Timeout,
+    bytes_of,
+    installed_backend,
+    registry_with,
+)
 
-from cembench.conformal.atlas import cut_map
-from cembench.conformal.laplacian import corner_products
-from cembench.conformal.planar import orientations
-from cembench.core.atomic import write_bytes
-from cembench.core.errors import MeshError, ParameterError, RenderError
-from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.files import SINGLE, write_soup
-from cembench.mesh.formats import gltf, obj
-from cembench.mesh.soup import Soup, Texture, columns
-from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.mesh.unit_square import packed, to_unit_square
-from cembench.mesh.uvs import uv_of_faces
-from cembench.running.surfaces import SurfaceFile
-from cembench.workflows.places import Place
-from cembench.workflows.shells import Shells
+if TYPE_CHECKING:
+    from cembench.workflows.map_surfaces import Maps
 
-Complex = NDArray[np.complex128]
+#: The recommended algorithms, in order of preference; the first that takes the surface is used.
+DEFAULT_ALGORITHMS = ("direct-cem", "direct-cem-holes")
 
 
-@dataclass(frozen=True)
-class FileOptions:
-    """Options for writing a map.
+@checked
+def map_files(
+    meshes: Sequence[AnyPath],
+    algorithm: str | None = None,
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    output: AnyPath | None = None,
+    uv: Placement = "unit",
+    checker: bool = False,
+    bake: AnyPath | None = None,
+    geometry_image: AnyPath | None = None,
+    remesh: AnyPath | None = None,
+    side: Annotated[int, Range(4, 8192)] = 129,
+    html: AnyPath | None = None,
+    preview: bool = False,
+    keep_invalid: bool = False,
+    overwrite: bool = False,
+    repair: bool = False,
+    cut: bool = False,
+    plugins: Sequence[str] = (),
+    solves: Solves = "reuse",
+    backend: Backend | None = None,
+    threads: Threads = 1,
+    timeout: Timeout = 600.0,
+    memory_bytes: int | str | None = None,
+    reporter: Reporter = SILENT,
+) -> Maps:
+    """Map the surfaces of files, check the maps, and write them.
+
+    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
+    hold all digits; PLY and GLB single precision. An OBJ file keeps its groups, materials, normals,
+    colours and polygons. With `cut`, the uncut surface is written, with one UV per corner. Several
+    surfaces written to one file share the unit square, each in its own part; larger surfaces get
+    larger parts.
 
     Parameters
     ----------
-    place : Place
-        Placement of the texture coordinates.
+    meshes : sequence of paths or names
+        Mesh files (OBJ, OFF, PLY, STL, MAT), or names of public surfaces, which are fetched.
+    algorithm : str, optional
+        Name of an algorithm, see :func:`cembench.list_algorithms`; default: direct-cem, or
+        direct-cem-holes for surfaces with holes.
+    parameters : mapping, optional
+        Parameters of the algorithm.
+    output : path, optional
+        Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. For several surfaces: a folder, or a file with
+        all of them.
+    uv : {"unit", "disk"}
+        Move the UVs into the unit square, or keep the map as it is (a disk).
     checker : bool
-        Whether to add a checkerboard texture. GLB always has one.
-    bake : Path, optional
-        A texture for the file's own coordinates, to be repainted for the new ones.
-
-    """
-
-    place: Place = Place.unit
-    checker: bool = False
-    bake: Path | None = None
-
-    @property
-    def textured(self) -> bool:
-        """Whether a texture file is written beside formats that cannot hold one."""
-        return self.checker or self.bake is not None
-
-
-def beside(output: Path, file_options: FileOptions) -> list[Path]:
-    """Return the additional files that are written beside an output.
-
-    Raises
-    ------
-    ParameterError
-        A texture is requested for a format that cannot refer to one.
-
-    """
-    suffix = output.suffix.lower()
-    if not file_options.textured or suffix == ".glb":
-        return []
-    texture = output.with_name(f"{output.stem}_texture.png")
-    if suffix == ".obj":
-        return [texture, output.with_suffix(".mtl")]
-    if suffix == ".ply":
-        return [texture]
-    raise ParameterError(
-        f"{output}: {suffix} files cannot refer to a texture; use --checker and --bake with "
-        ".glb, .obj or .ply."
-    )
-
-
-def check_file_options(meshes: Sequence[Path], file_options: FileOptions) -> None:
-    """Raise the texture errors of :func:`write_map` before anything is mapped.
-
-    Raises
-    ------
-    ParameterError
-        Both a checkerboard and a texture, or a texture for several surfaces, are requested.
-    RenderError
-        The texture cannot be read.
-
-    """
-    if file_options.bake is None:
-        return
-    from cembench.drawing.texture import read_texture
-
-    if file_options.checker:
-        raise ParameterError("--checker and --bake each give a texture; choose one.")
-    if len(meshes) > 1:
-        raise ParameterError("--bake works with one surface; map the surfaces one by one.")
-    read_texture(file_options.bake)
-
-
-def write_map(
-    output: Path, surface: SurfaceFile, z: Complex, file_options: FileOptions | None = None
-) -> tuple[Notice, ...]:
-    """Write a surface with its map as texture coordinates.
-
-    An OBJ file that was not repaired keeps its content and gets the coordinates. A surface that was
-    cut is written uncut, with coordinates per corner, if the format supports that.
-
-    Parameters
-    ----------
-    output : Path
-        OBJ, PLY, GLB, VTP or NPZ file.
-    surface : SurfaceFile
-        The surface and the file it was read from.
-    z : complex128 (n,)
-        The map.
-    file_options : FileOptions, optional
-        Placement of the coordinates, and the texture.
+        Add a checkerboard texture; GLB always has one.
+    bake : path, optional
+        A texture for the OBJ's own UVs, to be repainted for the new ones.
+    geometry_image : path, optional
+        Sample the surface on a grid: NPY, EXR or PNG.
+    remesh : path, optional
+        Remesh the surface through the map, and write it to this file.
+    side : int
+        Samples along a side, for `geometry_image` and `remesh`.
+    html : path, optional
+        Write a page with a 3-D view of surface and map; works offline.
+    preview : bool
+        Draw a PNG beside the output; folded triangles are red.
+    keep_invalid : bool
+        Write invalid maps too.
+    overwrite : bool
+        Overwrite the input, a picture not made by cembench, or files in a folder.
+    repair : bool
+        Repair the mesh files first, like :func:`cembench.repair`.
+    cut : bool
+        Cut the surface into a disk first, like :func:`cembench.cut`.
+    plugins : sequence of str
+        Python files or ``module:name`` with more algorithms.
+    solves : {"reuse", "backslash"}
+        Reuse factorisations, or factor at every solve.
+    backend : str, optional
+        The library that factors matrices (default: cvxopt if it is installed, else superlu).
+        cvxopt-metis suits large meshes.
+    threads : int
+        Threads of the numerical libraries.
+    timeout : float
+        Time limit of a call, in seconds.
+    memory_bytes : int or str, optional
+        Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
+    reporter : Reporter
+        Receives what is being done.
 
     Returns
     -------
-    tuple of Notice
-        A notice if rounding folds triangles in the file.
+    Maps
+        An iterable: each surface is mapped and written when it is asked for.
 
     Raises
     ------
-    MeshError, ParameterError, RenderError
-        A file cannot be written, or the texture cannot be read or does not fit.
+    MeshError
+        A file cannot be read, or its surface is not of a kind that the algorithm takes.
+    ParameterError
+        Options exclude each other, or a file would be overwritten.
+    RegistryError
+        The algorithm is unknown.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> (mapped,) = cembench.map_files(["flat.obj"], output="flat_uv.obj")
+    >>> mapped.ok, mapped.written["output"]
+    (True, 'flat_uv.obj')
 
     """
-    file_options = file_options or FileOptions()
-    moved = placed(z, file_options.place)
-    textured = _textured(surface, moved)
-    texture = _texture(surface, textured, file_options, output)
-    original = None
-    suffix = output.suffix.lower()
-    if suffix == ".obj" == surface.path.suffix.lower() and not surface.repaired:
-        text = surface.path.read_text(encoding="latin-1")  # any bytes, as they are
-        corners = (surface.uncut.F, surface.cut.mesh.F) if surface.uncut and surface.cut else ()
-        original = obj.with_uv(text, moved, *corners)
-    _write(output, textured, texture, file_options, original)
-    return _folded_by_rounding(output, z, moved, surface.mesh.F)
+    from pathlib import Path
 
+    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.running.options import Options
+    from cembench.running.plan import MeasurementSettings
+    from cembench.workflows.map_outputs import (
+        Extras,
+        check_extras,
+        check_shells,
+        check_takes_disks,
+        output_files,
+    )
+    from cembench.workflows.map_surfaces import FileJobs, Maps, jobs_of, local_files, with_pictures
+    from cembench.workflows.write_maps import FileOptions, beside
 
-def write_shells(
-    output: Path, shells: Shells, maps: Sequence[Complex], file_options: FileOptions
-) -> tuple[Notice, ...]:
-    """Write a file of several surfaces, with their maps side by side in the unit square.
+    def path_of(path: AnyPath | None) -> Path | None:
+        return None if path is None else Path(path)
 
-    Otherwise like :func:`write_map`: an OBJ file keeps its content.
-    """
-    uv, corners = shells.together(maps)
-    mesh = shells.whole
-    whole = SurfaceFile(shells.path, mesh)
-    textured = Soup.of_triangles(mesh.V, mesh.F, uv, corners, name=mesh.name)
-    texture = _texture(whole, textured, file_options, output)
-    original = None
-    if output.suffix.lower() == ".obj" == shells.path.suffix.lower():
-        text = shells.path.read_text(encoding="latin-1")  # any bytes, as they are
-        original = obj.with_uv(text, uv, *(() if corners is None else (mesh.F, corners)))
-    _write(output, textured, texture, file_options, original)
-    before = np.zeros(len(uv), dtype=np.complex128)
-    F = mesh.F if corners is None else corners
-    for part, z, faces in zip(shells.parts, maps, shells.faces, strict=True):
-        before[F[faces]] = z[part.mesh.F]
-    return _folded_by_rounding(output, before, uv, F)
-
-
-def write_corner_map(
-    output: Path, surface: SurfaceFile, corners: Complex, file_options: FileOptions
-) -> tuple[Notice, ...]:
-    """Write a surface with one UV per corner (3 m,), as an atlas has.
-
-    Raises
-    ------
-    MeshError, ParameterError, RenderError
-        As for :func:`write_map`; a texture cannot be baked for an atlas.
-
-    """
-    if file_options.bake is not None:
-        raise ParameterError("--bake needs a map with one UV per vertex; this is an atlas.")
-    mesh = surface.mesh
-    found = cut_map(mesh, corners.reshape(-1, 3))
-    moved = placed(found.uv, file_options.place)
-    textured = Soup.of_triangles(mesh.V, mesh.F, moved, found.surface.F, name=mesh.name)
-    _write(output, textured, _checker(file_options, output), file_options, None)
-    return _folded_by_rounding(output, found.uv, moved, found.surface.F)
-
-
-def save_map(
-    output: Path, mesh: TriangleMesh, z: Complex, file_options: FileOptions | None = None
-) -> tuple[Notice, ...]:
-    """Write a surface that was not read from a file; like :func:`write_map`."""
-    file_options = file_options or FileOptions()
-    if file_options.bake is not None:
-        raise ParameterError("--bake needs a surface read from an OBJ file.")
-    moved = placed(z, file_options.place)
-    surface = Soup.of_triangles(mesh.V, mesh.F, moved, name=mesh.name)
-    _write(output, surface, _checker(file_options, output), file_options, None)
-    return _folded_by_rounding(output, z, moved, mesh.F)
-
-
-def write_atlas(
-    output: Path,
-    surfaces: Sequence[SurfaceFile],
-    maps: Sequence[Complex],
-    file_options: FileOptions,
-) -> tuple[Notice, ...]:
-    """Write several surfaces to one file, with their maps side by side in the unit square.
-
-    A GLB file gets a node for each surface; other formats get one mesh.
-    """
-    areas = [float(corner_products(file.mesh.V, file.mesh.F)[1].sum()) for file in surfaces]
-    moved = packed(maps, areas)
-    parts = [_textured(file, z) for file, z in zip(surfaces, moved, strict=True)]
-    texture = _checker(file_options, output)
-    if output.suffix.lower() == ".glb":
-        whole = gltf.write(*parts, texture=Texture(texture) if texture else None)
-        write_bytes(output, whole, error=MeshError, parents=False)
-    else:
-        _write(output, _joined(parts), texture, file_options, None)
-    told = [
-        _folded_by_rounding(output, z, after, file.mesh.F)
-        for file, z, after in zip(surfaces, maps, moved, strict=True)
+    options = Options(timeout=timeout, memory_bytes=bytes_of(memory_bytes))
+    settings = MeasurementSettings(solves, installed_backend(backend), threads, repeats=1)
+    registry = registry_with(plugins, reporter)
+    candidates = [
+        registry.algorithm(name) for name in ([algorithm] if algorithm else DEFAULT_ALGORITHMS)
     ]
-    return tuple(notice for notices in told for notice in notices)
-
-
-def placed(z: Complex, place: Place) -> Complex:
-    """Return a map moved to the placement of its texture coordinates."""
-    return to_unit_square(z) if place is Place.unit else z
-
-
-def _textured(surface: SurfaceFile, moved: Complex) -> Soup:
-    mesh, corners = surface.mesh, None
-    if surface.uncut and surface.cut:
-        mesh, corners = surface.uncut, surface.cut.mesh.F
-    return Soup.of_triangles(mesh.V, mesh.F, moved, corners, name=surface.mesh.name)
-
-
-def _texture(
-    surface: SurfaceFile, textured: Soup, file_options: FileOptions, output: Path
-) -> bytes | None:
-    if file_options.bake is None:
-        return _checker(file_options, output)
-    from cembench.drawing.texture import baked_png, read_texture
-
-    if surface.repaired:
-        raise ParameterError(
-            "--bake needs the faces of the original file, but the surface was repaired; run "
-            "`cembench repair` to see what it changes, and fix the file so that it keeps its UVs."
+    if cut:
+        check_takes_disks(candidates)
+    given, target = [Path(mesh) for mesh in meshes], path_of(output)
+    outputs = output_files(given, target)
+    file_options = FileOptions(uv, checker, path_of(bake))
+    extras = Extras(path_of(geometry_image), path_of(remesh), side, uv, path_of(html))
+    check_extras(given, outputs, file_options, extras)
+    is_atlas = any(a.target == "atlas" for a in candidates)
+    if is_atlas and (extras.files or bake or len(given) > 1):
+        raise ParameterError.about(
+            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
+            "{html} and {bake}, which need one UV per vertex.",
+            name=candidates[0].name,
         )
-    old = uv_of_faces(surface.path, textured.triangles)
-    assert textured.uv is not None
-    new = columns(textured.uv)[textured.uv_triangles]
-    return baked_png(read_texture(file_options.bake), old, new)
-
-
-def _checker(file_options: FileOptions, output: Path) -> bytes | None:
-    if not file_options.checker and output.suffix.lower() != ".glb":
-        return None
-    from cembench.drawing.texture import checker_png
-
-    return checker_png()
-
-
-def _write(
-    output: Path,
-    surface: Soup,
-    texture: bytes | None,
-    file_options: FileOptions,
-    original: str | None,
-) -> None:
-    """Write the files of a surface, the texture first, so that no file names a missing one."""
-    image = Texture(texture) if texture else None
-    for path in beside(output, file_options):
-        if path.suffix == ".png":
-            assert texture is not None
-            write_bytes(path, texture, error=RenderError, parents=False)
-            image = Texture(texture, path.name)
-        else:
-            assert image is not None
-            write_bytes(path, obj.mtl_bytes(image.file), error=MeshError, parents=False)
-    if output.suffix.lower() != ".obj":
-        write_soup(output, surface, image)
-        return
-    text = original or obj.write(surface).decode()
-    if file_options.textured:
-        library = output.with_suffix(".mtl").name.encode("utf-8", "surrogateescape")
-        text = obj.with_material(text, library.decode("latin-1"))
-    write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
-
-
-def _joined(parts: Sequence[Soup]) -> Soup:
-    """Return several surfaces joined into one mesh."""
-    starts = np.cumsum([0, *(len(part.V) for part in parts)])
-    coordinates = [part.uv for part in parts if part.uv is not None]
-    uv_starts = np.cumsum([0, *(len(uv) for uv in coordinates)])
-    indices = zip(parts, uv_starts, strict=False)
-    return Soup.of_triangles(
-        np.concatenate([part.V for part in parts]),
-        np.concatenate([part.triangles + k for part, k in zip(parts, starts, strict=False)]),
-        np.concatenate(coordinates),
-        np.concatenate([part.uv_triangles + k for part, k in indices]),
-    )
-
-
-def _folded_by_rounding(
-    output: Path, z: Complex, moved: Complex, F: NDArray[np.int64]
-) -> tuple[Notice, ...]:
-    """Return a notice of how many triangles rounding folds in the file."""
-    single = output.suffix.lower() in SINGLE
-    written = moved.astype(np.complex64).astype(np.complex128) if single else moved
-    after = orientations(written, F)
-    count = int(((orientations(z, F) > 0) & (after <= 0)).sum())
-    if not count:
-        return ()
-    precision = "single precision" if single else "the unit square"
-    remedy = "write OBJ, VTP or NPZ" if single else "--uv disk keeps the map as it is"
-    told = (
-        f"{count} of {len(F)} triangles are so small in the map that rounding to {precision} folds "
-        f"or flattens them; {remedy}"
-    )
-    return (Notice(NoticeKind.FOLDED_BY_ROUNDING, told),)
+    sources = local_files(given, registry, reporter)
+    written = list(dict.fromkeys(path for path in outputs if path is not None))
+    others = [path for file in written for path in beside(file, file_options)]
+    inputs = [*sources, *([file_options.bake] if file_options.bake else [])]
+    for path in (*written, *others, *extras.files):
+        refuse_inputs(path, inputs, force=overwrite)
+    refuse_present(others if target in outputs else [*written, *others], force=overwrite)
+    together = target if len(given) > 1 and target in outputs else None
+    files = []
+    for source, place in zip(sources, outputs, strict=True):
+        with reporter.busy(f"reading {source}"):
+            shells, jobs = jobs_of(
+                *(source, registry, candidates, parameters or {}, settings, plugins),
+                repair=repair,
+                cut=cut,
+            )
+        check_shells(len(shells.parts), source, file_options, extras)
+        files.append(FileJobs(shells, jobs, None if together else place))
+    if preview and is_atlas:
+        reporter.note(
+            "no picture was drawn: the islands of an atlas have no fixed positions in the plane"
+        )
+    elif preview:
+        files = with_pictures(files, overwrite=overwrite)
+    for folder in {path.parent for path in written}:
+        folder.mkdir(exist_ok=True)
+    return Maps(files, options, file_options, extras, together, reporter, keep_invalid=keep_invalid)

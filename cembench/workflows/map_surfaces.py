@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,26 +11,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.notices import Notice
+from cembench.core.reporter import SILENT, Reporter
+from cembench.drawing.own_pictures import check_replaceable
+from cembench.mesh import datasets
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
 from cembench.running.surfaces import SurfaceFile
-from cembench.workflows.map_extras import Extras, write_extras
-from cembench.workflows.map_files import (
+from cembench.workflows.map_outputs import (
+    Extras,
+    draw_map,
+    draw_shells,
+    picture_files,
+    write_extras,
+)
+from cembench.workflows.shells import Shells, read_shells
+from cembench.workflows.write_maps import (
     FileOptions,
     write_atlas,
     write_corner_map,
     write_map,
     write_shells,
 )
-from cembench.workflows.map_places import draw_map, draw_shells
-from cembench.workflows.shells import Shells
 
 Complex = NDArray[np.complex128]
-#: Shows a text during some work.
-Busy = Callable[[str], AbstractContextManager[object]]
+#: Notices, each with the file it is about.
+Told = tuple[tuple[Path, Notice], ...]
 
 
 @dataclass(frozen=True)
@@ -75,7 +82,7 @@ class Mapped:
     #: Kinds of outputs written, with their files.
     written: Mapping[str, str]
     #: Notices about the written files.
-    told: tuple[tuple[Path, Notice], ...] = ()
+    told: Told = ()
 
     @property
     def ok(self) -> bool:
@@ -83,127 +90,157 @@ class Mapped:
         return self.record.outcome.status == "ok"
 
 
+def local_files(
+    meshes: Sequence[Path], registry: Registry, reporter: Reporter = SILENT
+) -> list[Path]:
+    """Return the file of each path or name of a public surface, which is fetched if necessary."""
+    known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
+    fetched = {}
+    for path in known:
+        dataset = registry.dataset(str(path))
+        with reporter.downloads([dataset]) as progress:
+            datasets.fetch(dataset, progress=progress(dataset))
+        fetched[path] = datasets.surface_file(dataset)
+    return [fetched.get(path, path) for path in meshes]
+
+
 def jobs_of(
-    shells: Shells,
+    source: Path,
     registry: Registry,
     candidates: Sequence[Algorithm],
-    parameters: Mapping[str, str],
-    how: MeasurementSettings,
+    parameters: Mapping[str, Any],
+    settings: MeasurementSettings,
     plugins: Sequence[str],
-) -> tuple[Job, ...]:
-    """Return a job for each surface, with the first algorithm that takes it."""
-    found = []
+    *,
+    repair: bool,
+    cut: bool,
+) -> tuple[Shells, tuple[Job, ...]]:
+    """Return the surfaces of a file, and a job for each with the first algorithm that takes it."""
+    shells = read_shells(source, candidates, mend=repair, cut=cut)
+    jobs = []
     for surface in shells.parts:
         mesh = surface.mesh
         taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
-        standing = {mesh.name: paper_role_of(registry, mesh)}
-        tasks = plan_cells([taken], [mesh], dict(parameters), how, list(plugins), standing)
-        found.append(Job(surface, tasks[0]))
-    return tuple(found)
+        role = {mesh.name: paper_role_of(registry, mesh)}
+        (task,) = plan_cells([taken], [mesh], parameters, settings, plugins, role)
+        jobs.append(Job(surface, task))
+    return shells, tuple(jobs)
 
 
-def map_surfaces(
-    files: Sequence[FileJobs],
-    options: Options,
-    file_options: FileOptions,
-    extras: Extras,
-    busy: Busy,
-    *,
-    keep_invalid: bool = False,
-) -> Iterator[Mapped]:
-    """Map the surfaces one by one, write their outputs, and yield each when it is done.
-
-    A file of several surfaces and its picture are written after the last one, unless a map is
-    missing; see :func:`incomplete`.
+def with_pictures(files: Sequence[FileJobs], *, overwrite: bool) -> list[FileJobs]:
+    """Return the files with a path for a picture of each, beside its output.
 
     Raises
     ------
-    MeshError, ParameterError, RenderError
-        A file cannot be written.
+    ParameterError
+        Two pictures would have the same path.
+    RenderError
+        A file that is not one of our pictures would be overwritten.
 
     """
-    for file in files:
-        maps: list[Complex] = []
-        for k, job in enumerate(file.jobs):
-            found = _mapped(
-                file, job, options, file_options, extras, busy, keep_invalid=keep_invalid
-            )
-            if found.uv is not None and (found.ok or keep_invalid):
-                maps.append(found.uv)
-            is_last = k == len(file.jobs) - 1
-            if k and is_last and len(maps) == len(file.jobs):
-                told = _write_shells(file, maps, file_options, busy)
-                found = Mapped(found.surface, found.record, found.uv, found.written, told)
-            yield found
+    sources = [file.shells.path for file in files]
+    chosen = [file.jobs[0].task.algorithm for file in files]
+    pictures = picture_files(sources, chosen, [file.output for file in files])
+    for picture in pictures if not overwrite else ():
+        check_replaceable(picture)
+    return [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
 
 
-def incomplete(
-    files: Sequence[FileJobs], found: Sequence[Mapped], *, keep_invalid: bool = False
-) -> list[Path]:
-    """Return the files that were not written because a map is missing."""
-    missing, start = [], 0
-    for file in files:
-        own = found[start : start + len(file.jobs)]
-        start += len(file.jobs)
-        lacks = any(m.uv is None or not (m.ok or keep_invalid) for m in own)
-        if len(own) > 1 and file.output is not None and lacks:
-            missing.append(file.output)
-    return missing
+@dataclass
+class Maps:
+    """The maps of files, each made and written when it is asked for.
 
+    A file of several surfaces and its picture are written after the last one, unless a map is
+    missing; so is `output`, if all files go to one.
 
-def write_together(
-    output: Path, found: Sequence[Mapped], file_options: FileOptions
-) -> tuple[Notice, ...]:
-    """Write all surfaces to one file; all must have a map."""
-    maps = [mapped.uv for mapped in found if mapped.uv is not None]
-    return write_atlas(output, [mapped.surface for mapped in found], maps, file_options)
+    Attributes
+    ----------
+    done : list of Mapped
+        The surfaces mapped so far.
+    missing : list of Path
+        Files that were not written because a map is missing.
 
+    """
 
-def _mapped(
-    file: FileJobs,
-    job: Job,
-    options: Options,
-    file_options: FileOptions,
-    extras: Extras,
-    busy: Busy,
-    *,
-    keep_invalid: bool,
-) -> Mapped:
-    mesh, title = job.surface.mesh, job.task.algorithm.title
-    with busy(f"{title} on {mesh.name}, {mesh.m:,} triangles"):
-        record, uv = map_once(job.task, options)
-    if uv is None or not (record.outcome.status == "ok" or keep_invalid):
-        return Mapped(job.surface, record, uv, {})
-    is_atlas = job.task.algorithm.target == "atlas"
-    written: dict[str, str] = {}
-    told: list[tuple[Path, Notice]] = []
-    alone = len(file.jobs) == 1
-    if file.output is not None:
-        written["output"] = str(file.output)
-        if alone:
-            write: Any = write_corner_map if is_atlas else write_map
-            notices = write(file.output, job.surface, uv, file_options)
-            told += [(file.output, notice) for notice in notices]
-    if extras.files:
-        with busy("writing"):
-            notices = write_extras(extras, mesh, uv, record)
-        told += [(extras.remeshed or job.surface.path, notice) for notice in notices]
-        written |= {what: str(path) for what, path in extras.named.items()}
-    if file.picture is not None and not is_atlas:
-        written["preview"] = str(file.picture)
-        if alone:
-            with busy("drawing"):
-                draw_map(mesh, uv, file.picture, record)
-    return Mapped(job.surface, record, uv, written, tuple(told))
+    files: Sequence[FileJobs]
+    options: Options
+    file_options: FileOptions
+    extras: Extras
+    output: Path | None = None
+    reporter: Reporter = SILENT
+    keep_invalid: bool = False
+    done: list[Mapped] = field(default_factory=list)
+    missing: list[Path] = field(default_factory=list)
 
+    def __len__(self) -> int:
+        return sum(len(file.jobs) for file in self.files)
 
-def _write_shells(
-    file: FileJobs, maps: Sequence[Complex], file_options: FileOptions, busy: Busy
-) -> tuple[tuple[Path, Notice], ...]:
-    told: tuple[Notice, ...] = ()
-    if file.output is not None:
-        told = write_shells(file.output, file.shells, maps, file_options)
-    if file.picture is not None:
-        with busy("drawing"):
-            draw_shells(file.shells, maps, file.picture)
-    return tuple((file.output or file.shells.path, notice) for notice in told)
+    def __iter__(self) -> Iterator[Mapped]:
+        for file in self.files:
+            own: list[Mapped] = []
+            for job in file.jobs:
+                mapped = self._mapped(file, job)
+                own.append(mapped)
+                if len(own) == len(file.jobs) > 1:
+                    mapped = replace(mapped, told=self._write_shells(file, own))
+                self.done.append(mapped)
+                yield mapped
+        if self.output is not None:
+            self._write_together(self.output)
+
+    def writes(self, mapped: Mapped) -> bool:
+        """Whether a map is written."""
+        return mapped.uv is not None and (mapped.ok or self.keep_invalid)
+
+    def _maps(self, mapped: Sequence[Mapped], output: Path | None) -> list[Complex]:
+        """Return the maps that are written to one file; none if one is missing."""
+        if all(map(self.writes, mapped)):
+            return [one.uv for one in mapped if one.uv is not None]
+        if output is not None:
+            self.missing.append(output)
+        return []
+
+    def _write_together(self, output: Path) -> None:
+        if maps := self._maps(self.done, output):
+            surfaces = [mapped.surface for mapped in self.done]
+            for notice in write_atlas(output, surfaces, maps, self.file_options):
+                self.reporter.note(f"{output}: {notice}")
+
+    def _write_shells(self, file: FileJobs, own: Sequence[Mapped]) -> Told:
+        told: tuple[Notice, ...] = ()
+        maps = self._maps(own, file.output)
+        if maps and file.output is not None:
+            told = write_shells(file.output, file.shells, maps, self.file_options)
+        if maps and file.picture is not None:
+            with self.reporter.busy("drawing"):
+                draw_shells(file.shells, maps, file.picture)
+        return tuple((file.output or file.shells.path, notice) for notice in told)
+
+    def _mapped(self, file: FileJobs, job: Job) -> Mapped:
+        mesh, algorithm = job.surface.mesh, job.task.algorithm
+        with self.reporter.busy(f"{algorithm.title} on {mesh.name}, {mesh.m:,} triangles"):
+            record, uv = map_once(job.task, self.options)
+        mapped = Mapped(job.surface, record, uv, {})
+        if uv is None or not self.writes(mapped):
+            return mapped
+        is_atlas = algorithm.target == "atlas"
+        written: dict[str, str] = {}
+        told: list[tuple[Path, Notice]] = []
+        alone = len(file.jobs) == 1
+        if file.output is not None:
+            written["output"] = str(file.output)
+            if alone:
+                write: Any = write_corner_map if is_atlas else write_map
+                notices = write(file.output, job.surface, uv, self.file_options)
+                told += [(file.output, notice) for notice in notices]
+        if self.extras.files:
+            with self.reporter.busy("writing"):
+                notices = write_extras(self.extras, mesh, uv, record)
+            told += [(self.extras.remeshed or job.surface.path, notice) for notice in notices]
+            written |= {what: str(path) for what, path in self.extras.named.items()}
+        if file.picture is not None and not is_atlas:
+            written["preview"] = str(file.picture)
+            if alone:
+                with self.reporter.busy("drawing"):
+                    draw_map(mesh, uv, file.picture, record)
+        return replace(mapped, written=written, told=tuple(told))

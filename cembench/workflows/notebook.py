@@ -1,8 +1,9 @@
-"""HTML tables for notebooks."""
+"""What a notebook shows."""
 
 from __future__ import annotations
 
 import html
+import sys
 from collections.abc import Iterable, Sequence
 
 
@@ -18,3 +19,17 @@ def html_table(rows: Iterable[Sequence[str]], heads: Sequence[str] = ()) -> str:
         cells = "".join(f"<td>{html.escape(text)}</td>" for text in others)
         lines.append(f"<tr><th style='text-align:left'>{html.escape(first)}</th>{cells}</tr>")
     return f"<table>{''.join(lines)}</table>"
+
+
+def is_notebook() -> bool:
+    """Whether this process is the kernel of a notebook."""
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return hasattr(shell, "kernel")
+
+
+def show_page(page: str, height: int = 640) -> None:
+    """Show an HTML page below the notebook's cell, in a frame of its own."""
+    from IPython.display import HTML, display
+
+    frame = f"<iframe srcdoc='{html.escape(page)}' width='100%' height='{height}'></iframe>"
+    display(HTML(frame))  # type: ignore[no-untyped-call]

@@ -9,29 +9,28 @@ import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
+from cembench.core.extras import Extra, require
+from cembench.core.names import file_name, unknown
 from cembench.mesh.files import check_writable_format
-from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.registry import Algorithm, Registry, load_registry
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import SurfaceInput, load_surface
-from cembench.workflows.notebook import html_table
+from cembench.workflows.map_files import DEFAULT_ALGORITHMS
+from cembench.workflows.notebook import html_table, is_notebook, show_page
+from cembench.workflows.settings import Placement
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-#: The recommended algorithm for each kind of surface.
-DEFAULT_ALGORITHMS: Mapping[type[TriangleMesh], str] = {
-    DiskMesh: "direct-cem",
-    HoledMesh: "direct-cem-holes",
-}
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class Result:
     @property
     def metrics(self) -> Mapping[str, float | int | None]:
         """Figures by name, computed by the harness; None if one is infinite."""
-        return self.outcome.metrics
+        return _Figures(self.outcome.metrics)
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -115,11 +114,12 @@ class Result:
         """Additional data reported by the algorithm."""
         return self.outcome.extras
 
+    @checked
     def save(
         self,
         path: str | os.PathLike[str],
         *,
-        uv: Literal["unit", "disk"] = "unit",
+        uv: Placement = "unit",
         checker: bool = False,
         overwrite: bool = False,
     ) -> Path:
@@ -151,17 +151,12 @@ class Result:
             `uv` is neither "unit" nor "disk".
 
         """
-        from cembench.core.outputs import refuse_existing
-        from cembench.workflows.map_files import FileOptions, beside, save_map
-        from cembench.workflows.places import Place
+        from cembench.core.outputs import refuse_present
+        from cembench.workflows.write_maps import FileOptions, beside, save_map
 
-        path = Path(path)
-        if uv not in tuple(Place):
-            raise ParameterError(f"uv={uv!r} is unknown; allowed: 'unit', 'disk'.")
-        file_options = FileOptions(Place(uv), checker)
+        path, file_options = Path(path), FileOptions(uv, checker)
         check_writable_format(path, with_uv=True)
-        for file in (path, *beside(path, file_options)):
-            refuse_existing(file, overwrite=overwrite)
+        refuse_present((path, *beside(path, file_options)), force=overwrite)
         for notice in save_map(path, self.mesh, self.z, file_options):
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
@@ -216,9 +211,12 @@ class Result:
         Returns
         -------
         matplotlib.figure.Figure
-            The figure, which a notebook displays.
+            The figure, which ``matplotlib.pyplot.show()`` or a notebook displays.
 
         """
+        import io
+
+        from matplotlib import pyplot
         from matplotlib.figure import Figure
         from matplotlib.image import imread
 
@@ -227,22 +225,26 @@ class Result:
             from cembench.core.atomic import write
 
             write(Path(path), lambda file: file.write(png))
-        import io
-
         pixels = imread(io.BytesIO(png), format="png")
-        figure = Figure(figsize=(pixels.shape[1] / 100, pixels.shape[0] / 100), dpi=100)
-        figure.figimage(pixels)
+        size = (pixels.shape[1] / 100, pixels.shape[0] / 100)
+        # A notebook would display a figure of pyplot twice: as such, and as the cell's result.
+        make = Figure if is_notebook() else pyplot.figure
+        figure = make(figsize=size, dpi=100)
+        axes = figure.add_axes((0, 0, 1, 1))
+        axes.imshow(pixels, aspect="auto")
+        axes.set_axis_off()
         return figure
 
     def show(self, path: str | os.PathLike[str] | None = None) -> Path:
-        """Open an interactive page with the surface and its image in the browser.
+        """Show an interactive page with the surface and its image.
 
-        The page works offline and needs no other file.
+        It is shown below the cell of a notebook, else in the browser. The page works offline and
+        needs no other file.
 
         Parameters
         ----------
         path : path, optional
-            HTML file to write; it is then not opened. Default: a temporary file.
+            HTML file to write; it is then not shown. Default: a temporary file.
 
         Returns
         -------
@@ -251,6 +253,8 @@ class Result:
 
         Raises
         ------
+        MissingExtra
+            A package for pages is not installed.
         RenderError
             The page cannot be written.
 
@@ -258,7 +262,7 @@ class Result:
         import tempfile
         import webbrowser
 
-        from cembench.core.names import file_name
+        require(Extra.REPORT, "a page with a view of the map", "jinja2", "markupsafe")
         from cembench.report.render.view_page import write_view_page
         from cembench.workflows.view import map_page
 
@@ -268,7 +272,10 @@ class Result:
             return Path(path)
         shown = Path(tempfile.mkdtemp(prefix="cembench-")) / f"{file_name(self.mesh.name)}.html"
         write_view_page(shown, page)
-        webbrowser.open(shown.as_uri())
+        if is_notebook():
+            show_page(page)
+        else:
+            webbrowser.open(shown.as_uri())
         return shown
 
     def _png(self) -> bytes:
@@ -308,10 +315,17 @@ class Result:
         )
 
 
+class _Figures(dict[str, "float | int | None"]):
+    """Figures by name; an unknown name is answered with the nearest known one."""
+
+    def __missing__(self, name: str) -> None:
+        raise KeyError(unknown("metric", str(name), self))
+
+
 def parameterize(
-    surface: SurfaceInput,
+    surface: SurfaceInput | ArrayLike,
+    *faces_and_algorithm: ArrayLike | str,
     algorithm: str | None = None,
-    *,
     keep_invalid: bool = False,
     plugins: Iterable[str] = (),
     **parameters: Any,
@@ -320,8 +334,11 @@ def parameterize(
 
     Parameters
     ----------
-    surface : mesh, path, name or pair of arrays (V, F)
-        A disk or a surface with holes. V is (n, 3), F is (m, 3) and counts from 0.
+    surface : mesh, path, name or arrays
+        A disk or a surface with holes: a mesh, a path, a name, a pair (V, F), or V with F as the
+        next argument. V is (n, 3), F is (m, 3) and counts from 0.
+    *faces_and_algorithm
+        F, if `surface` is V; then the name of the algorithm, unless it is given by keyword.
     algorithm : str, optional
         A name from :func:`cembench.list_algorithms`; default: ``"direct-cem"``, or
         ``"direct-cem-holes"`` for surfaces with holes.
@@ -345,43 +362,34 @@ def parameterize(
     RegistryError
         The algorithm is unknown.
     ParameterError
-        A parameter is unknown, or its value is out of range.
+        A parameter is unknown, its value is out of range, or two algorithms are named.
     AlgorithmFailed
         No map was found, or the map is not valid and `keep_invalid` is False.
 
     Examples
     --------
     >>> import cembench
-    >>> result = cembench.parameterize(cembench.surface("hemi-ellipsoid", 400))
-    >>> result.uv.shape == (result.mesh.n, 2)
+    >>> mesh = cembench.surface("hemi-ellipsoid", 400)
+    >>> result = cembench.parameterize(mesh.V, mesh.F)
+    >>> result.uv.shape == (mesh.n, 2)
     True
     >>> result.metrics["flipped_triangles"]
     0
+    >>> cembench.parameterize(mesh, "cem").algorithm.name
+    'cem'
 
     """
+    arrays = [one for one in faces_and_algorithm if one is not None and not isinstance(one, str)]
+    named = [one for one in (*faces_and_algorithm, algorithm) if isinstance(one, str)]
+    if len(named) > 1:
+        raise ParameterError(f"two algorithms are named, {' and '.join(named)}; name one.")
+    given: Any = (surface, *arrays) if arrays else surface
     registry = load_registry(plugins)
-    mesh, chosen = _mesh_and_algorithm(surface, algorithm, registry)
+    candidates = [registry.algorithm(name) for name in named or DEFAULT_ALGORITHMS]
+    mesh = load_surface(given, [a.mesh_type for a in candidates], registry=registry)
+    chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
     outcome, z = check_cell(chosen, task.mesh, task.cell)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)
-
-
-def default_algorithm(mesh: TriangleMesh) -> str:
-    """Return the name of the recommended algorithm for this kind of surface."""
-    for kind, name in DEFAULT_ALGORITHMS.items():
-        if isinstance(mesh, kind):
-            return name
-    kinds = ", ".join(kind.__name__ for kind in DEFAULT_ALGORITHMS)
-    raise ParameterError(f"{mesh.name} is a {type(mesh).__name__}; allowed: {kinds}.")
-
-
-def _mesh_and_algorithm(
-    surface: SurfaceInput, name: str | None, registry: Registry
-) -> tuple[TriangleMesh, Algorithm]:
-    if name is None:
-        mesh: TriangleMesh = load_surface(surface, registry=registry)
-        return mesh, registry.algorithm(default_algorithm(mesh))
-    chosen = registry.algorithm(name)
-    return load_surface(surface, (chosen.mesh_type,), registry=registry), chosen

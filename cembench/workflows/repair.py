@@ -6,19 +6,16 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
+from cembench.core.arguments import Range, checked
 from cembench.core.errors import MeshError
-from cembench.core.notices import Notice
-from cembench.mesh.defects import located
-from cembench.mesh.files import read_soup
-from cembench.mesh.repair import Components
-from cembench.mesh.repair import repair as repair_arrays
-from cembench.mesh.soup import Soup
-from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.running.surfaces import SurfaceInput, prepared, soup_of
+from cembench.workflows.settings import MOST_FACES
 
-#: Kinds of repaired surfaces; every one is of the first.
-_KINDS: tuple[type[TriangleMesh], ...] = (TriangleMesh, DiskMesh, HoledMesh)
+if TYPE_CHECKING:
+    from cembench.core.notices import Notice
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.running.surfaces import SurfaceInput
 
 
 @dataclass(frozen=True)
@@ -54,27 +51,32 @@ class Repair:
         return self.meshes[0]
 
 
+@checked
 def repair(
     surface: SurfaceInput,
     *,
-    weld: float | None = None,
-    fill_holes: int = 0,
-    components: Components = "largest",
+    weld: Annotated[float, Range(0.0, 1e60)] | None = None,
+    fill_holes: Annotated[int, Range(0, MOST_FACES)] = 0,
+    components: Literal["largest", "all"] = "largest",
 ) -> Repair:
     """Repair a surface into an oriented manifold, and count every step.
+
+    Steps, in order: faces with missing vertices dropped, polygons cut into triangles, coincident
+    vertices welded, degenerate and duplicate triangles fixed or dropped, non-manifold edges and
+    vertices split, triangles oriented consistently, components chosen, ears dropped, holes filled,
+    isolated vertices removed. docs/repair.md describes each step.
 
     Parameters
     ----------
     surface : path, pair of arrays (V, F), or mesh
         V is (n, 3) and may hold NaN, F is (m, 3) and counts from 0.
     weld : float, optional
-        Vertices up to this distance apart, in the surface's units, are merged; 0 merges only
-        those that coincide exactly. By default these are merged unless the surface is a disk
-        already, whose seams are cuts.
+        Weld vertices up to this distance apart, in the surface's units; 0: equal ones only, which
+        is the default but for the seams of a disk.
     fill_holes : int
-        Boundary loops of at most this many edges are filled, except the longest of a component.
-    components : "largest" or "all"
-        The connected components to keep.
+        Fill holes of at most N edges; the longest boundary loop of a component stays open.
+    components : {"largest", "all"}
+        Keep the component with the most triangles, or all of them.
 
     Returns
     -------
@@ -101,14 +103,22 @@ def repair(
     'DiskMesh'
 
     """
+    from cembench.mesh.defects import located
+    from cembench.mesh.files import read_soup
+    from cembench.mesh.repair import repair as repair_arrays
+    from cembench.mesh.soup import Soup
+    from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+    from cembench.running.surfaces import prepared, soup_of
+
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
     soup = soup_of(surface) if path is None else read_soup(path)
     try:
         found = repair_arrays(
             soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
         )
+        kinds = (TriangleMesh, DiskMesh, HoledMesh)  # every surface is of the first
         soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in found.surfaces]
-        meshes = [prepared(one, _KINDS).mesh for one in soups]
+        meshes = [prepared(one, kinds).mesh for one in soups]
     except MeshError as error:
         raise located(error, path) from None
     return Repair(tuple(meshes), found.counts, soup.notices)

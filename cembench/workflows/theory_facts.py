@@ -11,8 +11,7 @@ import numpy as np
 from cembench.conformal.certificate import certify
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import Algorithm, load_registry
-from cembench.running.surfaces import SurfaceInput, load_surface
+from cembench.registry import Algorithm
 from cembench.workflows.theory import (
     TOLERANCE,
     BoundaryOperator,
@@ -62,38 +61,6 @@ class TheoryFacts:
     others: Mapping[str, tuple[float, ...]]
     spectrum: list[float]
     missing: str = ""
-
-
-def theory(surface: SurfaceInput, *, iterations: int = 200) -> TheoryFacts:
-    """Test the statements of Section 4 of the paper on a disk.
-
-    Parameters
-    ----------
-    surface : mesh, path, name or pair of arrays (V, F)
-        A topological disk.
-    iterations : int
-        Number of iterations of the bare maps (23) and (30).
-
-    Returns
-    -------
-    TheoryFacts
-        The premises and statements, each with the figure that decides it.
-
-    Raises
-    ------
-    MeshError
-        The surface is damaged or not a disk.
-
-    Examples
-    --------
-    >>> import cembench
-    >>> cembench.theory(cembench.surface("flat-disk", 200)).facts["premises_hold"]
-    True
-
-    """
-    mesh = load_surface(surface, (DiskMesh,))
-    assert isinstance(mesh, DiskMesh)
-    return theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)
 
 
 def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> TheoryFacts:

@@ -15,7 +15,7 @@ surfaces = [
     cembench.surface("hemi-ellipsoid", faces).renamed(f"ellipsoid-{faces}") for faces in sizes
 ]
 run = cembench.benchmark(surfaces, ["cem", "harmonic-circle"], rounds=1)
-table = run.table()
+table = run.table(full=True)
 
 # %%
 # All columns.

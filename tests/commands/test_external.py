@@ -63,7 +63,7 @@ def test_what_cannot_be_meant_is_refused(cli, words, message):
 
 def test_the_map_of_an_atlas_is_written_with_a_uv_for_each_corner(cli, face):
     how = ("--program", "target=atlas", "--program", "name=cutter")
-    code, out, err = cli("map", face, "--command", command("cut"), *how, "-o", "uv.obj")
+    code, out, err = cli("map", face, "--command", command("cut"), *how, "-v", "-o", "uv.obj")
     assert code == 0, err
     assert re.search(r"islands +2 *\n", out)
     assert "maximum |mu|" in out

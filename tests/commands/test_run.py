@@ -104,11 +104,11 @@ def test_export_writes_a_row_a_cell(runs, form):
         (("compare", "one", "empty"), "have no timed cell in common"),
         (("export", "nowhere"), "nowhere holds no run"),
         (("merge", "nowhere", "-o", "all"), "nowhere holds no run"),
-        (("run", "--surfaces", "flat-disk", "--memory", "much"), "--memory 'much' is not a size"),
-        (("run", "--surfaces", "flat-disk", "--solves", "twice"), "--solves 'twice' is unknown"),
+        (("run", "--surfaces", "flat-disk", "--memory", "much"), "--memory much is not a size"),
+        (("run", "--surfaces", "flat-disk", "--solves", "twice"), "--solves twice is not allowed"),
         (("run", "--mesh-dir", "nowhere"), "--mesh-dir nowhere is not a folder"),
         (("run", "--mesh-dir", "one"), "holds no file of a mesh (.obj, .off,"),
-        (("run",), "no surface to run on: name a --profile"),
+        (("run",), "there is no surface to measure on"),
     ],
 )
 def test_bad_usage_is_said(runs, arguments, message):
@@ -200,7 +200,7 @@ def test_ctrl_c_says_that_the_same_command_resumes(cli, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cembench.commands.progress.run_tasks", interrupted)
+    monkeypatch.setattr("cembench.workflows.plan_benchmark.run_tasks", interrupted)
     code, _, err = cli("run", "--surfaces", "flat-disk", "--faces", "60", "-a", "cem")
     assert code == 130
     assert "Stopped; the same command resumes." in err

@@ -76,9 +76,7 @@ def a_report(folder):
 
 
 def a_validation(folder):
-    from cembench.commands.validate import validate
-
-    validate("lscm", output=folder)
+    cembench.validate("lscm", out=folder)
 
 
 def parquet(folder):

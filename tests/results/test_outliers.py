@@ -2,8 +2,9 @@
 
 import pytest
 
-from cembench.commands.cli import _present
+from cembench.commands.benchmark import _print_run
 from cembench.results.outliers import NAMED, outlier_lines, outliers
+from cembench.workflows.benchmark import Run
 from tests.results.test_comparison import record_of
 
 
@@ -81,8 +82,8 @@ def test_algorithms_beyond_five_are_counted():
 
 
 def test_the_summary_after_a_run_names_them(tmp_path, capsys):
-    _present(WRECKED, as_json=False, where=tmp_path, reference=None)
+    _print_run(Run(tmp_path, tuple(WRECKED)), None, as_json=False)
     printed = " ".join(capsys.readouterr().out.split())
     assert "! FDM on nefertiti: 70.3 degrees, the other algorithms' median is 8.15" in printed
-    _present(WRECKED[:1], as_json=False, where=tmp_path, reference=None)
+    _print_run(Run(tmp_path, tuple(WRECKED[:1])), None, as_json=False)
     assert "degrees, the other" not in capsys.readouterr().out

@@ -102,7 +102,7 @@ def test_what_remembers_its_calls_is_caught_in_the_rounds(here):
         (":right", ("-p", "steps=2"), "no chosen algorithm has a parameter 'steps'"),
         (":right", ("-p", "steps"), "-p 'steps' is not of the form NAME=VALUE"),
         (":right", ("--up-to", 100), "--up-to 100 is too few"),
-        (":right", ("--require", "wonders"), "Invalid value for '--require'"),
+        (":right", ("--require", "wonders"), "--require wonders is not allowed"),
     ],
 )
 def test_bad_usage_is_said_before_anything_is_run(here, cli, plugin, arguments, message):

@@ -13,8 +13,7 @@ from PIL import Image
 import cembench
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.workflows import geometry_images
-from cembench.workflows.map_files import FileOptions, save_map
-from cembench.workflows.places import Place
+from cembench.workflows.write_maps import FileOptions, save_map
 from tests import gallery
 from tests.commands.test_cli import FAULTY
 
@@ -51,7 +50,7 @@ def test_texture_coordinates_lie_in_the_unit_square_unless_asked(result, suffix,
     assert 0.99 <= uv.max() <= 1
     uv = uv_of(result.save(tmp_path / f"b{suffix}", uv="disk"))
     np.testing.assert_allclose(uv, result.uv, atol=1e-6)
-    with pytest.raises(cembench.ParameterError, match="allowed: 'unit', 'disk'"):
+    with pytest.raises(cembench.ParameterError, match="write one of 'unit', 'disk'"):
         result.save(tmp_path / f"c{suffix}", uv="square")
 
 
@@ -73,7 +72,7 @@ def test_triangles_that_rounding_folds_are_counted(tmp_path):
     z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / np.abs(mesh.V[:, :2]).max()
     inner = np.setdiff1d(np.arange(mesh.n), mesh.boundary)
     z[inner] *= 1e-12  # the disk's middle, as on a long finger
-    assert save_map(tmp_path / "a.obj", mesh, z, FileOptions(Place.disk)) == ()
+    assert save_map(tmp_path / "a.obj", mesh, z, FileOptions("disk")) == ()
     (notice,) = save_map(tmp_path / "a.ply", mesh, z)
     assert notice.kind == "folded_by_rounding"
     assert "single precision" in str(notice)

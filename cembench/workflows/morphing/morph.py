@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -54,6 +54,8 @@ class Morph:
     registrations: tuple[Registration, ...]
     carried: tuple[Real, ...]
     stops: tuple[Real, ...]
+    #: Seconds of the maps and of the registration.
+    seconds: Mapping[str, float] = field(default_factory=dict)
 
     def at(self, time: float) -> Real:
         """Return the first surface's vertices, float64 (n, 3), at a time from 0 to 1."""

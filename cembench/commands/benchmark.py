@@ -1,0 +1,137 @@
+"""The command `run`: measure algorithms on surfaces."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.text import Text
+
+from cembench.commands.cluster import hours, show_hours
+from cembench.commands.console import SHOWN, Json, out, print_json, split
+from cembench.commands.external import Command, Settings, declared_command
+from cembench.commands.from_api import Call, from_api
+from cembench.workflows.benchmark import benchmark
+
+if TYPE_CHECKING:
+    from cembench.workflows.benchmark import Run
+    from cembench.workflows.plan_benchmark import Plan
+
+
+@from_api(
+    benchmark,
+    without=("watcher", "reporter", "out"),
+    sets="--set",
+    limit="--limit N",
+    precision="--precision SHARE",
+    budget="--budget TIME",
+    solves="--solves NAME",
+    cluster="--cluster PLACE",
+)
+def run(
+    call: Call,
+    *,
+    mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
+    dataset: Annotated[
+        list[str], typer.Option("--dataset", help="Public surfaces (see `fetch`), comma-separated.")
+    ] = [],  # noqa: B006
+    surfaces: Annotated[
+        list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
+    ] = [],  # noqa: B006
+    command: Command = None,
+    program: Settings = [],  # noqa: B006
+    output: Annotated[
+        Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
+    ] = Path("results/run"),
+    as_json: Json = False,
+) -> None:
+    """Print the figures of the cells that were asked for; exit with 1 if one did not end ok."""
+    given = call.keywords
+    declared, named = declared_command(command, program)
+    measured = call(
+        surfaces=[*mesh, *split(dataset), *split(surfaces)],
+        algorithms=[*(given["algorithms"] or ()), *named] or None,
+        plugins=[*given["plugins"], *declared],
+        out=output,
+        reporter=SHOWN,
+    )
+    if given["dry_run"]:
+        _print_plan(measured.plan, as_json=as_json)
+    else:
+        _print_run(measured, given["reference"], as_json=as_json)
+
+
+def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
+    from cembench.report.content.evidence import Evidence
+    from cembench.report.content.many import MANY
+    from cembench.report.run_tables import machine_lines, many_table, results_table, speedups_table
+    from cembench.results.outliers import outlier_lines
+    from cembench.results.record_rows import REFERENCE, rows
+    from cembench.results.store import Store
+
+    records, folder, reference = list(run.asked), run.folder, reference or REFERENCE
+    suspects = [Text(f"! {line}", style="yellow") for line in outlier_lines(records)]
+    evidence = Evidence(Store(folder), tuple(records), ())
+    many = len({record.cell.mesh_hash for record in records}) > MANY
+    if as_json:
+        print_json(rows(records, reference))
+    elif many:
+        out.print(many_table(records))
+        for words in (*machine_lines(evidence.machines), *suspects):
+            out.print(words)
+    else:
+        out.print(results_table(evidence))
+        speedups = speedups_table(records, reference)
+        if speedups is not None:
+            out.print("", speedups, sep="\n")
+        for words in suspects:
+            out.print(words)
+    if not as_json:
+        out.print(f"\nRecords and maps: {folder.resolve()}", soft_wrap=True)
+    if many and not as_json:
+        out.print(f"Pictures and profiles: cembench report {folder}", soft_wrap=True)
+    if any(record.outcome.status != "ok" for record in records):
+        raise typer.Exit(1)
+
+
+def _print_plan(plan: Plan, *, as_json: bool) -> None:
+    """Print which cells would be measured, and their estimated cost."""
+    from cembench.commands.progress import duration
+    from cembench.report.run_tables import plan_table
+    from cembench.workflows.plan_benchmark import plan_summary
+
+    costs, held, summary = plan.costs(), plan.held(), plan_summary(plan)
+    on_cluster = hours(plan.tasks, costs, plan.options.budget) if plan.cluster else None
+    if as_json:
+        print_json(summary | ({"cluster": on_cluster} if on_cluster else {}))
+        return
+    out.print(
+        plan_table(
+            [
+                (t.cell, t.facts.faces, c.basis if c else f"recorded: {held[t.cell.key]}", c)
+                for t, c in zip(plan.tasks, costs, strict=True)
+            ]
+        )
+    )
+    known = [cost for cost in costs if cost is not None]
+    is_rough = any(cost.basis == "rough" for cost in known)
+    rough = " (rough: few similar cells were measured here before)" if is_rough else ""
+    out.print(
+        f"\n{len(known)} of {len(plan.tasks)} cells to measure: about "
+        f"{duration(summary['seconds'])}, {summary['memory_bytes'] / 2**30:.1f} GiB at most{rough}"
+    )
+    if on_cluster:
+        show_hours(on_cluster)
+
+
+#: Each command with the examples in its help.
+VERBS = (
+    (
+        run,
+        "Examples:  cembench run --profile quick --dry-run  ·  "
+        "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
+        "cembench run --surfaces spherical-cap -o results/cap --json  ·  "
+        "cembench run --set real-disks -a all --limit 20",
+    ),
+)

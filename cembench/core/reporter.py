@@ -1,0 +1,42 @@
+"""What a function of the API reports while it works."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from typing import Any
+
+
+class Reporter:
+    """Receives what a function is doing; this one ignores it, the command line shows it."""
+
+    @property
+    def command(self) -> str:
+        """The command that makes this call; empty in Python."""
+        return ""
+
+    def busy(self, text: str) -> AbstractContextManager[Callable[[str], object]]:
+        """Show a text during a block, which can replace it by calling what it gets."""
+        return nullcontext(lambda text: None)
+
+    def step(self, text: str) -> None:
+        """Show what begins."""
+
+    def note(self, text: str) -> None:
+        """Show a remark."""
+
+    def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
+        """Show downloads during a block, which gets a function of a dataset to its progress."""
+        return nullcontext(lambda dataset: None)
+
+    def watching(
+        self, cells: int, *, on_cluster: bool = False, resumes: bool = True
+    ) -> AbstractContextManager[Any]:
+        """Show the progress of so many cells during a block, which gets a watcher or None.
+
+        `resumes` says whether the same call resumes the work if it is stopped.
+        """
+        return nullcontext()
+
+
+SILENT = Reporter()

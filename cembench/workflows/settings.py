@@ -1,0 +1,139 @@
+"""Settings that several functions of the API share: their ranges, and the texts they may be.
+
+The command line reads the signatures that use them, so this module imports nothing large. The upper
+bounds are far above what any machine can do; they keep sums, clocks and system limits from
+overflowing.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+
+from cembench.core.arguments import Range
+from cembench.core.errors import ParameterError, Setting
+from cembench.core.reporter import SILENT, Reporter
+
+if TYPE_CHECKING:
+    from cembench.registry import Registry
+
+#: A process needs more than a hundred MiB to load the libraries.
+LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
+LONGEST = 10_000_000.0
+MOST_FACES = 1_000_000_000
+
+AnyPath: TypeAlias = str | os.PathLike[str]
+Placement: TypeAlias = Literal["unit", "disk"]
+Solves: TypeAlias = Literal["reuse", "backslash"]
+Backend: TypeAlias = Literal["cvxopt", "cvxopt-metis", "superlu", "pardiso"]
+Threads: TypeAlias = Annotated[int, Range(1, 1024)]
+Timeout: TypeAlias = Annotated[float, Range(0.1, LONGEST)]
+#: Each surface has its own, narrower bounds.
+Faces: TypeAlias = Annotated[int, Range(1, MOST_FACES)]
+Rounds: TypeAlias = Annotated[int, Range(1, 10_000)]
+Seed: TypeAlias = Annotated[int, Range(0, 2**63 - 1)]
+
+_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+def precision_share(precision: float | str) -> float:
+    """Return the share that a precision names: 0.05, "0.05" or "5%".
+
+    Raises
+    ------
+    ParameterError
+        It is not a share, or is outside the range.
+
+    """
+    text = str(precision).strip()
+    try:
+        number = float(text.removesuffix("%")) / (100 if text.endswith("%") else 1)
+    except ValueError:
+        number = math.nan
+    if not 0.001 <= number <= 0.5:
+        raise ParameterError.about(
+            "{given} is not allowed; write a share from 0.1% to 50%, e.g. 5% or 0.05.",
+            given=Setting("precision", repr(precision)),
+        )
+    return number
+
+
+def budget_seconds(budget: float | str) -> float:
+    """Return the seconds that a budget names: 90, "90s", "30m" or "2h".
+
+    Raises
+    ------
+    ParameterError
+        It is not a time, or is outside the range.
+
+    """
+    seconds = math.nan
+    try:
+        if isinstance(budget, str):
+            text = budget.strip().lower()
+            seconds = float(text[:-1]) * _UNITS[text[-1:]]
+        else:
+            seconds = float(budget)
+    except (ValueError, KeyError):
+        pass
+    if not 0 <= seconds <= LONGEST:
+        raise ParameterError.about(
+            "{given} is not a time; write a number with a unit, e.g. 90s, 30m or 2h.",
+            given=Setting("budget", repr(budget)),
+        )
+    return seconds
+
+
+def bytes_of(memory_bytes: int | str | None) -> int:
+    """Return the bytes that a memory limit names, such as "4GiB"; None is 90 % of the free memory.
+
+    Raises
+    ------
+    ParameterError
+        It is not a size, or is outside the range.
+
+    """
+    import psutil
+    from pydantic import ByteSize, TypeAdapter, ValidationError
+
+    if memory_bytes is None:
+        return int(0.9 * psutil.virtual_memory().available)
+    given = Setting("memory_bytes", repr(memory_bytes))
+    try:
+        size: int = TypeAdapter(ByteSize).validate_python(memory_bytes)
+    except (ValidationError, OverflowError):
+        raise ParameterError.about(
+            "{given} is not a size; write a number with a unit, e.g. 4GiB or 500MB.", given=given
+        ) from None
+    if not LEAST_MEMORY <= size <= MOST_MEMORY:
+        raise ParameterError.about(
+            "{given} is {size:,} bytes; allowed: 256MiB (a process needs more than half of that to "
+            "load the libraries) to 1024TiB.",
+            given=given,
+            size=size,
+        )
+    return size
+
+
+def installed_backend(backend: str | None) -> str:
+    """Return the name of a library that factors matrices; raise if it is not installed."""
+    from cembench.linear_algebra.backends import default_backend
+    from cembench.linear_algebra.cholesky import linear_algebra
+
+    name = backend or default_backend()
+    with linear_algebra(backend=name):
+        return name
+
+
+def registry_with(plugins: Sequence[str], reporter: Reporter = SILENT) -> Registry:
+    """Load the registry with these plug-ins, each first in a process with a time limit."""
+    from cembench.registry import load_registry
+
+    if not plugins:
+        return load_registry()
+    from cembench.running.plugins import load_with_plugins
+
+    with reporter.busy(f"importing {', '.join(plugins)}"):
+        return load_with_plugins(plugins)

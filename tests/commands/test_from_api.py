@@ -1,0 +1,221 @@
+"""A command is its function of the API: the same defaults, the same results, the same errors."""
+
+import inspect
+import json
+import sys
+
+import pytest
+import typer
+
+import cembench
+from cembench.commands.cli import app
+from cembench.commands.from_api import _value
+from cembench.core.arguments import arguments_of
+
+VERBS = {
+    (one.name or one.callback.__name__).rstrip("_"): one.callback
+    for one in app.registered_commands
+    if hasattr(one.callback, "function")
+}
+GROUP = typer.main.get_command(app)
+
+
+def test_these_verbs_are_made_from_the_api():
+    assert {"map", "run", "validate", "repair", "cut", "theory", "morph"} <= VERBS.keys()
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_options_have_the_defaults_of_the_function(verb):
+    command = VERBS[verb]
+    own = inspect.signature(command.body).parameters
+    options = {option.name: option for option in GROUP.commands[verb].params}
+    shared = [a for a in arguments_of(command.function).values() if a.name in options]
+    assert shared or verb == "cut"
+    for argument in shared:
+        if argument.name in own or argument.default is inspect.Parameter.empty:
+            continue  # the shell has an argument of its own, or must be given one
+        default = options[argument.name].default
+        is_sequence = argument.many or isinstance(default, list)
+        assert (_value(argument, list(default or ())) if is_sequence else default) in (
+            argument.default,
+            argument.default or {},
+            list(argument.default or ()) if argument.many else argument.default,
+        ), argument.name
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_option_says_what_it_is(verb):
+    for option in GROUP.commands[verb].params:
+        assert option.name == "help" or option.help, option.name
+
+
+@pytest.fixture
+def cap(cli):
+    cembench.write_mesh("cap.obj", cembench.surface("hemi-ellipsoid", 300))
+    return "cap.obj"
+
+
+def said(cli, *words):
+    code, out, err = cli(*words, "--json")
+    assert code == 0, err
+    return json.loads(out)
+
+
+SAME = {
+    "map": lambda cli, cap: (
+        next(dict(m.record.outcome.metrics) for m in cembench.map_files([cap])),
+        said(cli, "map", cap),
+    ),
+    "run": lambda cli, cap: (
+        dict(cembench.benchmark([cap], ["cem"], rounds=1).asked[0].outcome.metrics),
+        said(cli, "run", "--mesh", cap, "-a", "cem", "--rounds", 1)[0],
+    ),
+    "theory": lambda cli, cap: (
+        dict(cembench.theory(cap, iterations=30).facts),
+        said(cli, "theory", cap, "--iterations", 30)[0],
+    ),
+    "repair": lambda cli, cap: (
+        {"steps": dict(cembench.repair(cap).steps)},
+        said(cli, "repair", cap, "-o", "mended.obj"),
+    ),
+    "cut": lambda cli, cap: (
+        {"vertices": cembench.cut(cap).mesh.n},
+        said(cli, "cut", cap, "-o", "disk.obj"),
+    ),
+    "morph": lambda cli, cap: (
+        cembench.morph([cap, cap]).metrics(5),
+        said(cli, "morph", cap, cap, "--frames", 5),
+    ),
+    "validate": lambda cli, cap: (
+        {"valid": cembench.validate("harmonic-circle", checks_only=True).valid},
+        said(cli, "validate", "harmonic-circle", "--checks-only"),
+    ),
+}
+
+
+@pytest.mark.parametrize("verb", SAME)
+def test_the_call_and_the_command_give_the_same(verb, cli, cap):
+    call, command = SAME[verb](cli, cap)
+    assert call
+    for name, value in json.loads(json.dumps(call)).items():
+        assert command[name] == value, name
+
+
+def test_the_map_of_a_file_is_that_of_parameterize(cli, cap):
+    (mapped,) = cembench.map_files([cap])
+    expected = dict(cembench.parameterize(cap).metrics)
+    assert dict(mapped.record.outcome.metrics) == pytest.approx(expected, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("call", "words", "in_python", "in_shell"),
+    [
+        (
+            lambda: cembench.benchmark(["flat-disk"], rounds=6, precision="5%"),
+            ("run", "--surfaces", "flat-disk", "--rounds", 6, "--precision", "5%"),
+            "`rounds` fixes the number of rounds, and `precision` chooses it",
+            "--rounds fixes the number of rounds, and --precision chooses it",
+        ),
+        (
+            lambda: cembench.benchmark(["flat-disk"], memory_bytes="much"),
+            ("run", "--surfaces", "flat-disk", "--memory", "much"),
+            "memory_bytes='much' is not a size",
+            "--memory much is not a size",
+        ),
+        (
+            lambda: cembench.map_files(["a.obj"], checker=True),
+            ("map", "a.obj", "--checker"),
+            "add `output`",
+            "add -o",
+        ),
+    ],
+)
+def test_python_is_advised_in_python_and_the_shell_in_options(
+    cli, call, words, in_python, in_shell
+):
+    with pytest.raises(cembench.ParameterError) as refused:
+        call()
+    assert in_python in str(refused.value)
+    code, _, err = cli(*words)
+    assert code == 2
+    assert in_shell in err
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"rounds": 0},
+        {"rounds": 2.5},
+        {"threads": float("nan")},
+        {"solves": ["twice"]},
+        {"pairing": "both"},
+        {"timeout": "long"},
+    ],
+)
+def test_the_function_refuses_what_the_option_would(given):
+    with pytest.raises(cembench.ParameterError, match="is not allowed; write"):
+        cembench.benchmark(["flat-disk"], **given)
+
+
+def test_one_bad_file_of_a_folder_is_left_out_with_a_note(cli, cap):
+    cli.folder.joinpath("bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
+    words = ("run", "--mesh-dir", ".", "-a", "lscm", "--dry-run", "--json")
+    code, out, err = cli(*words)
+    assert code == 0
+    assert [cell["mesh"] for cell in json.loads(out)["cells"]] == ["cap"]
+    assert "note: bad.obj is left out:" in err
+    cli.folder.joinpath("cap.obj").unlink()
+    assert cli(*words)[0] == 2
+
+
+def test_a_program_that_is_not_there_is_told_before_anything_is_measured(cli, cap):
+    words = ("run", "--mesh", cap, "--command", "no-such-program {input} {output}", "--dry-run")
+    code, _, err = cli(*words)
+    assert code == 0
+    assert "there is no program 'no-such-program'" in " ".join(err.split())
+
+
+def test_vertices_and_faces_may_be_two_arguments():
+    mesh = cembench.surface("flat-disk", 200)
+    for result in (
+        cembench.parameterize(mesh.V, mesh.F, "cem"),
+        cembench.parameterize(mesh.V, mesh.F, algorithm="cem"),
+        cembench.parameterize((mesh.V, mesh.F), "cem"),
+    ):
+        assert result.algorithm.name == "cem"
+    with pytest.raises(cembench.ParameterError, match="two algorithms"):
+        cembench.parameterize(mesh, "cem", algorithm="lscm")
+    with pytest.raises(KeyError, match="Did you mean conformal_energy"):
+        result.metrics["conformal_enrgy"]
+
+
+def test_quiet_prints_errors_only(cli, cap):
+    assert cli("map", cap, "-q") == (0, "", "")
+    code, out, err = cli("map", cap, "-q", "-a", "cme")
+    assert (code, out) == (2, "")
+    assert "Did you mean" in err
+
+
+def test_map_prints_few_lines_and_all_of_them_on_request(cli, cap):
+    few, all_of_them = (cli("map", cap, "-o", f"{name}.obj", *more)[1] for name, more in MORE)
+    assert len(few.splitlines()) == 5
+    assert len(all_of_them.splitlines()) > 10
+
+
+MORE = (("a", ()), ("b", ("-v",)))
+
+
+def test_ctrl_c_while_the_command_line_is_loaded_ends_with_a_line(monkeypatch, capsys):
+    from cembench.__main__ import main
+
+    class Interrupts:
+        def find_spec(self, name, path=None, target=None):
+            if name == "cembench.commands.cli":
+                raise KeyboardInterrupt
+
+    monkeypatch.delitem(sys.modules, "cembench.commands.cli")
+    monkeypatch.setattr(sys, "meta_path", [Interrupts(), *sys.meta_path])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 130
+    assert capsys.readouterr().err == "Stopped.\n"
