@@ -83,13 +83,13 @@ class DeclaredPanel(_Part):
     facet: str = ""
     panel: str = ""
     series: str = "label"
-    kind: Kind | Literal["profile"] = "points"
+    kind: Literal["line", "points", "both", "steps", "bars", "stack", "profile"] = "points"
     x: DeclaredAxis = DeclaredAxis()
     y: DeclaredAxis
     #: Expressions are of the rows that agree in these columns, which are at least two.
     by: tuple[str, ...] = ()
     tooltip: str = ""
-    overlay: Literal["", "power law", "front"] = ""
+    overlay: Literal["", "power-law", "front"] = ""
     #: Without a row for which this is true there is no panel.
     needs: str = ""
     #: Maximum number of series.
@@ -363,7 +363,7 @@ def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Dr
             x, y = [x for _, x in places], [held.get(place, absent) for place in places]
         about = tooltips if spec.tooltip and not named else ()
         series.append(PlotSeries(name, x, y, cast(Kind, spec.kind), styles[name], about))
-        if spec.overlay == "power law" and (line := power_law(name, clouds[name], styles[name])):
+        if spec.overlay == "power-law" and (line := power_law(name, clouds[name], styles[name])):
             series.append(line)
     if spec.overlay == "front":
         series.append(front(clouds))
