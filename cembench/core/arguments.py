@@ -16,7 +16,8 @@ from functools import cache, wraps
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
-from cembench.core.errors import ParameterError, Setting
+from cembench.core.errors import ParameterError
+from cembench.core.wording import Setting
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -289,9 +289,9 @@ def benchmark(
     max_rounds : int
         Maximum number of rounds with `precision`.
     budget : float or str, optional
-        Time of the run, in seconds or as 30m. While it lasts cells get rounds, the cheapest their
-        first 7 before others; each has one. auto: 105s for the profile quick, 1h for standard, 4h
-        for paper, else 30m. None in Python: no limit.
+        Time of the run, e.g. 30m; in Python also seconds. While it lasts cells get rounds, the
+        cheapest their first 7 before others; each has one. auto: 105s for the profile quick, 1h for
+        standard, 4h for paper, else 30m. None in Python: no limit.
     pairing : {"auto", "separate", "process"}
         Besides a process for each cell, a round may have one that the algorithms of a surface
         share, where processes differ more than calls (process). auto: where this machine's scatter

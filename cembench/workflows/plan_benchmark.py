@@ -9,10 +9,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from cembench.core.errors import MeshError, ParameterError, RegistryError, Setting
+from cembench.core.errors import MeshError, ParameterError, RegistryError
 from cembench.core.extras import Extra, require
 from cembench.core.names import unknown
 from cembench.core.reporter import Reporter
+from cembench.core.wording import Setting
 from cembench.mesh.files import read_repaired
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
