@@ -66,6 +66,10 @@ class Run:
     ----------
     folder : Path
         Folder with the records and maps.
+    asked : tuple of Record
+        The records of the cells that were asked for, in their order.
+    plan : Plan, optional
+        What was planned: the cells, and what each is expected to cost.
 
     Examples
     --------
@@ -77,9 +81,7 @@ class Run:
     """
 
     folder: Path
-    #: The records of the cells that were asked for, in their order.
     asked: tuple[Record, ...] = field(default=(), compare=False, repr=False)
-    #: What was planned: the cells, and what each is expected to cost.
     plan: Plan | None = field(default=None, compare=False, repr=False)
 
     def records(self) -> list[Record]:
