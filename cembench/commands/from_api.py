@@ -36,6 +36,8 @@ USUAL = {
     "plugins": "--plugin",
     "rounds": "--rounds --repeats",
 }
+#: Arguments that may be names or paths.
+PATHS = ("plugins", "sets")
 #: The options that messages name.
 NAMES = {name: spelling.split()[0] for name, spelling in USUAL.items()}
 #: A call of the function with the arguments of the command line; `call(x=1)` makes it.
@@ -139,6 +141,8 @@ def _option_of(
     metavar = next((word for word in spelled if not word.startswith("-")), None)
     kind = _kind(argument)
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
+    if _is_split(argument):
+        repeatable = " Comma-separated."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if kind in (int, float) and argument.range is not None:
         more |= {"min": argument.range.least, "max": argument.range.most}
@@ -151,6 +155,11 @@ def _option_of(
     whole = list[kind] if is_list else kind if default is not None else kind | None  # type: ignore[valid-type]
     info = typer.Option(*(flags or [_option(argument.name)]), **more)
     return Annotated[whole, info if named else typer.Argument(**more)], default
+
+
+def _is_split(argument: Argument) -> bool:
+    """Whether commas separate its values; they may be part of paths."""
+    return argument.many and argument.name not in PATHS and _kind(argument) is not Path
 
 
 def _is_single(argument: Argument) -> bool:
@@ -176,7 +185,7 @@ def _value(argument: Argument, given: Any) -> Any:
         return given
     if _is_mapping(argument):
         return assignments(given)
-    items = given if _kind(argument) is Path else split(list(given))
+    items = split(list(given)) if _is_split(argument) else given
     return items or argument.default
 
 

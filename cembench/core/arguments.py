@@ -16,8 +16,11 @@ from functools import cache, wraps
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
-from cembench.core.errors import ParameterError, Setting
+from cembench.core.errors import ParameterError
+from cembench.core.wording import Setting
 
+#: The head of a section of a docstring.
+_SECTION = re.compile(r"\n\n\w[\w ]*\n-+\n")
 P = ParamSpec("P")
 R = TypeVar("R")
 
@@ -128,7 +131,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 def summary_of(function: Callable[..., Any]) -> str:
     """Return the text of a docstring above its first section."""
-    return re.split(r"\n\n\w[\w ]*\n-+\n", inspect.getdoc(function) or "")[0].strip()
+    return _SECTION.split(inspect.getdoc(function) or "")[0].strip()
 
 
 class _Names(dict[str, Any]):

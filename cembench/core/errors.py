@@ -6,43 +6,12 @@ does so as Python does (``rounds=6``) and, on the command line, as an option (``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from string import Formatter
-from typing import Any, Self
+from typing import TYPE_CHECKING, Self
 
+from cembench.core import wording
 
-@dataclass(frozen=True)
-class Setting:
-    """An argument in a message: its name and, unless empty, its value as Python writes it."""
-
-    name: str
-    value: str = ""
-
-    def in_python(self) -> str:
-        """Return it as an argument of a call."""
-        return f"{self.name}={self.value}" if self.value else f"`{self.name}`"
-
-    def in_shell(self, options: Mapping[str, str]) -> str:
-        """Return it as an option; `options` names those that do not follow from the argument."""
-        option = options.get(self.name, f"--{self.name.replace('_', '-')}")
-        value = self.value.strip("'\"")
-        return option if value in ("", "True") else f"{option} {value}".strip()
-
-
-class _Sentence(Formatter):
-    """Formats a message; a field without a value is a :class:`Setting`, its format the value."""
-
-    def __init__(self, word: Callable[[Setting], str]) -> None:
-        self.word = word
-
-    def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
-        return kwargs.get(str(key), Setting(str(key)))
-
-    def format_field(self, value: Any, format_spec: str) -> str:
-        if not isinstance(value, Setting):
-            return str(super().format_field(value, format_spec))
-        return self.word(Setting(value.name, format_spec) if format_spec else value)
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 
 class CembenchError(Exception):
@@ -88,7 +57,7 @@ class CembenchError(Exception):
         'a.obj: leave out --uv disk'
 
         """
-        error = cls(_Sentence(Setting.in_python).vformat(template, (), values))
+        error = cls(wording.in_python(template, values))
         error._template = (template, values)
         return error
 
@@ -96,8 +65,7 @@ class CembenchError(Exception):
         """Name arguments as options in the message; `options` has the names that are irregular."""
         if self._template is not None:
             template, values = self._template
-            said = _Sentence(lambda one: one.in_shell(options)).vformat(template, (), values)
-            self.args, self._template = (said,), None
+            self.args, self._template = (wording.in_shell(template, values, options),), None
 
 
 class MeshError(CembenchError):

@@ -67,6 +67,10 @@ class Run:
     ----------
     folder : Path
         Folder with the records and maps.
+    asked : tuple of Record
+        The records of the cells that were asked for, in their order.
+    plan : Plan, optional
+        What was planned: the cells, and what each is expected to cost.
 
     Examples
     --------
@@ -78,9 +82,7 @@ class Run:
     """
 
     folder: Path
-    #: The records of the cells that were asked for, in their order.
     asked: tuple[Record, ...] = field(default=(), compare=False, repr=False)
-    #: What was planned: the cells, and what each is expected to cost.
     plan: Plan | None = field(default=None, compare=False, repr=False)
 
     def records(self) -> list[Record]:
@@ -290,9 +292,9 @@ def benchmark(
     max_rounds : int
         Maximum number of rounds with `precision`.
     budget : float or str, optional
-        Time of the run, in seconds or as 30m. While it lasts cells get rounds, the cheapest their
-        first 7 before others; each has one. auto: 105s for the profile quick, 1h for standard, 4h
-        for paper, else 30m. None in Python: no limit.
+        Time of the run, e.g. 30m; in Python also seconds. While it lasts cells get rounds, the
+        cheapest their first 7 before others; each has one. auto: 105s for the profile quick, 1h for
+        standard, 4h for paper, else 30m. None in Python: no limit.
     pairing : {"auto", "separate", "process"}
         Besides a process for each cell, a round may have one that the algorithms of a surface
         share, where processes differ more than calls (process). auto: where this machine's scatter

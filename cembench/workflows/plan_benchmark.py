@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cembench.core.errors import MeshError, ParameterError, Setting
+from cembench.core.errors import MeshError, ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import Reporter
+from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record

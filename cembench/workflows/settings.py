@@ -13,8 +13,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from cembench.core.arguments import Range
-from cembench.core.errors import ParameterError, Setting
+from cembench.core.errors import ParameterError
 from cembench.core.reporter import SILENT, Reporter
+from cembench.core.wording import Setting
 
 if TYPE_CHECKING:
     from cembench.registry import Registry

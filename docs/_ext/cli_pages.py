@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from enum import Enum
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args, get_origin
 
 import typer
 
@@ -89,6 +89,9 @@ def _type(one: Any) -> str:
     parts = [part for part in (*get_args(kind), kind) if isinstance(part, type)]
     if kind is None:
         return str(one.type.name).upper()
+    literal = next((k for k in (kind, *get_args(kind)) if get_origin(k) is Literal), None)
+    if literal is not None:
+        return "|".join(get_args(literal))
     if issubclass(parts[0], Enum):
         return "|".join(str(choice.value) for choice in parts[0])
     names = {int: "INTEGER", float: "NUMBER", Path: "PATH"}

@@ -219,3 +219,11 @@ def test_ctrl_c_while_the_command_line_is_loaded_ends_with_a_line(monkeypatch, c
         main()
     assert stopped.value.code == 130
     assert capsys.readouterr().err == "Stopped.\n"
+
+
+def test_a_comma_is_part_of_a_plug_in_s_path(cli, cap):
+    cli.folder.joinpath("a,b.py").write_text("")
+    assert cli("map", cap, "--plugin", "a,b.py", "-q")[2].count("'a'") == 0
+    code, _, err = cli("run", "--set", "no,where", "-a", "cem", "--dry-run")
+    assert code == 2
+    assert "'no,where'" in err
