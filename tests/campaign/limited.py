@@ -37,8 +37,9 @@ class Limits:
     """What one case may take."""
 
     cpu_seconds: int = 10
-    #: See :func:`cembench.running.process.limit_memory`; None for no limit.
-    memory_bytes: int | None = 3 * 2**30
+    #: For :func:`cembench.running.process.limit_memory`, which lets 3.25 GiB of this be reserved,
+    #: 3 of them beyond what the process has when it is forked; None for no limit.
+    memory_bytes: int | None = 3 * 2**29
 
 
 @dataclass(frozen=True)
