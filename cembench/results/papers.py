@@ -57,7 +57,7 @@ class _Part(BaseModel):
     @classmethod
     def _known(cls, given: Any) -> Any:
         for name in given if isinstance(given, dict) else ():
-            if name not in cls.model_fields:
+            if name not in cls.model_fields and cls.model_config["extra"] == "forbid":
                 raise ValueError(_unknown(name, cls.model_fields))
         return given
 
