@@ -75,7 +75,7 @@ BUDGETS = {
     "drawing": 1_750,
     "report": 7_950,
     "validation": 2_400,
-    "workflows": 6_100,
+    "workflows": 6_000,
     "commands": 4_100,
 }
 
