@@ -410,7 +410,7 @@ def benchmark(
         seed,
         reference=reference or REFERENCE,
         most_rounds=max_rounds,
-        budget=_usual_budget(profile)
+        budget=usual_budget(profile)
         if budget == "auto"
         else None
         if budget is None
@@ -466,7 +466,7 @@ def benchmark(
     return Run(folder, tuple(records), plan)
 
 
-def _usual_budget(profile: str | None) -> float:
+def usual_budget(profile: str | None) -> float:
     """Return the seconds after which cells get no more rounds: those of the profile, if any."""
     from cembench.results.papers import usual_paper
     from cembench.running.options import USUAL_BUDGET

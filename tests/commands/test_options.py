@@ -7,8 +7,8 @@ import pytest
 import typer
 
 from cembench.commands.cli import app
-from cembench.commands.options import budget_seconds
 from cembench.results.profiles import Profile
+from cembench.workflows.benchmark import usual_budget
 
 SMALL = ("--surfaces", "flat-disk", "--faces", 100, "-a", "cem", "--dry-run")
 
@@ -71,9 +71,7 @@ def test_what_is_out_of_range_is_refused(cli, option):
 
 
 def test_a_profile_has_the_time_that_its_paper_gives_it():
-    given = [budget_seconds(None, profile) for profile in (*Profile, None)]
-    assert given == [105, 3600, 14_400, 1800]
-    assert budget_seconds("2m", Profile.quick) == 120
+    assert [usual_budget(profile) for profile in (*Profile, None)] == [105, 3600, 14_400, 1800]
 
 
 def test_rounds_are_fixed_or_until_precise_but_not_both(cli):

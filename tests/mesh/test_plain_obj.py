@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
-from fuzz.mutations import mutate
 
 from cembench import MeshError
 from cembench.mesh.files import read_soup
 from cembench.mesh.formats import obj
 from cembench.mesh.soup import Soup
+from tests.campaign.mutations import mutate
 
 NUMBERS = (
     *("0", "-0.0", "+1", ".5", "1.", "1e400", "-1e-400", "1e5", "1E+05", "1-2", "e5", "1.2.3"),
