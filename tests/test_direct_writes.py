@@ -17,7 +17,8 @@ ALLOWED = {
     "cembench/core/folders.py:publish": "moves files that were flushed and checked as drafts",
     "cembench/workflows/morphing/writers.py:write_meshes": "moves checked drafts",
     "cembench/results/samples.py:append_line": "a journal grows by a line; a cut one is dropped",
-    "cembench/running/local.py": "between processes, in the scratch folder",
+    "cembench/running/launcher.py": "between processes, in the scratch folder",
+    "cembench/running/timing.py": "between processes, in the scratch folder",
     "cembench/running/external/exchange.py:write_input": "a program's own folder, temporary",
     "cembench/running/external/call.py:_ended": "what a program prints, in a temporary folder",
     "algorithms/peers/blender_unwrap.py:main": "a program's own folder, temporary",
@@ -41,7 +42,7 @@ OPEN_FILES = {"file", "buffer"}
 #: Functions and objects of ours that have such names and write through `atomic`, or not at all.
 OURS, OUR_OBJECTS = (
     ("write_bytes", "write_text", "write_html", "move"),
-    ("store", "self", "into", "self.store"),
+    ("store", "self", "into", "self.store", "self.recorder"),
 )
 
 

@@ -67,18 +67,18 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
-    "core": 1_750,
+    "core": 2_100,
     "mesh": 5_900,
-    "linear_algebra": 1_450,
+    "linear_algebra": 1_500,
     "conformal": 5_350,
-    "registry": 870,
-    "results": 4_000,
-    "running": 7_210,
+    "registry": 900,
+    "results": 4_150,
+    "running": 7_150,
     "drawing": 1_750,
-    "report": 7_970,
-    "validation": 2_400,
-    "workflows": 6_100,
-    "commands": 4_000,
+    "report": 7_800,
+    "validation": 2_250,
+    "workflows": 7_000,
+    "commands": 3_200,
 }
 
 
