@@ -52,7 +52,9 @@ def results_table(evidence: Evidence) -> Section:
         table = declared_table(evidence, "results", keys=keys)
         assert table is not None, "a policy has records"
         title = f"solves: {policy}" if len(evidence.policies) > 1 else ""
-        items.append(replace(table, title=title))
+        # In the order asked for; the status, which is last, has the key.
+        rows = tuple(sorted(table.rows, key=lambda row: keys.index(row[-1].record)))
+        items.append(replace(table, title=title, rows=rows))
     items += map(Text, evidence.machines.explained())
     noted = [x.neighbours for r in evidence.records for x in r.outcome.rounds if x.neighbours]
     busy = sum(neighbours.busy for neighbours in noted)

@@ -18,15 +18,18 @@ def shown(item, width=40):
     return [line.rstrip() for line in console.export_text().splitlines()]
 
 
-def test_names_are_shortened_figures_stand_right_and_long_texts_are_broken():
+def test_names_are_shortened_and_figures_stand_right():
+    table = Table.of("t", "", [NAME, Column("n")], [["a-very-long-name", 1], ["b", 23]])
+    assert shown(table, 12) == ["surface    n", "a-very-l…  1", "b         23"]
+
+
+def test_beside_long_texts_names_are_broken_and_not_shortened():
     long = "one two three four five six seven eight"
     columns = [NAME, Column("n"), Column("said", numeric=False)]
-    table = Table.of("t", "", columns, [["a-very-long-name", 1, long], ["b", 23, "x"]])
-    head, first, *rest = shown(table, 36)
-    assert head.split() == ["surface", "n", "said"]
-    assert first.startswith("a-very-long…  1 one two")
-    assert rest[-1].startswith("b            23 x")
-    assert all(len(line) <= 36 for line in [head, first, *rest])
+    lines = shown(Table.of("t", "", columns, [["a-very-long-name", 1, long]]), 30)
+    assert all(len(line) <= 30 for line in lines)
+    assert "".join(line.split()[0] for line in lines[1:3]) == "a-very-long-name"
+    assert " ".join(line[10:] for line in lines[1:]).split()[-1] == "eight"
 
 
 def test_without_headings_there_is_no_line_of_them():
@@ -87,7 +90,7 @@ def test_a_folded_table_has_the_columns_of_a_group_below_each_other():
 def test_a_section_has_its_title_above_and_lines_between_its_tables():
     table = Table.of("t", "Table", [Column("", numeric=False)], [["a"]])
     section = Section("s", "Section", (Text("Before."), table, table))
-    assert shown(section) == ["Section", "Before.", "", "Table", "a", "", "Table", "a"]
+    assert shown(section) == ["Section", "  Before.", "", "Table", "a", "", "Table", "a"]
 
 
 def test_no_other_code_makes_a_table():

@@ -177,7 +177,7 @@ def _grid(table: Table, widths: Sequence[int], gap: int) -> Grid:
     above = ""
     for row in table.rows:
         lines = [Line(value.text, STYLES[value.tone]) for value in row]
-        if headed and row[0].text == above:
+        if headed and not table.columns[0].numeric and row[0].text == above:
             lines[0] = Line()
         above = row[0].text
         grid.add_row(*lines)
