@@ -142,6 +142,10 @@ class Shown(Reporter):
         """Print a remark."""
         note(text)
 
+    def warn(self, text: str) -> None:
+        """Print a warning."""
+        warn(text)
+
     def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
         """Show a bar for each download on a terminal."""
         from cembench.commands.fetch import bars

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 
 class Reporter:
-    """Receives what a function is doing; this one ignores it, the command line shows it."""
+    """Receives what a function is doing; this one ignores all but warnings, the command line
+    shows it.
+    """
 
     @property
     def command(self) -> str:
@@ -24,6 +27,10 @@ class Reporter:
 
     def note(self, text: str) -> None:
         """Show a remark."""
+
+    def warn(self, text: str) -> None:
+        """Warn of a risk, also where remarks are ignored."""
+        warnings.warn(text, stacklevel=3)
 
     def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
         """Show downloads during a block, which gets a function of a dataset to its progress."""

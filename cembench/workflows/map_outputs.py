@@ -92,7 +92,7 @@ def check_extras(
     check_file_options(meshes, file_options)
     if file_options.textured and None in outputs:
         raise ParameterError.about(
-            "{checker} and {bake} need a file for the texture: add {output}."
+            "{checker} and {bake} need a file that uses the texture: add {output}."
         )
     if len(set(outputs)) < len(outputs) and outputs[0] and file_options.place != "unit":
         raise ParameterError.about("surfaces in one file share the unit square: leave out {uv}.")

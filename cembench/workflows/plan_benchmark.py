@@ -137,7 +137,7 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
     where = parse_cluster(cluster)
     require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
     if where.is_open:
-        reporter.note(
+        reporter.warn(
             f"{where.address} asks nobody who they are: whoever reaches it runs programs as the "
             "users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off it."
         )

@@ -318,7 +318,7 @@ def _folded_by_rounding(
     if not count:
         return ()
     precision = "single precision" if single else "the unit square"
-    remedy = "write OBJ, VTP or NPZ" if single else "the placement 'disk' keeps the map as it is"
+    remedy = "write OBJ, VTP or NPZ" if single else "uv='disk' (--uv disk) keeps the map as it is"
     told = (
         f"{count} of {len(F)} triangles are so small in the map that rounding to {precision} folds "
         f"or flattens them; {remedy}"
