@@ -1,19 +1,15 @@
-"""How many disks end in a valid map by each tool, and at what cost. Fills a table of a page.
-
-Every surface below the folders that is a disk is mapped once, without a clock::
-
-    python -m benchmarks.last_resort FOLDER... [--faces 150000]
-"""
+"""How many disks end in a valid map by each tool, and at what cost."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
-import pandas as pd
+import numpy as np
 
-from benchmarks.pages import ROOT, fill
+from benchmarks.measuring import progress
+from benchmarks.pages import Section, Table
 from cembench.conformal.metrics import angle_errors, flipped_triangles, is_disk_map
 from cembench.conformal.planar import turns
 from cembench.core.errors import AlgorithmFailed, MeshError
@@ -21,41 +17,32 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 
-PAGE = ROOT / "docs/algorithms.md"
 TOOLS = ("direct-cem", "bff", "cetm-flips")
 SUFFIXES = (".npz", ".obj", ".ply", ".off")
+LAYOUT = """
+| algorithm | disks | failed | folded | last resort | valid \
+| angle error, times the folded map's: median | worst |
+|---|---:|---:|---:|---:|---:|---:|---:|
+| {algorithm} | {disks} | {failed} | {folded} | {resort} | {valid} | {median:.3f} | {worst:.2f} |"""
 
 
-def main() -> None:
-    """Map every disk by every tool, and write the shares that are valid."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folders", type=Path, nargs="+", help="folders with meshes")
-    parser.add_argument("--faces", type=int, default=150_000, help="most triangles of a disk")
-    chosen = parser.parse_args()
-    disks = list(disks_below(chosen.folders, chosen.faces))
-    outcomes = pd.DataFrame([outcome(mesh, name) for mesh in disks for name in TOOLS])
-    by_tool = outcomes.groupby("algorithm", sort=False)
-    titles = (
-        "algorithm",
-        "disks",
-        "failed",
-        "folded",
-        "last resort",
-        "valid",
-        "angle error, times the folded map's: median",
-        "worst",
-    )
-    lines = [f"| {' | '.join(titles)} |", f"|---{'|---:' * (len(titles) - 1)}|"]
-    lines += [f"| {name} | {' | '.join(cells(rows))} |" for name, rows in by_tool]
+def last_resort(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
+    """Count the disks that end in a valid map by each tool, and what that cost in angles.
+
+    Every surface below the folders that is a disk of at most so many triangles is mapped once.
+    """
+    disks = list(disks_below(folders, faces))
+    outcomes = [[outcome(mesh, name) for name in TOOLS] for mesh in progress(disks)]
+    rows = [row(name, [one[k] for one in outcomes]) for k, name in enumerate(TOOLS)]
     note = (
-        f"{len(disks)} disks of up to {chosen.faces:,} triangles. Failed and folded: the method's "
-        "own maps. Last resort: arcs widened, or the surface's mean value weights, on those and on "
+        f"{len(disks)} disks of up to {faces:,} triangles. Failed and folded: the method's own "
+        "maps. Last resort: arcs widened, or the surface's mean value weights, on those and on "
         "crowded maps."
     )
-    fill(PAGE, Path(__file__).stem, "\n".join([*lines, "", note]))
+    return Section([Table(rows, LAYOUT), note], "docs/algorithms.md")
 
 
-def disks_below(folders: list[Path], faces: int) -> Iterator[DiskMesh]:
+def disks_below(folders: Sequence[Path], faces: int) -> Iterator[DiskMesh]:
     """Give the disks in these folders that have no more than so many triangles."""
     for path in sorted(p for folder in folders for p in folder.rglob("*") if p.suffix in SUFFIXES):
         try:
@@ -66,17 +53,16 @@ def disks_below(folders: list[Path], faces: int) -> Iterator[DiskMesh]:
             yield mesh
 
 
-def outcome(mesh: DiskMesh, name: str) -> dict[str, object]:
+def outcome(mesh: DiskMesh, name: str) -> dict[str, Any]:
     """Map a disk, and return what happened to the method's own map and how the map ended."""
     algorithm = load_registry().algorithm(name)
     try:
         made = algorithm.function(mesh.fresh(), **algorithm.arguments({}))
     except AlgorithmFailed:
-        return {"algorithm": name, "failed": True, "valid": False, "folded": False, "resort": False}
+        return {"failed": True, "valid": False, "folded": False, "resort": False, "cost": None}
     uv, extras = made.uv, made.extras
     before = extras.get("before_repair", {}).get("angle_error_mean_deg")
     return {
-        "algorithm": name,
         "failed": "failure" in extras,
         "folded": extras["folded_before_repair"] > 0,
         "resort": "last_resort" in extras,
@@ -87,12 +73,12 @@ def outcome(mesh: DiskMesh, name: str) -> dict[str, object]:
     }
 
 
-def cells(rows: pd.DataFrame) -> list[str]:
-    """Return the cells of an algorithm's row."""
-    counts = [str(int(rows[name].sum())) for name in ("failed", "folded", "resort", "valid")]
-    cost = rows["cost"].dropna()
-    return [str(len(rows)), *counts, f"{cost.median():.3f}", f"{cost.max():.2f}"]
-
-
-if __name__ == "__main__":
-    main()
+def row(name: str, outcomes: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Return an algorithm's row: counts, and the median and largest cost in angles."""
+    counts = {
+        what: sum(bool(one[what]) for one in outcomes)
+        for what in ("failed", "folded", "resort", "valid")
+    }
+    costs = [one["cost"] for one in outcomes if one["cost"] is not None] or [np.nan]
+    about = {"algorithm": name, "disks": len(outcomes)}
+    return about | counts | {"median": float(np.median(costs)), "worst": max(costs)}

@@ -90,7 +90,7 @@ def peers(
     lacking = {a.name: why for a in chosen if (why := missing(a))}
     measured = call(
         [*mesh, *(split(surfaces) or ([] if mesh or given["mesh_dir"] else USUAL))],
-        [a.name for a in chosen if a.name not in lacking],
+        algorithms=[a.name for a in chosen if a.name not in lacking],
         faces=faces,
         plugins=plugins,
         rounds=rounds,

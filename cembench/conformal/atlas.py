@@ -124,12 +124,12 @@ def _atlas(figures: MapFigures) -> AtlasFigures:
 #: The metrics that only an atlas has.
 ATLAS_METRICS: tuple[Metric, ...] = (
     Metric(
-        "islands", "islands", "islands", "", "d", "d",
+        "islands", "islands", "islands", "", ".0f", ".0f",
         "connected parts of the image",
         lambda f: _atlas(f).cut.islands, better=None,
     ),
     Metric(
-        "mirrored_islands", "mirrored islands", "mirrored", "", "d", "d",
+        "mirrored_islands", "mirrored islands", "mirrored", "", ".0f", ".0f",
         "islands whose orientation is opposite to that of the surface",
         lambda f: _atlas(f).cut.mirrored,
     ),
@@ -139,7 +139,7 @@ ATLAS_METRICS: tuple[Metric, ...] = (
         lambda f: _atlas(f).cut.seam_length,
     ),
     Metric(
-        "folds_of_worst_island", "folds of the worst island", "worst", "", "d", "d",
+        "folds_of_worst_island", "folds of the worst island", "worst", "", ".0f", ".0f",
         "number of folded triangles in the island that has the most",
         lambda f: int(_atlas(f).folds.max()),
     ),

@@ -122,9 +122,9 @@ def valid_map(
         if own is not None and folded:
             extras["before_repair"] = before = figures(mesh, own, folded)
             extras["fold_repairs"] = _offer_patches(choice, own, folded)
-            if choice.cost > (0, False, (1 + CHEAP) * before["angle_error_mean_deg"]):
+            if not choice.reaches((1 + CHEAP) * before["angle_error_mean_deg"]):
                 _offer_convex_maps(choice, own)
-        if own is None or crowded or (folded and choice.cost > (0, False, BAD)):
+        if own is None or crowded or (folded and not choice.reaches(BAD)):
             _offer_mean_value_maps(choice, own)
         extras["fold_repairs"] += choice.solves
         b = mesh.boundary
@@ -141,12 +141,13 @@ class _Choice:
     """The best map offered: fewest folds, E_C in bounds, then least mean angle error.
 
     E_C is in bounds up to a multiple of that of the algorithm's own map
-    (:data:`cembench.conformal.fold_repair.MOST_COST`).
+    (:data:`cembench.conformal.fold_repair.MOST_COST`). It says nothing of maps with angle errors
+    above :data:`BAD`, which come last.
     """
 
     def __init__(self, mesh: DiskMesh, own: Complex | None) -> None:
         self.mesh = mesh
-        self.cost, self.most_energy = (mesh.m + 1, True, np.inf), np.inf
+        self.cost, self.most_energy = (mesh.m + 1, True, True, np.inf), np.inf
         #: Number of vertices of the best map that have the surface's weights; solves in all.
         self.by_means = self.solves = 0
         if own is not None:
@@ -158,10 +159,16 @@ class _Choice:
         """Keep a map if it is better."""
         folds = flipped_triangles(self.mesh, z)
         new = figures(self.mesh, z, folds)
-        above = new["conformal_energy"] > self.most_energy
-        cost = (folds, above, new["angle_error_mean_deg"])
+        bad = new["angle_error_mean_deg"] > BAD
+        above = not bad and new["conformal_energy"] > self.most_energy
+        cost = (folds, bad, above, new["angle_error_mean_deg"])
         if cost < self.cost:
             self.z, self.cost, self.by_means = z, cost, by_means
+
+    def reaches(self, angle: float) -> bool:
+        """Whether the best map has no folds, E_C in bounds, and at most this mean angle error."""
+        folds, _, above, error = self.cost
+        return not folds and not above and error <= angle
 
     def offer_means(self, z: Complex, surface: Mask, W: scipy.sparse.csr_array) -> None:
         """Offer the map with the boundary of `z` and positive weights.

@@ -183,6 +183,11 @@ def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
     return max((circle.circularity for circle in boundary_circles(mesh, uv)), default=0.0)
 
 
+def surface_areas(mesh: TriangleMesh) -> Real:
+    """Return the area of each triangle of the surface, shape (m,)."""
+    return corner_products(mesh.V, mesh.F)[1] / 2
+
+
 def is_disk_map(mesh: TriangleMesh, uv: Complex) -> bool:
     """Whether the outer boundary lies on the unit circle, within :data:`NEAR_CIRCLE`."""
     if not mesh.loops:
@@ -388,7 +393,7 @@ METRICS: tuple[Metric, ...] = (
         lambda f: float(f.angle_errors.std()), shown="overview",
     ),
     Metric(
-        "flipped_triangles", "folded triangles", "folds", "", "d", "d",
+        "flipped_triangles", "folded triangles", "folds", "", ".0f", ".0f",
         "number of triangles whose image has no positive area",
         lambda f: flipped_triangles(f.mesh, f.uv), shown="overview",
     ),

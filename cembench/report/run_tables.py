@@ -201,13 +201,15 @@ def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
     facts, outcome = record.mesh, record.outcome
     size = f"{facts.vertices:,} vertices, {facts.faces:,} triangles"
     yield "surface", f"{record.cell.mesh}: {size}"
+    if facts.paper_row:
+        yield "in the paper", _printed(record)
     yield "algorithm", f"{record.title} ({record.target})"
     if outcome.metrics.get("angle_error_mean_deg") is not None:
         angles, folds = (outcome.metrics[n] for n in ("angle_error_mean_deg", "flipped_triangles"))
         shown = f"{angles:.2f} degrees mean angle error, {folds} folds"
         yield "quality", f"{shown}; -v prints all figures"
     if outcome.median_seconds is not None:
-        yield "seconds", f"{outcome.median_seconds:.3f}"
+        yield "seconds", seconds_words(record) or f"{outcome.median_seconds:.3f}"
     if outcome.folded_before_repair:
         yield "folded before repair", str(outcome.folded_before_repair)
     yield from (("note", str(note)) for note in outcome.notes)

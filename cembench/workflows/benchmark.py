@@ -13,9 +13,6 @@ from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
 from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
-from cembench.running.options import Options
-from cembench.running.surfaces import SurfaceInput
-from cembench.running.watcher import Watcher
 from cembench.workflows.notebook import html_table
 from cembench.workflows.settings import (
     AnyPath,
@@ -377,6 +374,7 @@ def benchmark(
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
     from cembench.running.external.present import missing
+    from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
     from cembench.workflows.plan_benchmark import (
         Plan,

@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cembench.core.arguments import Range, checked
 from cembench.core.reporter import SILENT, Reporter
 from cembench.results.intervals import DEFAULT_ROUNDS
-from cembench.running.options import Options
-from cembench.running.surfaces import SurfaceInput
 from cembench.workflows.settings import MOST_FACES, AnyPath, Rounds, Timeout
 
 if TYPE_CHECKING:
@@ -100,6 +98,7 @@ def validate(
     """
     from cembench.core import extras, folders
     from cembench.results.profiles import Profile, surfaces_of
+    from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, distribute_parameters, plan_cells
     from cembench.validation.examine import ValidationHooks, ValidationOptions, examine
     from cembench.validation.requirement import Requirement

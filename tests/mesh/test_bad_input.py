@@ -100,7 +100,7 @@ def test_bad_usage(arguments, message, cli, tmp_path):
 
 def test_run_needs_something_to_run_on(cli):
     code, _, err = cli("run")
-    assert (code, "no surface to run on" in err) == (2, True)
+    assert (code, "there is no surface to measure on" in err) == (2, True)
 
 
 def test_two_surfaces_of_one_name(cli, tmp_path):
@@ -134,8 +134,9 @@ def test_a_folder_of_meshes_leaves_nothing_out_in_silence(cli, tmp_path):
         (lambda: odd.write_bytes(b"ply\nformat"), "no faces"),
     ):
         make()
-        code, _, err = cli("run", "--mesh-dir", tmp_path / "meshes", "-a", "cem", "--dry-run")
-        assert (code, f"{odd}: {message}" in err) == (2, True), err
+        code, out, err = cli("run", "--mesh-dir", tmp_path / "meshes", "-a", "cem", "--dry-run")
+        assert (code, f"odd.obj is left out: {odd}: {message}" in err) == (0, True), err
+        assert "good" in out
         odd.rmdir() if odd.is_dir() else odd.unlink()
     assert cli("run", "--mesh-dir", tmp_path / "meshes", "-a", "cem", "--dry-run")[0] == 0
 
