@@ -138,8 +138,9 @@ def _option_of(
     """Return the annotation and the default of an argument for the command-line library."""
     spelled = spelling.split()
     flags = [word for word in spelled if word.startswith("-")]
-    metavar = next((word for word in spelled if not word.startswith("-")), None)
     kind = _kind(argument)
+    usual = {Path: "PATH", str: "NAME"}.get(kind) if argument.many else None
+    metavar = next((word for word in spelled if not word.startswith("-")), usual)
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
     if _is_split(argument):
         repeatable = " Comma-separated."

@@ -262,9 +262,9 @@ def benchmark(
         which are fetched.
     algorithms : sequence of str, optional
         Names of algorithms (see :func:`cembench.list_algorithms`), or all. Default: the usual ones,
-        or the paper's four for the profile quick.
+        or the paper's own for the profile quick.
     profile : {"quick", "standard", "paper"}, optional
-        The paper's models: the 8 smallest, those up to 210 k faces, or all 20.
+        The paper's models: the smallest, those up to a number of faces, or all.
     mesh_dir : sequence of paths
         All mesh files in a folder but NPZ; those that cannot be used are left out.
     sets : sequence of str
