@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from cembench.linear_algebra.backends import default_backend
 from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
 from cembench.running.launcher import Launcher
@@ -43,7 +44,9 @@ def _servers():
 
 @pytest.fixture
 def one_server(_servers, monkeypatch):
-    """Fork checks, too, and all from one server."""
+    """Fork checks, too, and all from one server, started before a test limits its process."""
+    if can_fork(1):
+        _servers.of(for_measuring(1), default_backend())
     write, started = Launcher._write, Launcher._started
 
     def fork(self, job, limits, log):

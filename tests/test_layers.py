@@ -73,7 +73,7 @@ BUDGETS = {
     "conformal": 5_350,
     "registry": 900,
     "results": 4_150,
-    "running": 7_150,
+    "running": 7_250,
     "drawing": 1_750,
     "report": 7_800,
     "validation": 2_250,

@@ -108,7 +108,8 @@ def map_files(
     threads : int
         Threads of the numerical libraries.
     timeout : float
-        Time limit of a call, in seconds.
+        Time limit of a call, in seconds; 600 only if the call has a process of its own, as it has
+        with another limit, a plug-in, several threads or a large surface.
     memory_bytes : int or str, optional
         Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
     reporter : Reporter
@@ -201,4 +202,8 @@ def map_files(
         files = with_pictures(files, overwrite=overwrite)
     for folder in {path.parent for path in written}:
         folder.mkdir(exist_ok=True)
-    return Maps(files, options, file_options, extras, together, reporter, keep_invalid=keep_invalid)
+    return Maps(
+        *(files, options, file_options, extras, together, reporter),
+        keep_invalid=keep_invalid,
+        apart=timeout != Options.timeout or memory_bytes is not None,
+    )

@@ -10,17 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.metrics import caption
-from cembench.conformal.resample import regular_remesh
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
-from cembench.drawing.preview import write_preview
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm
 from cembench.results.records import Record
-from cembench.workflows.geometry_images import check_image_format, write_geometry_image
 from cembench.workflows.settings import Placement
 from cembench.workflows.shells import Shells
 from cembench.workflows.write_maps import FileOptions, check_file_options, save_map
@@ -69,8 +66,12 @@ def write_extras(
     """Write the files; return notices about triangles that rounding folds in the new mesh."""
     told: tuple[Notice, ...] = ()
     if extras.samples is not None:
+        from cembench.workflows.geometry_images import write_geometry_image
+
         write_geometry_image(extras.samples, mesh, z, extras.side)
     if extras.remeshed is not None:
+        from cembench.conformal.resample import regular_remesh
+
         new, new_z = regular_remesh(mesh, z, extras.side)
         told = save_map(extras.remeshed, new, new_z, FileOptions(extras.place))
     if extras.page is not None:
@@ -109,6 +110,8 @@ def check_extras(
     if extras.page is not None and not extras.page.parent.is_dir():
         raise MeshError(f"{extras.page}: there is no folder {extras.page.parent}. Make it first.")
     if extras.samples is not None:
+        from cembench.workflows.geometry_images import check_image_format
+
         check_image_format(extras.samples)
     if extras.remeshed is not None:
         check_writable_format(extras.remeshed, with_uv=True)
@@ -208,12 +211,16 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
 
 def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, record: Record) -> None:
     """Draw a surface and its map as a PNG, with the recorded figures."""
+    from cembench.drawing.preview import write_preview
+
     title = f"{record.cell.mesh}: {record.title}"
     write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
 
 
 def draw_shells(shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path) -> None:
     """Draw the surfaces of a file and their maps, placed as in its UVs, as a PNG."""
+    from cembench.drawing.preview import write_preview
+
     starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
     V = np.concatenate([part.mesh.V for part in shells.parts])
     F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])

@@ -16,6 +16,7 @@ from cembench.drawing.own_pictures import check_replaceable
 from cembench.mesh import datasets
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
+from cembench.running.here import map_here, may_run_here
 from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
@@ -169,6 +170,8 @@ class Maps:
     output: Path | None = None
     reporter: Reporter = SILENT
     keep_invalid: bool = False
+    #: Whether each surface is mapped in a process of its own, which keeps the limits.
+    apart: bool = True
     done: list[Mapped] = field(default_factory=list)
     missing: list[Path] = field(default_factory=list)
 
@@ -219,7 +222,10 @@ class Maps:
     def _mapped(self, file: FileJobs, job: Job) -> Mapped:
         mesh, algorithm = job.surface.mesh, job.task.algorithm
         with self.reporter.busy(f"{algorithm.title} on {mesh.name}, {mesh.m:,} triangles"):
-            record, uv = map_once(job.task, self.options)
+            if self.apart or not may_run_here(job.task):
+                record, uv = map_once(job.task, self.options)
+            else:
+                record, uv = map_here(job.task)
         mapped = Mapped(job.surface, record, uv, {})
         if uv is None or not self.writes(mapped):
             return mapped

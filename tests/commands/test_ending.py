@@ -133,7 +133,7 @@ def test_a_temporary_folder_that_is_full_is_told(tmp_path):
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (2**16, 2**16))
 
-    done = run(["map", "disk.obj", "-a", "cem"], tmp_path, preexec_fn=little)
+    done = run(["map", "disk.obj", "-a", "cem", "--timeout", 60], tmp_path, preexec_fn=little)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
     assert "temporary folder" in done.stderr
@@ -147,7 +147,7 @@ def test_a_temporary_folder_that_is_not_there_is_told(tmp_path):
         "from cembench.commands.cli import main; main()\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", script, "map", "disk.obj"],
+        [sys.executable, "-c", script, "map", "disk.obj", "--timeout", "60"],
         cwd=tmp_path, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 2
