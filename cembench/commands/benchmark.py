@@ -51,7 +51,7 @@ def run(
     declared, named = declared_command(command, program)
     measured = call(
         surfaces=[*mesh, *split(dataset), *split(surfaces)],
-        algorithms=[*(given["algorithms"] or ()), *named] or None,
+        algorithms=[*(given["algorithms"] or ["usual"]), *named],
         plugins=[*given["plugins"], *declared],
         out=output,
         reporter=SHOWN,

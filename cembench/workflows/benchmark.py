@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
     from cembench.report.document import Report
+    from cembench.results.profiles import Profile
     from cembench.results.records import Record
     from cembench.running.surfaces import SurfaceInput
     from cembench.running.watcher import Watcher
@@ -261,8 +262,8 @@ def benchmark(
         ``surface-1``, ``surface-2``, ... Names are those of generated surfaces, or of public ones,
         which are fetched.
     algorithms : sequence of str, optional
-        Names of algorithms (see :func:`cembench.list_algorithms`), or all. Default: the usual ones,
-        or the paper's own for the profile quick.
+        Names of algorithms (see :func:`cembench.list_algorithms`), all, or usual, which is the
+        default: the usual ones, or the paper's own for the profile quick.
     profile : {"quick", "standard", "paper"}, optional
         The paper's models: the smallest, those up to a number of faces, or all.
     mesh_dir : sequence of paths
@@ -386,7 +387,7 @@ def benchmark(
     )
     from cembench.workflows.sets import exhibit_of
 
-    given = list(surfaces)
+    given, models = list(surfaces), Profile(profile) if profile else None
     if out is not None:
         run_folder.check(Path(out))
     check_cluster(cluster, pairing, reporter)
@@ -408,7 +409,7 @@ def benchmark(
         seed,
         reference=reference or REFERENCE,
         most_rounds=max_rounds,
-        budget=usual_budget(profile)
+        budget=usual_budget(models)
         if budget == "auto"
         else None
         if budget is None
@@ -419,13 +420,13 @@ def benchmark(
     )
     library = installed_backend(backend)
     registry = registry_with(plugins, reporter)
-    usual = algorithms_of(Profile(profile), registry) if profile else registry.usual_algorithms
+    usual = algorithms_of(models, registry) if models else registry.usual_algorithms
     chosen = chosen_algorithms(registry, algorithms, usual)
     check_reference(reference, chosen)
     for algorithm in chosen:
         if why := missing(algorithm):
             reporter.note(f"{algorithm.name} is not available: {why}.")
-    given += surfaces_of(Profile(profile), registry) if profile else []
+    given += surfaces_of(models, registry) if models else []
     if not given and not mesh_dir and not sets:
         raise ParameterError.about(
             "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
@@ -464,10 +465,9 @@ def benchmark(
     return Run(folder, tuple(records), plan)
 
 
-def usual_budget(profile: str | None) -> float:
+def usual_budget(profile: Profile | None) -> float:
     """Return the seconds after which cells get no more rounds: those of the profile, if any."""
     from cembench.results.papers import usual_paper
     from cembench.running.options import USUAL_BUDGET
 
-    budgets = {str(name): seconds for name, seconds in usual_paper().profiles.budgets.items()}
-    return budgets.get(profile, USUAL_BUDGET) if profile else USUAL_BUDGET
+    return usual_paper().profiles.budgets.get(profile, USUAL_BUDGET) if profile else USUAL_BUDGET

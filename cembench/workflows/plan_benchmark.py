@@ -246,10 +246,9 @@ def _first_problem(error: str) -> str:
 def chosen_algorithms(
     registry: Registry, algorithms: Sequence[str] | None, usual: Sequence[str]
 ) -> list[Algorithm]:
-    """Return the algorithms of these names: "all" for every one, none for the usual ones."""
-    names = list(algorithms or usual)
-    if names == ["all"]:
-        names = list(registry.algorithms)
+    """Return the algorithms of these names; "all" and "usual" (the default) stand for several."""
+    several = {"all": registry.algorithms, "usual": usual}
+    names = [name for one in algorithms or ("usual",) for name in several.get(one, (one,))]
     return [registry.algorithm(name) for name in dict.fromkeys(names)]
 
 

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from cembench import write_mesh
+from cembench import DiskMesh, write_mesh
 from cembench.mesh.uvs import read_uv
+from cembench.registry import load_registry
 from cembench.running.timing import CellTimer
 
 SCRIPT = Path(__file__).parents[1] / "running/external/misbehaves.py"
@@ -121,3 +122,22 @@ class TimerWithoutForks(CellTimer):
 
     def __init__(self, scratch, options):
         super().__init__(scratch, options, forks=False)
+
+
+@pytest.mark.parametrize(
+    ("words", "others"),
+    [
+        ((), load_registry().usual_algorithms),
+        (("-a", "all"), load_registry().algorithms),
+        (("-a", "cem"), ["cem"]),
+    ],
+)
+def test_run_measures_the_program_beside_the_algorithms_it_would_measure(cli, words, others):
+    program = ("--command", command("good"), "--program", "name=mine")
+    surface = ("--surfaces", "flat-disk", "--faces", 100)
+    code, out, err = cli("run", *surface, *words, *program, "--dry-run", "--json")
+    assert code == 0, err
+    planned = {cell["algorithm"] for cell in json.loads(out)["cells"]}
+    assert "mine" in planned
+    disks = {name for name in others if load_registry().algorithm(name).mesh_type is DiskMesh}
+    assert disks <= planned
