@@ -6,12 +6,6 @@ own are for what is compared, for plug-ins and programs, and where a limit has t
 
 from __future__ import annotations
 
-import signal
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
-from types import FrameType
-
 import numpy as np
 import psutil
 from numpy.typing import NDArray
@@ -42,37 +36,9 @@ def may_run_here(task: Task) -> bool:
 
 
 def map_here(task: Task) -> tuple[Record, NDArray[np.complex128] | None]:
-    """Call once in this process, and keep nothing on disk; see :func:`local.map_once`.
-
-    Raises
-    ------
-    KeyboardInterrupt
-        The user stopped it.
-
-    """
+    """Call once in this process, and keep nothing on disk; see :func:`local.map_once`."""
     started = now()
     load_libraries()
-    with threadpool_limits(limits=1), _interruptible() as stopped:
+    with threadpool_limits(limits=1):
         outcome, uv = check_cell(task.algorithm, task.mesh, task.cell)
-    if stopped:
-        raise KeyboardInterrupt
     return record_of(task, outcome, describe_environment()["id"], started), uv
-
-
-@contextmanager
-def _interruptible() -> Iterator[list[int]]:
-    """Yield a list that Ctrl-C adds to; the call takes the exception for an error of its own."""
-    stopped: list[int] = []
-    if threading.current_thread() is not threading.main_thread():
-        yield stopped  # where signals do not arrive
-        return
-
-    def stop(number: int, frame: FrameType | None) -> None:
-        stopped.append(number)
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGINT, stop)
-    try:
-        yield stopped
-    finally:
-        signal.signal(signal.SIGINT, before)

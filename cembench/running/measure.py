@@ -11,7 +11,10 @@ from __future__ import annotations
 import gc
 import math
 import random
-from collections.abc import Callable, Sequence
+import signal
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
 from time import monotonic
@@ -158,11 +161,46 @@ def check_cell(
     This never raises because of the algorithm: an exception, even one that would end the process,
     becomes a status with its cause. The only round of the outcome is this call, without a warm-up.
     The second value is the map; an invalid one too, if it has the right shape and is finite.
+
+    What a handler of signals raises, such as KeyboardInterrupt for Ctrl-C, is raised.
     """
-    called, uv = call_cell(algorithm, mesh, cell)
+    with _raised_by_signals() as raised:
+        called, uv = call_cell(algorithm, mesh, cell)
+    if raised:
+        raise raised[0]
     if uv is None:
         return called, None
     return judged_check(Promise.of(algorithm), mesh, called, uv), uv
+
+
+@contextmanager
+def _raised_by_signals() -> Iterator[list[BaseException]]:
+    """Yield a list of what handlers of signals raise, which is no fault of the algorithm's."""
+    raised: list[BaseException] = []
+    handlers: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # where signals arrive
+        handlers = {number: signal.getsignal(number) for number in signal.valid_signals()}
+        handlers = {
+            number: _noting(one, raised) for number, one in handlers.items() if callable(one)
+        }
+    before = {number: signal.signal(number, one) for number, one in handlers.items()}
+    try:
+        yield raised
+    finally:
+        for number, one in before.items():
+            if signal.getsignal(number) is handlers[number]:  # else a handler chose another
+                signal.signal(number, one)
+
+
+def _noting(handler: Any, raised: list[BaseException]) -> Callable[[int, Any], Any]:
+    def handle(number: int, frame: Any) -> Any:
+        try:
+            return handler(number, frame)
+        except BaseException as error:
+            raised.append(error)
+            raise
+
+    return handle
 
 
 def call_cell(

@@ -108,8 +108,8 @@ def map_files(
     threads : int
         Threads of the numerical libraries.
     timeout : float
-        Time limit of a call, in seconds; 600 only if the call has a process of its own, as it has
-        with another limit, a plug-in, several threads or a large surface.
+        Time limit of a call, in seconds. The default applies to calls that have their own process:
+        those of plug-ins and programs, on large surfaces, or with several threads.
     memory_bytes : int or str, optional
         Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
     reporter : Reporter

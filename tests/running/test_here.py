@@ -2,6 +2,7 @@
 
 import os
 import signal
+import sys
 import threading
 from dataclasses import replace
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
+import cembench
 from cembench.registry import load_registry
 from cembench.running import here
 from cembench.running.local import map_once
@@ -18,6 +20,11 @@ from cembench.running.plan import MeasurementSettings, plan_cells
 def task_of(spec, faces=500, **settings):
     how = MeasurementSettings(repeats=1, **settings)
     return plan_cells([spec], [hemi_ellipsoid(faces)], {}, how)[0]
+
+
+def parameterized(task):
+    """The same call by the Python API."""
+    return cembench.parameterize(task.mesh, "harmonic-circle")
 
 
 @pytest.mark.parametrize("name", ["direct-cem", "lscm", "circle-packing"])
@@ -41,22 +48,42 @@ def test_what_is_not_ours_large_or_of_several_threads_has_its_own_process(monkey
     assert not here.may_run_here(task)
 
 
+def end(number, frame):
+    """End as the command line does."""
+    sys.exit(128 + number)
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
-def test_ctrl_c_is_no_fault_of_the_algorithm():
-    ours = load_registry().algorithm("harmonic-circle")
-    inside, other = threading.Event(), ours.function
+@pytest.mark.parametrize(
+    ("number", "handler", "raised"),
+    [
+        (signal.SIGINT, signal.default_int_handler, KeyboardInterrupt),
+        (signal.SIGTERM, end, SystemExit),
+    ],
+)
+@pytest.mark.parametrize("call", [here.map_here, parameterized])
+def test_a_signal_is_no_fault_of_the_algorithm(call, number, handler, raised, monkeypatch):
+    spec = load_registry().algorithm("harmonic-circle")
+    inside = threading.Event()
 
     def slow(mesh, **parameters):
         inside.set()
         while True:
-            other(mesh, **parameters)
+            spec.function(mesh, **parameters)
 
-    def press():
+    def send():
         inside.wait()
-        signal.raise_signal(signal.SIGINT)
+        os.kill(os.getpid(), number)
 
-    before = signal.getsignal(signal.SIGINT)
-    threading.Thread(target=press).start()
-    with pytest.raises(KeyboardInterrupt):
-        here.map_here(replace(task_of(ours), algorithm=replace(ours, function=slow)))
-    assert signal.getsignal(signal.SIGINT) is before
+    task = task_of(spec)
+    task = replace(task, algorithm=replace(spec, function=slow))
+    monkeypatch.setattr("cembench.workflows.parameterize.plan_cells", lambda *_: [task])
+    monkeypatch.setattr("cembench.registry.Registry.algorithm", lambda *_: task.algorithm)
+    before = signal.signal(number, handler)
+    try:
+        threading.Thread(target=send).start()
+        with pytest.raises(raised):
+            call(task)
+        assert signal.getsignal(number) is handler
+    finally:
+        signal.signal(number, before)
