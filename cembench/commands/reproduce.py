@@ -100,7 +100,8 @@ def _surfaces(
     """Return a surface for each row: the model if it is there, else its stand-in; and the roles."""
     from cembench.mesh.datasets import is_fetched, surface_file
     from cembench.results.profiles import surfaces_of
-    from cembench.running.plan import gather_surfaces, paper_roles
+    from cembench.running.plan import paper_roles
+    from cembench.workflows.plan_benchmark import read_surfaces
     from cembench.workflows.reproduce import fetch_models, public_models
 
     stand_ins = {registry.surface(s).paper_row: s for s in surfaces_of(Profile.quick, registry)}
@@ -117,7 +118,8 @@ def _surfaces(
     ):
         err.print(f"{kind}: {', '.join(rows) or 'none'}", soft_wrap=True)
     made = _made(registry, names)
-    read, roles = gather_surfaces(registry, algorithms, [*map(surface_file, models.values())], ())
+    files = map(surface_file, models.values())
+    read, roles = read_surfaces(files, (), registry, algorithms, SHOWN, faces=None, repair=False)
     return [*read, *made], roles | paper_roles(registry, names)
 
 

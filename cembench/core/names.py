@@ -62,10 +62,8 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     >>> unknown("metric", "image_aera", ["dirichlet_energy", "image_area"])
     "unknown metric 'image_aera'; known: dirichlet_energy, image_area. Did you mean image_area?"
     """
-    known = sorted(known)
-    near = get_close_matches(name, known) or [one for one in known if one.startswith(name)]
-    asked = f" Did you mean {' or '.join(near)}?" if name and near else ""
-    return f"unknown {kind} {name!r}; known: {', '.join(known) or 'none'}.{asked}"
+    names = ", ".join(known := sorted(known)) or "none"
+    return f"unknown {kind} {name!r}; known: {names}.{did_you_mean(name, known)}"
 
 
 def slug(name: str, longest: int = LONGEST) -> str:

@@ -65,7 +65,7 @@ def results_table(evidence: Evidence) -> Section:
 
 
 def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
-    """Return the speedups of the reference over the others , with their intervals.
+    """Return the speedups of the reference over the others, with their intervals.
 
     Without enough rounds for an interval, each surface has one row. None if there is nothing to
     compare.

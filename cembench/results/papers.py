@@ -199,7 +199,7 @@ class StatedClaim(_Part):
     quote: str
     place: str
     test: str
-    rows: str = "ok & main & chosen & model"
+    rows: str = "ok & main & chosen & model.notna()"
     algorithms: tuple[str, ...] = ()
     per: tuple[str, ...] = ("place", "surface")
     each: Mapping[str, str] = {}

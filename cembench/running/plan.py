@@ -20,7 +20,6 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.papers import paper_of
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.running.sources import hash_of, sources_of
-from cembench.running.surfaces import generate_surface, kinds_of, load_file
 
 
 @dataclass(frozen=True)
@@ -159,26 +158,6 @@ def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFac
         paper_row=standing.paper_row,
         origin=standing.origin,
     )
-
-
-def gather_surfaces(
-    registry: Registry,
-    algorithms: Sequence[Algorithm],
-    files: Sequence[Path],
-    names: Sequence[str],
-    faces: int | None = None,
-    *,
-    mend: bool = False,
-) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
-    """Read these files and generate these surfaces; return them and their roles in the paper.
-
-    With `mend`, the files are repaired first.
-    """
-    kinds = kinds_of(algorithms)
-    meshes = [load_file(path, kinds, repair=mend).mesh for path in files]
-    standing = {mesh.name: paper_role_of(registry, mesh) for mesh in meshes}
-    meshes += [generate_surface(registry, name, faces) for name in dict.fromkeys(names)]
-    return meshes, standing | paper_roles(registry, names)
 
 
 #: Files of this format in a folder are meshes only if named: most hold other arrays.

@@ -94,8 +94,6 @@ def morph(
     from time import perf_counter
 
     from cembench.drawing.camera import viewpoints
-    from cembench.mesh.triangle_mesh import DiskMesh
-    from cembench.running.surfaces import load_surface
     from cembench.workflows.morphing.morph import morph as register_all
     from cembench.workflows.morphing.surfaces_and_films import checked_maps, disk_with_landmarks
 
@@ -105,14 +103,9 @@ def morph(
     meshes: list[DiskMesh] = []
     known: list[Mapping[str, int]] = []
     for surface in surfaces:
-        named: Mapping[str, int] = {}
-        if isinstance(surface, str | os.PathLike):
-            with reporter.busy(f"reading {surface}"):
-                mesh, named = disk_with_landmarks(registry, os.fspath(surface), faces)
-        else:
-            given = load_surface(surface, (DiskMesh,), registry=registry)
-            assert isinstance(given, DiskMesh)
-            mesh = given
+        what = os.fspath(surface) if isinstance(surface, str | os.PathLike) else "a surface"
+        with reporter.busy(f"reading {what}"):
+            mesh, named = disk_with_landmarks(registry, surface, faces)
         for notice in mesh.notices:
             reporter.note(f"{mesh.name}: {notice}")
         meshes.append(mesh)

@@ -51,5 +51,4 @@ def theory(
     from cembench.workflows.theory_facts import RIVAL, theory_facts
 
     mesh = load_surface(surface, (DiskMesh,))
-    assert isinstance(mesh, DiskMesh)
     return theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)

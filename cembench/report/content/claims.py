@@ -57,10 +57,9 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
     """Return the run's frame with what claims need besides.
 
     `policy` is the number of the linear-algebra policy. `chosen` are the records that stand for
-    their algorithm on a surface, whatever the policy; `model` those of the paper's models and
-    `counted` those of one surface for each. `speedup`, `speedup_low` and `verdict` compare with the
-    main parameters of the reference. `below_one` is the share of the corners whose angles change by
-    less than a degree.
+    their algorithm on a surface, whatever the policy. `speedup`, `speedup_low` and `verdict`
+    compare with the main parameters of the reference. `below_one` is the share of the corners whose
+    angles change by less than a degree.
     """
     import pandas as pd
 
@@ -76,8 +75,6 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
             {
                 "policy": evidence.policies.index(record.cell.solves),
                 "chosen": chosen,
-                "model": bool(surface.paper_row),
-                "counted": surface in evidence.one_per_model,
                 "speedup": found.speedup if found else None,
                 "speedup_low": interval.low if interval else None,
                 "verdict": found.verdict if found else None,

@@ -169,8 +169,8 @@ class Evidence:
 
         Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
-        number), `main`, and `ok`; `model` (of the paper), `counted` (not a stand-in for a model
-        that the run has too), `printed` (an algorithm of the paper), and `reference`.
+        number), `main`, and `ok`; `model` (of the paper), `counted` (the one surface for its
+        model), `printed` (an algorithm of the paper), and `reference`.
         """
         series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
         surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
@@ -183,7 +183,7 @@ class Evidence:
             about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
             more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
             more["model"], more["origin"] = surface.paper_row or None, surface.origin
-            more["counted"] = surface not in self.stand_ins_left_out
+            more["counted"] = surface in self.one_per_model
             more["printed"] = own.algorithm in self.paper.algorithms
             more["reference"] = own.algorithm == self.reference
             order = (place, k, self.policies.index(record.cell.solves))

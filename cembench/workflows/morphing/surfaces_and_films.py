@@ -15,7 +15,7 @@ from cembench.registry import Registry
 from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, paper_roles, plan_cells
-from cembench.running.surfaces import is_generated, load_surface
+from cembench.running.surfaces import SurfaceInput, is_generated, load_surface
 from cembench.workflows.morphing import writers
 from cembench.workflows.morphing.drawing import Film, draw_film
 from cembench.workflows.morphing.morph import Morph
@@ -25,9 +25,9 @@ Tell = Callable[[str], object]
 
 
 def disk_with_landmarks(
-    registry: Registry, name: str, faces: int | None = None
+    registry: Registry, surface: SurfaceInput, faces: int | None = None
 ) -> tuple[DiskMesh, Mapping[str, int]]:
-    """Return the disk of a mesh file or a registered name, and its landmarks by name.
+    """Return a disk, and its landmarks by name if it is a registered surface.
 
     Raises
     ------
@@ -35,8 +35,8 @@ def disk_with_landmarks(
         There is no such surface, or it is not a disk.
 
     """
-    mesh = load_surface(name, (DiskMesh,), faces=faces, registry=registry)
-    find = registry.surface(name).landmarks if is_generated(name, registry) else None
+    mesh = load_surface(surface, (DiskMesh,), faces=faces, registry=registry)
+    find = registry.surface(surface).landmarks if is_generated(surface, registry) else None
     return mesh, find(mesh) if find else {}
 
 
