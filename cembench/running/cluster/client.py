@@ -47,6 +47,7 @@ _PATIENCE = 5.0
 #: Seconds without any worker after which a run on this machine's own workers ends: dask restarts
 #: them, but only so often. On other clusters, workers can join at any time.
 LOCAL_PATIENCE = 120.0
+_UNKNOWN_MACHINE = "a machine of the cluster"
 
 
 def run_on_cluster(
@@ -304,7 +305,8 @@ class _ClusterRun:
             self.watcher.shows(f"{machine} has other software: {text}")
 
     def _machine_of(self, worker: str) -> str:
-        return self.machines[worker].machine
+        """Return the name of a worker's machine; a worker may be lost before it is described."""
+        return self.machines[worker].machine if worker in self.machines else _UNKNOWN_MACHINE
 
     def _saved_cells(self) -> str:
         return f"{len(self.recorder.records)} finished cells are in {self.recorder.store.folder}"
@@ -319,6 +321,8 @@ class _ClusterRun:
     def _handle_event(self, assignment: _Assignment, event: Mapping[str, Any]) -> None:
         """Show the progress of a unit."""
         task = assignment.parcel.by_label.get(event.get("cell", ""))
+        if event["worker"] not in self.machines:  # it joined after the last look
+            self._look()
         if event["what"] == "takes":
             self._handle_taken(assignment, event["worker"])
         elif event["what"] == "queues":
@@ -374,7 +378,10 @@ class _ClusterRun:
             assignment.sends_surface = True
             self._submit(assignment, answer.worker)
             return
-        state = self.machines[answer.worker]
+        if answer.worker not in self.machines:
+            self._look()
+        machine = self._machine_of(answer.worker)
+        state = self.machines.setdefault(answer.worker, MachineState(machine=machine))
         state.at = ""
         tasks = {task.cell.key: task for task in assignment.parcel.tasks}
         for content, uv in answer.records:
@@ -397,9 +404,9 @@ class _ClusterRun:
 
     def _give_up(self, assignment: _Assignment) -> None:
         """Record the cells of a unit that ended its workers as failed."""
-        last = assignment.workers[-1] if assignment.workers else None
-        machine = self._machine_of(last) if last else "a machine of the cluster"
-        environment = self.environments[last] if last else self.recorder.environment
+        last = assignment.workers[-1] if assignment.workers else ""
+        machine = self._machine_of(last)
+        environment = self.environments.get(last, self.recorder.environment)
         detail = (
             f"its surface ended {MOST_LOST} workers that measured it, the last on "
             f"{machine}{assignment.during}"

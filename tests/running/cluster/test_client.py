@@ -82,7 +82,12 @@ def test_two_workers_give_the_same_maps_and_statuses_as_one_process(client, tmp_
     assert again.steps == []
 
 
-def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(client, tmp_path):
+@pytest.mark.parametrize("look_every", [module.LOOK_EVERY, 60.0], ids=["looks", "hears-first"])
+def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(
+    client, tmp_path, monkeypatch, look_every
+):
+    """A restarted worker may report that it took the unit before it was seen to be there."""
+    monkeypatch.setattr(module, "LOOK_EVERY", look_every)
     deadly = tasks_of("ends-the-worker", surfaces=SURFACES[:1], plugin=DEADLY)
     tasks = [*deadly, *tasks_of("good", surfaces=SURFACES[1:])]
     store, heard = Store(tmp_path), Listener()
