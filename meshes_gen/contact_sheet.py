@@ -11,7 +11,7 @@ from PIL import Image
 
 from cembench.core.atomic import write
 from cembench.core.names import file_name
-from cembench.drawing.clay import draw_clay
+from cembench.drawing.painter import draw_clay
 from cembench.drawing.scene import framed
 from cembench.mesh.triangle_mesh import TriangleMesh
 

@@ -14,7 +14,7 @@ from cembench.surfaces.holed_disk import holed_disk
 from PIL import Image
 
 from cembench.core.errors import RecordError
-from cembench.drawing import draw_numpy
+from cembench.drawing import painter
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.report import plots
 from cembench.report.content import inspection
@@ -55,10 +55,11 @@ DECOYS = {
 def no_renderer(monkeypatch):
     """Pictures are grey, so that they take no time."""
 
-    def grey(scene, side):
-        return (np.full((side, side, 3), 128, dtype=np.uint8),) * 2
+    def grey(panel, colouring, folded=None):
+        side = panel.raster.size // painter.SAMPLES
+        return np.full((side, side, 3), 128, dtype=np.uint8)
 
-    monkeypatch.setattr(draw_numpy, "draw", grey)
+    monkeypatch.setattr(painter, "paint", grey)
 
 
 @pytest.fixture

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write
-from cembench.drawing import draw_numpy
+from cembench.drawing import painter
 from cembench.drawing.compose import INK
-from cembench.drawing.scene import Scene, image_in_window
+from cembench.drawing.scene import Board, folded_by, image_in_window, surface_in_window
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 Complex = NDArray[np.complex128]
@@ -64,13 +64,20 @@ def write_steps(
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     figure.text(0.5, 1 - TITLE / 2 / height, title, ha="center", va="center", fontweight="bold")
+    space = surface_in_window(mesh)
+    board = Board.of(mesh.F, space, final)
     for number, panel in enumerate(panels):
         row, column = divmod(number, columns)
         left = GAP + column * (SIDE + GAP)
         bottom = height - TITLE - row * (SIDE + LABEL + GAP) - SIDE
-        scene = Scene.of(mesh, final if panel.uv is None else panel.uv, final)
-        surface, image = draw_numpy.draw(scene, SIDE)
-        figure.figimage(surface if panel.uv is None else image, left, bottom, origin="upper")
+        folded = folded_by(final if panel.uv is None else panel.uv, mesh.F)
+        drawn = (
+            painter.surface_panel(mesh.F, space, SIDE)
+            if panel.uv is None
+            else painter.image_panel(mesh.F, space, panel.uv, folded, SIDE)
+        )
+        picture = painter.paint(drawn, painter.checkerboard(drawn, board), folded)
+        figure.figimage(picture, left, bottom, origin="upper")
         if panel.uv is not None:
             _outline(figure, mesh, panel, (left, bottom), (width, height))
         words = f"({chr(ord('a') + number)}) {panel.label}" if number < 26 else panel.label

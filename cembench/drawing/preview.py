@@ -19,9 +19,8 @@ from numpy.typing import NDArray
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import ParameterError, RenderError
-from cembench.drawing import compose, draw_numpy
+from cembench.drawing import compose, painter, scene
 from cembench.drawing.checkerboard import FINER
-from cembench.drawing.scene import Scene, image_in_window
 from cembench.drawing.view_scene import upright
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -87,13 +86,12 @@ def preview_png(
     """Return the picture of :func:`write_preview` as the bytes of a PNG file."""
     _check(mesh, uv, size)
     uv = upright(mesh, uv) if turned else uv
-    scene = Scene.of(mesh, uv)
-    surface, image = _draw(scene, compose.panel_side(size))
-    outline = image_in_window(uv)[:, :2]
-    overlay = compose.Overlay(tuple(outline[loop] for loop in mesh.loops), scene.small_folds)
-    return compose.page(
-        surface, image, overlay, (title, caption, _note(scene, turned=turned)), size
-    )
+    surface, image, board = _draw(mesh, uv, compose.panel_side(size))
+    outline = scene.image_in_window(uv)[:, :2]
+    loops = tuple(outline[loop] for loop in mesh.loops)
+    overlay = compose.Overlay(loops, scene.small_folds(uv, mesh.F))
+    words = (title, caption, _note(divided=board.squares.is_divided, turned=turned))
+    return compose.page(surface, image, overlay, words, size)
 
 
 def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> None:
@@ -102,7 +100,7 @@ def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = 
     `side` is in pixels; other arguments and errors as for :func:`write_preview`.
     """
     _check(mesh, uv, SIZE)
-    surface, _ = _draw(Scene.of(mesh, uv), side)
+    surface, _, _ = _draw(mesh, uv, side)
     write_bytes(path, compose.png(surface), error=RenderError, parents=False)
 
 
@@ -112,7 +110,8 @@ def draw_panels(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Pi
     Raises the errors of :func:`write_preview`, except those about files.
     """
     _check(mesh, uv, SIZE)
-    return _draw(Scene.of(mesh, uv), side)
+    surface, image, _ = _draw(mesh, uv, side)
+    return surface, image
 
 
 def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
@@ -135,19 +134,19 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
         )
 
 
-def _note(scene: Scene, *, turned: bool) -> str:
+def _note(*, divided: bool, turned: bool) -> str:
     """Return the note below a picture on how it was drawn."""
     up = "The image is turned so that up on the surface is up in it." if turned else ""
     finer = (
         f"Squares that would be large on the surface are divided {FINER} by {FINER}, in both "
         "panels alike."
     )
-    return f"{up} {finer if scene.squares.is_divided else ''}".strip()
+    return f"{up} {finer if divided else ''}".strip()
 
 
-def _draw(scene: Scene, side: int) -> tuple[Picture, Picture]:
+def _draw(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Picture, scene.Board]:
     try:
-        return draw_numpy.draw(scene, side)
+        return painter.under_checkerboard(mesh, uv, side)
     except (MemoryError, ArithmeticError, ValueError, IndexError) as error:
         raise RenderError(
             f"the picture could not be drawn: {type(error).__name__}: {error}"

@@ -1,4 +1,4 @@
-"""The content of a preview: everything a renderer needs, independent of how it draws.
+"""How a surface, its image and a checkerboard lie in a picture, and how they are lit.
 
 Window coordinates: x to the right and y upwards, both from -1 to 1 in a square panel; z towards the
 viewer. A **square** of the checkerboard has side 1 in the coordinates `board`.
@@ -44,89 +44,47 @@ FAINTER = 0.55
 
 
 @dataclass(frozen=True)
-class View:
-    """One panel of separate triangles; no vertex is shared, so neighbours may differ.
+class Board:
+    """A checkerboard on an image, to be pulled back to the surface.
 
     Parameters
     ----------
-    corners : float64 (3 m, 3)
-        The triangles' corners in order, in window coordinates.
-    brightness : float64 (3 m,)
-        Brightness of each corner, 0 to 1.
-
-    """
-
-    corners: Real
-    brightness: Real
-
-
-@dataclass(frozen=True)
-class Scene:
-    """A surface and its image, ready to be drawn side by side under one checkerboard.
-
-    Triangles are separate, with their corners in order.
-
-    Parameters
-    ----------
-    space, plane : float64 (3 m, 3)
-        Corners on the surface as seen by the viewer, and in the image; window coordinates.
-    board : float64 (3 m, 2)
-        Corners on the checkerboard.
+    places : float64 (n, 2)
+        Position of each vertex on the board.
     squares : Checkerboard
         Which squares are divided.
-    brightness : float64 (3 m,)
-        Brightness of each corner, 0 to 1.
-    folded : bool (m,)
-        Whether a triangle's image has no positive area.
 
     """
 
-    space: Real
-    plane: Real
-    board: Real
-    brightness: Real
-    folded: NDArray[np.bool_]
+    places: Real
     squares: Checkerboard
 
     @classmethod
-    def of(cls, mesh: TriangleMesh, uv: Complex, board_uv: Complex | None = None) -> Self:
-        """Place the surface before the viewer and the image in its frame, and light both.
+    def of(cls, F: Ints, space: Real, uv: Complex) -> Self:
+        """Return the board of an image (n,); squares large on the surface `space` are divided.
 
-        The checkerboard is that of the image, or of another map `board_uv` (n,).
+        `space` is (n, 3) in window coordinates.
         """
-        F = mesh.F
-        space = framed(mesh.V @ view_rotation(mesh).T)
-        plane = image_in_window(uv)
-        ruled = plane if board_uv is None else image_in_window(board_uv)
-        board = ruled[:, :2] * (SQUARES / 2 / FILL)
-        return cls(
-            space=space[F].reshape(-1, 3),
-            plane=plane[F].reshape(-1, 3),
-            board=board[F].reshape(-1, 2),
-            brightness=brightness_of(F, space)[F].ravel(),
-            folded=~(signed_areas(uv, F) > 0),
-            squares=checkerboard_of(F, space, board),
-        )
+        places = image_in_window(uv)[:, :2] * (SQUARES / 2 / FILL)
+        area = np.linalg.norm(_normals(F, space), axis=1)
+        fineness = fineness_of(F, space, places)[F].mean(axis=1)
+        return cls(places, Checkerboard.of(places[F].mean(axis=1), fineness, area))
 
-    @property
-    def surface(self) -> View:
-        """Return the surface panel; sides of it that show the inside are darker."""
-        inside = np.repeat(doubled_areas(self.space[:, :2]) < 0, 3)
-        return View(self.space, np.where(inside, INSIDE * self.brightness, self.brightness))
 
-    @property
-    def image(self) -> View:
-        """Return the image panel, folds on top, with the surface's shading."""
-        lifted = self.plane.copy()
-        lifted[np.repeat(self.folded, 3), 2] += 1.0
-        return View(lifted, 1 - FAINTER * (1 - self.brightness))
+def surface_in_window(mesh: TriangleMesh) -> Real:
+    """Return the vertices of a surface turned towards the viewer; window coordinates (n, 3)."""
+    return framed(mesh.V @ view_rotation(mesh).T)
 
-    @property
-    def small_folds(self) -> Real:
-        """Return the centres (k, 2) of folds that are too small to be seen in the image."""
-        corners = self.plane[:, :2]
-        small = self.folded & (np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2)
-        return corners.reshape(-1, 3, 2)[small].mean(axis=1)
+
+def folded_by(uv: Complex, F: Ints) -> NDArray[np.bool_]:
+    """Whether each triangle's image has no positive area, (m,)."""
+    return np.asarray(~(signed_areas(uv, F) > 0))
+
+
+def small_folds(uv: Complex, F: Ints) -> Real:
+    """Return the centres (k, 2) of folds that are too small to be seen in the image."""
+    corners = image_in_window(uv)[F[folded_by(uv, F)]][:, :, :2]
+    return corners[np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2].mean(axis=1)
 
 
 def image_in_window(uv: Complex) -> Real:
@@ -135,9 +93,8 @@ def image_in_window(uv: Complex) -> Real:
 
 
 def doubled_areas(corners: Real) -> Real:
-    """Return twice the signed area of triangles, corners in order (3 m, 2); shape (m,)."""
-    a, b, c = corners[0::3], corners[1::3], corners[2::3]
-    u, v = b - a, c - a
+    """Return twice the signed area of triangles in the window, corners (m, 3, 2 or 3)."""
+    u, v = (corners[:, c, :2] - corners[:, 0, :2] for c in (1, 2))
     return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
 
 
@@ -171,13 +128,6 @@ def brightness_of(F: Ints, points: Real) -> Real:
     return np.clip(SHADOW + LAMPLIGHT * ((1 + facing) / 2) ** FALL_OFF, 0.0, 1.0)
 
 
-def checkerboard_of(F: Ints, space: Real, board: Real) -> Checkerboard:
-    """Divide the squares that would be large on the surface; vertices (n, 3) and (n, 2)."""
-    fineness = fineness_of(F, space, board)
-    area = np.linalg.norm(_normals(F, space), axis=1)
-    return Checkerboard.of(board[F].mean(axis=1), fineness[F].mean(axis=1), area)
-
-
 def fineness_of(F: Ints, space: Real, board: Real) -> Real:
     """Return the depth of subdivision that each vertex needs for squares of the wanted size.
 
@@ -185,7 +135,7 @@ def fineness_of(F: Ints, space: Real, board: Real) -> Real:
     """
     n = len(space)
     area = np.linalg.norm(_normals(F, space), axis=1)
-    on_board = np.abs(doubled_areas(board[F].reshape(-1, 2)))
+    on_board = np.abs(doubled_areas(board[F]))
     weight = np.maximum(_to_vertices(F, area, n), TINY)
     log_side = np.log(weight / np.maximum(_to_vertices(F, on_board, n), TINY)) / 2
     for _ in range(CALMING):

@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 from cembench.core.errors import ParameterError, RenderError
-from cembench.drawing import compose, draw_numpy
-from cembench.drawing.preview import write_preview
-from cembench.drawing.scene import FILL, SQUARES, Scene
+from cembench.drawing import compose, painter
+from cembench.drawing.preview import draw_panels, write_preview
+from cembench.drawing.scene import FILL, SQUARES
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import load_registry
 
@@ -68,7 +68,7 @@ def test_squares_of_a_flat_disk_are_where_they_must_be():
     dark = (np.floor(x) + np.floor(y)) % 2 == 1
     column = ((x * 2 * FILL / SQUARES + 1) / 2 * side).astype(int)
     row = ((1 - y * 2 * FILL / SQUARES) / 2 * side).astype(int)
-    for picture in draw_numpy.draw(Scene.of(mesh, seen_from_above(mesh)), side):
+    for picture in draw_panels(mesh, seen_from_above(mesh), side):
         blueness = picture[row, column, 2].astype(int) - picture[row, column, 0]
         np.testing.assert_array_equal(blueness > 40, dark)
 
@@ -78,7 +78,7 @@ def test_square_edges_are_exact_to_a_pixel_on_a_coarse_mesh():
     V = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     mesh = DiskMesh.from_arrays(V, [[0, 1, 2], [0, 2, 3]])
     side = 400
-    for picture in draw_numpy.draw(Scene.of(mesh, seen_from_above(mesh)), side):
+    for picture in draw_panels(mesh, seen_from_above(mesh), side):
         blue = picture[:, :, 2].astype(int) - picture[:, :, 0] > 20
         row = blue[int(side * (0.5 + FILL / 2 - 0.5 * FILL / SQUARES))]
         changes = np.flatnonzero(np.diff(row.astype(int))) + 1
@@ -90,9 +90,9 @@ def test_square_edges_are_exact_to_a_pixel_on_a_coarse_mesh():
 
 def test_folds_are_red_in_both_panels():
     mesh = flat_disk()
-    for picture in draw_numpy.draw(Scene.of(mesh, folded_map(mesh)), 300):
+    for picture in draw_panels(mesh, folded_map(mesh), 300):
         assert reddish(picture.astype(int)).sum() > 20
-    for picture in draw_numpy.draw(Scene.of(mesh, seen_from_above(mesh)), 300):
+    for picture in draw_panels(mesh, seen_from_above(mesh), 300):
         assert not reddish(picture.astype(int)).any()
 
 
@@ -140,10 +140,10 @@ def test_long_words_stay_on_the_page(tmp_path):
 
 
 def test_a_picture_that_cannot_be_drawn_is_an_error(tmp_path, monkeypatch):
-    def fail(scene, side):
+    def fail(mesh, uv, side):
         raise MemoryError("no room")
 
-    monkeypatch.setattr(draw_numpy, "draw", fail)
+    monkeypatch.setattr(painter, "under_checkerboard", fail)
     mesh = flat_disk()
     with pytest.raises(RenderError, match="could not be drawn: MemoryError: no room"):
         write_preview(mesh, seen_from_above(mesh), tmp_path / "disk.png", size=SMALL)

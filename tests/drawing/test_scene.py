@@ -7,7 +7,7 @@ from cembench.drawing import scene as look
 from cembench.drawing.camera import view_rotation
 from cembench.drawing.checkerboard import Checkerboard
 from cembench.drawing.rasterizer import rasterize
-from cembench.drawing.scene import Scene, doubled_areas
+from cembench.drawing.scene import Board, doubled_areas, surface_in_window
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
@@ -64,11 +64,12 @@ def test_a_finer_board_covers_the_same_surface_with_smaller_squares():
     mesh = relief(lambda x, y: 0 * x)
     z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
     uv = (z - 0.7) / (1 - 0.7 * z)  # a Moebius map of the disk: the scale varies by a factor of 32
-    scene = Scene.of(mesh, uv)
-    assert scene.squares.is_divided
-    middles = scene.board.reshape(-1, 3, 2).mean(axis=1)
-    _, level = scene.squares.at(middles)
-    sides = np.sqrt(doubled_areas(scene.space[:, :2]) / doubled_areas(scene.board))
+    space = surface_in_window(mesh)
+    board = Board.of(mesh.F, space, uv)
+    assert board.squares.is_divided
+    corners = board.places[mesh.F]
+    _, level = board.squares.at(corners.mean(axis=1))
+    sides = np.sqrt(doubled_areas(space[mesh.F]) / doubled_areas(corners))
     assert np.nanquantile(sides / look.FINER**level, 0.99) < 1.7 * look.LARGEST_SQUARE
     assert level.max() == 1
 

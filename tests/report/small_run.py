@@ -109,7 +109,7 @@ def write_run(folder, policies=POLICIES):
 def write_koebe(folder):
     """An exhibit with a picture and a table."""
     place = exhibit_folder(folder, "koebe")
-    from cembench.drawing.shading import jpeg
+    from cembench.drawing.painter import jpeg
 
     (place / "steps 1.jpg").write_bytes(jpeg(np.full((8, 8, 3), 200, dtype=np.uint8)))
     exhibit = Exhibit(

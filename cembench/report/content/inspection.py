@@ -14,7 +14,8 @@ from cembench.conformal.curvature import mean_curvature
 from cembench.conformal.metrics import angle_errors
 from cembench.core.atomic import write_bytes
 from cembench.core.names import digest, distinct_slugs
-from cembench.drawing import shading
+from cembench.drawing import painter
+from cembench.drawing.scene import Board, folded_by, surface_in_window
 from cembench.drawing.view_scene import (
     ViewedMap,
     rotated_to_match,
@@ -95,10 +96,11 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
         return Inspection(surface, kept=False)
     slugs = distinct_slugs({digest(s.label): s.label for s in evidence.series})
     write = partial(_write, folder, evidence.name_of(surface))
-    space = shading.surface_panel(mesh, SIDE)
+    points = surface_in_window(mesh)
+    space = painter.surface_panel(mesh.F, points, SIDE)
     checkerboards: dict[str, Figure] = {}
     angles: dict[str, Angles] = {}
-    shown: tuple[AlgorithmSeries, shading.RasterPanel] | None = None
+    shown: tuple[AlgorithmSeries, painter.Panel, NDArray[np.bool_]] | None = None
     viewed: list[ViewedMap] = []
     for series in evidence.series:
         record = evidence.find(surface, series)
@@ -108,10 +110,11 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
         uv = rotated_to_match(kept_uv, viewed[0].z) if viewed else upright(mesh, kept_uv)
         about = _about(series, record)
         viewed.append(ViewedMap(series.label, uv, about))
-        panel = shading.image_panel(mesh, uv, SIDE)
+        folded, board = folded_by(uv, mesh.F), Board.of(mesh.F, points, uv)
+        image = painter.image_panel(mesh.F, points, uv, folded, SIDE)
         checkerboards[series.label] = write(
             f"{slugs[digest(series.label)]}-checkerboard",
-            [shading.paint(p, shading.checkerboard(p, mesh, uv, space)) for p in (space, panel)],
+            [painter.paint(p, painter.checkerboard(p, board), folded) for p in (space, image)],
             title=series.label,
             caption=f"{surface.title}, {about}",
             alternative=f"{surface.title} and its image by {series.label} under one checkerboard",
@@ -120,14 +123,14 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
         if series.target == DISK:
             angles[series.label] = _angles(mesh, uv, record)
         if shown is None or (series.algorithm == evidence.reference and series.main):
-            shown = (series, panel)
+            shown = (series, image, folded)
     if shown is None:
         return Inspection(surface, kept=True)
     of = f"{surface.title} and its image by {shown[0].label}"
-    panels, H = (space, shown[1]), mean_curvature(mesh)
+    panels, H = ((space, None), shown[1:]), mean_curvature(mesh)
     curved = write(
         "curvature",
-        [shading.paint(p, shading.curvature(p, H)) for p in panels],
+        [painter.paint(p, painter.curvature(p, H), folded) for p, folded in panels],
         title="mean curvature",
         caption=f"{of}, coloured by the mean curvature of the surface: orange where it bulges "
         "outwards, blue where it bulges inwards.",
@@ -135,7 +138,7 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
     )
     meshed = write(
         "mesh",
-        [shading.paint(p, shading.edges(p)) for p in panels],
+        [painter.paint(p, painter.edges(p), folded) for p, folded in panels],
         title="mesh",
         caption=f"The mesh of {of}.",
         alternative=f"{of}, with their edges",
@@ -159,7 +162,7 @@ def _write(
     """Write pictures beside each other to a file, and return its figure."""
     name = f"{surface}-{what}"
     path = PurePosixPath("figures", f"{name}.jpg")
-    write_bytes(folder / path, shading.jpeg(shading.beside(pictures)))
+    write_bytes(folder / path, painter.jpeg(painter.beside(pictures)))
     return Figure(name, title, (path,), caption, alternative=alternative, record=record)
 
 

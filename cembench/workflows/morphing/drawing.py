@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import ParameterError
 from cembench.drawing.camera import viewpoints
-from cembench.drawing.clay import draw_clay
+from cembench.drawing.painter import draw_clay
 from cembench.drawing.scene import FILL
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.workflows.morphing.path import position

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from cembench import ParameterError
-from cembench.drawing.clay import draw_clay
+from cembench.drawing.painter import draw_clay
 from cembench.workflows.morphing.drawing import VIEWS, Film, check_views, draw_film
 from tests.workflows.morphing.reliefs import relief
 
