@@ -74,7 +74,7 @@ BUDGETS = {
     "registry": 900,
     "results": 4_150,
     "running": 7_250,
-    "drawing": 1_750,
+    "drawing": 1_600,
     "report": 7_800,
     "validation": 2_250,
     "workflows": 7_000,

@@ -82,7 +82,7 @@ def make_report(
     from cembench.running.environment import usable_cores
 
     asked = find_paper(paper) if paper else None
-    sound_records(Store(run), Depth.everything if verify else Depth.sample)
+    records = sound_records(Store(run), Depth.everything if verify else Depth.sample)
     folder = output or run / "report"
     told = f"cembench report {run}" + (f" -o {output}" if output else "")
     told += "".join(f" --tables {file}" for file in tables)
@@ -99,9 +99,10 @@ def make_report(
             if not err.is_terminal and done < total:
                 err.print(f"[{done + 1}/{total}] {words}", markup=False, soft_wrap=True)
 
-        jobs = min(usable_cores(), MOST_DRAWING)
-        told = command or told
-        made = write_report(run, folder, told, progress, jobs=jobs, tables=tables, paper=asked)
+        made = write_report(
+            run, folder, command or told, progress, jobs=min(usable_cores(), MOST_DRAWING),
+            tables=tables, paper=asked, records=records,
+        )  # fmt: skip
         return made, folder
 
 

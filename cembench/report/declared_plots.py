@@ -295,6 +295,8 @@ def _rows(
 ) -> pd.DataFrame:
     """Return the rows that points are of."""
     frame = evidence.frame
+    if surface is not None:
+        frame = frame[frame["mesh_hash"] == surface.mesh_hash]
     if spec.rows == "printed":
         frame = ROWS[spec.rows](evidence, frame, seen)
     elif spec.policy == "first":
@@ -302,8 +304,6 @@ def _rows(
     elif spec.policy == "any":
         frame = frame.sort_values("ok", ascending=False, kind="stable")
         frame = frame.drop_duplicates(["place", "series"]).sort_index()
-    if surface is not None:
-        frame = frame[frame["mesh_hash"] == surface.mesh_hash]
     if plot.models:
         frame = frame[frame["counted"] & frame["model"].isin(plot.models)]
     if spec.where:
@@ -376,18 +376,19 @@ def _evaluated(spec: DeclaredPanel, frame: pd.DataFrame) -> pd.DataFrame:
     """Return the rows that have a point, with its `x`, `y` and `tooltip`."""
     import pandas as pd
 
-    valid = frame[evaluate(spec.valid, frame).astype(bool)]
+    valid = frame[evaluate(spec.valid, frame).astype(bool)].reset_index(drop=True)
     groups = [valid] if len(valid) else []
     if spec.by:
         keys = ["place" if name == "surface" else name for name in spec.by]
         groups = [group for _, group in valid.groupby(keys, sort=False) if len(group) > 1]
-    parts = [frame.iloc[:0].assign(x=[], y=[], tooltip=[])]
+    parts = [pd.DataFrame({"x": [], "y": [], "tooltip": []}, dtype=object)]
     for group in groups:
         x, y = evaluate(spec.x.value, group), evaluate(spec.y.value, group)
         tooltip = evaluate(spec.tooltip, group) if spec.tooltip else ""
-        part = group.assign(x=x, y=y, tooltip=tooltip)
+        part = pd.DataFrame({"x": x, "y": y, "tooltip": tooltip}, index=group.index)
         parts.append(part if isinstance(y, pd.Series) else part.iloc[:1])
-    points = pd.concat(parts[1:] or parts)
+    found = pd.concat(parts[1:] or parts)
+    points = valid.loc[found.index].assign(**{str(name): found[name] for name in found})
     points = points[points["x"].notna() & points["y"].notna()]
     try:
         return points.astype({"y": float})

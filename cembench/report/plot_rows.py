@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cembench.report.content.difficulty import difficulties
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import BIN, Inspection, angles_of
 from cembench.results.papers import Paper
@@ -79,7 +78,7 @@ def _angles(evidence: Evidence, frame: pd.DataFrame, seen: Inspections) -> pd.Da
 
 def _difficulty(evidence: Evidence, frame: pd.DataFrame, seen: Inspections) -> pd.DataFrame:
     """Return the records on surfaces with a map to the disk: `factor_span`, `boundary_crowding`."""
-    known = difficulties(evidence, evidence.policies[0])
+    known = evidence.difficulties
     frame = frame[frame["mesh_hash"].isin(list(known))]
     of = [known[key] for key in frame["mesh_hash"]]
     return frame.assign(

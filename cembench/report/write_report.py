@@ -33,6 +33,7 @@ from cembench.report.render.markdown import write_markdown
 from cembench.report.render.tables_csv import write_tables_csv
 from cembench.report.shared_drawing import shared_drawing
 from cembench.results.papers import Paper
+from cembench.results.records import Record
 
 
 def write_report(
@@ -44,12 +45,13 @@ def write_report(
     jobs: int = 1,
     tables: Sequence[Path] = (),
     paper: Paper | None = None,
+    records: Sequence[Record] = (),
 ) -> Report:
     """Write the report of a run in all its forms; `jobs` processes draw its pictures and plots.
 
     `tables` are files with declarations of more tables and plots (:mod:`cembench.report.declared`,
     :mod:`cembench.report.declared_plots`). `paper` is the one it is of; default: the one with most
-    rows of the run.
+    rows of the run. `records` are those of the run, if they were read before.
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -67,14 +69,15 @@ def write_report(
 
     """
     require(Extra.REPORT, "a report")
-    evidence = Evidence.of(run, paper)
+    evidence = Evidence.of(run, paper, records)
     further = further_tables(evidence, tables)
     plots = [further_plots(evidence, path, k) for k, path in enumerate(tables, start=1)]
     folders.check(folder, "report")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
-            with shared_drawing(jobs):
+            # Processes pay where there are maps to draw.
+            with shared_drawing(jobs if (run / "meshes").is_dir() else 1):
                 report = build_report(evidence, draft, command, progress)
                 more = [
                     replace(section, items=(*section.items, *drawn(declared, draft)))

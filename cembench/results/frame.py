@@ -10,7 +10,8 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from types import MappingProxyType
+from functools import cache
+from types import CodeType, MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,30 +124,40 @@ def evaluate(expression: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NO
         The expression cannot be read, names something unknown, or fails on this frame.
 
     """
+    code, names = _compiled(expression)
     known = {**FUNCTIONS, **more}
-    columns = {str(name) for name in frame} - more.keys()
+    for name in names:
+        if name in frame and name not in more:
+            known[name] = frame[name]
+        elif name not in known:
+            columns = sorted({str(column) for column in frame} - more.keys())
+            raise ParameterError(
+                f"{expression!r} names {name!r}; known are the functions "
+                f"{', '.join((*FUNCTIONS, *more))} and the columns {', '.join(columns)}."
+            )
+    try:
+        return eval(code, {"__builtins__": {}}, known)
+    except Exception as error:
+        raise ParameterError(f"{expression!r} fails on this run: {error}.") from error
+
+
+@cache
+def _compiled(expression: str) -> tuple[CodeType, tuple[str, ...]]:
+    """Return the code of an expression, and the names in it."""
     try:
         tree = ast.parse(expression, mode="eval")
     except SyntaxError as error:
         raise ParameterError(f"{expression!r} is no expression: {error.msg}.") from error
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Name) and node.id in columns:
-            known[node.id] = frame[node.id]
-        elif isinstance(node, ast.Name) and node.id not in known:
-            raise ParameterError(
-                f"{expression!r} names {node.id!r}; known are the functions "
-                f"{', '.join((*FUNCTIONS, *more))} and the columns {', '.join(sorted(columns))}."
-            )
+    nodes = list(ast.walk(tree))
+    for node in nodes:
         if isinstance(node, ast.Attribute) and node.attr not in _METHODS:
             raise ParameterError(
                 f"{expression!r} asks for {node.attr!r}; allowed are {', '.join(sorted(_METHODS))}."
             )
         if isinstance(node, ast.Lambda | ast.ListComp | ast.GeneratorExp | ast.NamedExpr):
             raise ParameterError(f"{expression!r} is more than an expression over columns.")
-    try:
-        return eval(compile(tree, "<declaration>", "eval"), {"__builtins__": {}}, known)
-    except Exception as error:
-        raise ParameterError(f"{expression!r} fails on this run: {error}.") from error
+    names = dict.fromkeys(node.id for node in nodes if isinstance(node, ast.Name))
+    return compile(tree, "<declaration>", "eval"), tuple(names)
 
 
 def filled(text: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> str:

@@ -104,26 +104,26 @@ def average_interval(
         return None
     rng = np.random.default_rng(seed)
     logs = [np.log(np.asarray(ratios, dtype=float)) for ratios in surfaces]
-    figures = np.empty((DRAWS, len(logs)))
-    chosen = rng.integers(0, len(logs), figures.shape)
-    for place, values in enumerate(logs):
-        here = chosen == place
-        drawn = rng.integers(0, len(values), (int(here.sum()), len(values)))
-        figures[here] = np.median(values[drawn], axis=1)
-    low, high = np.quantile(average(np.exp(figures)), [(1 - level) / 2, (1 + level) / 2])
+    chosen = rng.integers(0, len(logs), DRAWS * len(logs))
+    figures = np.empty(chosen.shape)
+    in_order = np.argsort(chosen.astype(np.min_scalar_type(len(logs))), kind="stable")
+    places = np.split(in_order, np.cumsum(np.bincount(chosen, minlength=len(logs)))[:-1])
+    for draws, values in zip(places, logs, strict=True):
+        drawn = rng.integers(0, len(values), (len(draws), len(values)))
+        figures[draws] = np.median(values[drawn], axis=1)
+    averages = average(np.exp(figures).reshape(DRAWS, len(logs)))
+    low, high = np.quantile(averages, [(1 - level) / 2, (1 + level) / 2])
     return Interval(float(low), float(high))
 
 
 def arithmetic(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the arithmetic means along the last axis, as the paper averages."""
-    mean: NDArray[np.float64] = ratios.mean(axis=-1)
-    return mean
+    return np.asarray(ratios.mean(axis=-1))
 
 
 def geometric(ratios: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the geometric means along the last axis."""
-    mean: NDArray[np.float64] = np.exp(np.log(ratios).mean(axis=-1))
-    return mean
+    return np.asarray(np.exp(np.log(ratios).mean(axis=-1)))
 
 
 def rate_interval(

@@ -9,6 +9,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from enum import StrEnum
+from functools import cached_property
 from math import inf
 from typing import Annotated, Any, Literal, Self
 
@@ -109,7 +110,13 @@ class Cell(BaseModel):
             content.pop("precision", None)
         return content
 
-    @property
+    def __copy__(self) -> Self:
+        """Return a copy without the key, which an update would change."""
+        copied = super().__copy__()
+        copied.__dict__.pop("key", None)
+        return copied
+
+    @cached_property
     def key(self) -> str:
         """Hash of the content; the mesh's name is only a label and is left out."""
         content = self.model_dump(exclude={"mesh"}) | {"schema": SCHEMA_VERSION}

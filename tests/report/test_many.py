@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench.report.content.difficulty import boundary_crowding, difficulties
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.findings import many_findings
 from cembench.report.content.many import HARDEST, hardest
 from cembench.report.content.pairwise_wins import _wins, pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
+from cembench.report.difficulty import boundary_crowding
 from cembench.report.document import plain
 from cembench.report.run_tables import many_table
 from cembench.report.write_report import write_report
@@ -115,7 +115,7 @@ def test_equal_figures_and_untried_surfaces_are_no_win():
 
 
 def test_the_hardest_are_those_with_the_worst_best_map(evidence):
-    shown = hardest(evidence, "reuse")
+    shown = hardest(evidence)
     assert len(shown) == HARDEST
     table = by_label(declared_table(evidence, "spread"))
     best = [
@@ -131,7 +131,7 @@ def test_the_hardest_are_those_with_the_worst_best_map(evidence):
 
 
 def test_a_steeper_surface_has_a_larger_span(evidence):
-    known = difficulties(evidence, "reuse")
+    known = evidence.difficulties
     assert len(known) == COUNT
     spans = [known[s.mesh_hash].span for s in evidence.surfaces]
     assert np.corrcoef(np.arange(COUNT), np.log(spans))[0, 1] > 0.9

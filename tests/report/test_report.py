@@ -259,7 +259,7 @@ def test_of_a_cell_measured_twice_the_later_record_counts(tmp_path):
     evidence = Evidence.of(store.folder)
     surface = next(s for s in evidence.surfaces if s.mesh_hash == old.cell.mesh_hash)
     assert evidence.find(surface, evidence.series_of("cem")).cell.key == new.cell.key
-    assert evidence.superseded == 1
+    assert evidence.superseded == {old.cell.key}
 
 
 def test_other_parameters_are_a_series_of_their_own(tmp_path):

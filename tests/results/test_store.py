@@ -182,3 +182,12 @@ def test_the_plan_is_kept(record, tmp_path):
     assert store.plan() == []
     store.save_plan([record.cell])
     assert store.plan() == [record.cell]
+
+
+def test_a_changed_copy_of_a_cell_has_a_key_of_its_own():
+    cell = Cell(algorithm="cem", code_hash="c0de", mesh="lion", mesh_hash="abc")
+    key = cell.key
+    other = cell.model_copy(update={"mesh_hash": "def"})
+    assert other.key != key
+    assert other.key == Cell(**other.model_dump()).key
+    assert cell.model_copy(update={"mesh": "of another name"}).key == key

@@ -17,6 +17,7 @@ from cembench.core.errors import RecordError
 from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.report.difficulty import Difficulty, difficulty
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import record_rows as frame
 from cembench.results.columns import COLUMNS, DERIVED
@@ -98,16 +99,19 @@ class Evidence:
     store: Store
     records: tuple[Record, ...]
     exhibits: tuple[Exhibit, ...]
-    #: Number of records left out because the cell was measured again later.
-    superseded: int = 0
+    #: Keys of records left out because the cell was measured again later.
+    superseded: frozenset[str] = frozenset()
     #: The paper that the report is asked to be of; None for the one with most rows of the run.
     asked: Paper | None = None
 
     @classmethod
-    def of(cls, run: Path, paper: Paper | None = None) -> Evidence:
-        """Read a run, to be told of beside this paper; default: the one with most rows in it."""
+    def of(cls, run: Path, paper: Paper | None = None, records: Sequence[Record] = ()) -> Evidence:
+        """Return the evidence of a run; `paper` is by default the one with most rows in it.
+
+        `records` are those of the run, if they were read before.
+        """
         store = Store(run)
-        records = store.records()
+        records = records or store.records()
         if not records:
             raise RecordError(
                 f"{run} holds no record: no cell is finished yet. `cembench status {run}` "
@@ -115,7 +119,8 @@ class Evidence:
             )
         kept = _latest(records)
         exhibits = tuple(read_exhibits(run))
-        found = cls(store, tuple(kept), exhibits, len(records) - len(kept), paper)
+        older = {record.cell.key for record in records} - {record.cell.key for record in kept}
+        found = cls(store, tuple(kept), exhibits, frozenset(older), paper)
         if paper is not None and not found.models:
             raise RecordError(
                 f"no surface of {run} is, or stands in for, a model of {paper.title!r}; its models "
@@ -189,6 +194,29 @@ class Evidence:
             order = (place, k, self.policies.index(record.cell.solves))
             found.append((order, figures | about | more))
         return [row for _, row in sorted(found, key=lambda pair: pair[0])]
+
+    @cached_property
+    def best_maps(self) -> pd.DataFrame:
+        """The rows of the maps with the smallest mean angle errors, by the surface's hash.
+
+        Maps to the disk are preferred; the linear-algebra policy is the first.
+        """
+        frame = self.frame
+        maps = frame[frame["ok"] & (frame["solves"] == self.policies[0]) & frame[ANGLE].notna()]
+        ranked = maps.assign(elsewhere=maps["target"] != DISK)
+        ranked = ranked.sort_values(["elsewhere", ANGLE], kind="stable")
+        return ranked.drop_duplicates("place").set_index("mesh_hash").sort_values("place")
+
+    @cached_property
+    def difficulties(self) -> dict[str, Difficulty]:
+        """The difficulty of each surface that has a map to the disk, by its hash."""
+        best, found = self.best_maps, {}
+        for of_surface, key in best["key"][best["target"] == DISK].items():
+            mesh = self.mesh(next(s for s in self.surfaces if s.mesh_hash == of_surface))
+            uv = self.uv(self.by_key[key])
+            if mesh is not None and uv is not None and (one := difficulty(mesh, uv)):
+                found[str(of_surface)] = one
+        return found
 
     @cached_property
     def by_key(self) -> dict[str, Record]:

@@ -7,7 +7,6 @@ from math import inf
 from pathlib import Path
 
 from cembench.report.content.by_surface import hardest_table
-from cembench.report.content.difficulty import best_maps
 from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.pairwise_wins import pairwise_wins
@@ -22,24 +21,23 @@ MANY = 24
 HARDEST = 10
 
 
-def hardest(evidence: Evidence, policy: str) -> tuple[MeasuredSurface, ...]:
+def hardest(evidence: Evidence) -> tuple[MeasuredSurface, ...]:
     """Return the surfaces with the largest angle errors of the best map, worst first.
 
     Surfaces without any map come first.
     """
-    errors = best_maps(evidence, policy)[ANGLE].to_dict()
+    errors = evidence.best_maps[ANGLE].to_dict()
     by_error = sorted(evidence.surfaces, key=lambda s: errors.get(s.mesh_hash, inf), reverse=True)
     return tuple(by_error[:HARDEST])
 
 
 def hardest_gallery(
     evidence: Evidence,
-    policy: str,
     surfaces: Sequence[MeasuredSurface],
     inspections: Mapping[str, Inspection],
 ) -> Gallery | None:
     """Return the best map of each of these surfaces; None if the run saved no surface."""
-    labels = best_maps(evidence, policy)["label"].to_dict()
+    labels = evidence.best_maps["label"].to_dict()
     best = [(inspections[s.mesh_hash].checkerboards, labels.get(s.mesh_hash)) for s in surfaces]
     figures = [maps[label] for maps, label in best if label in maps]
     if not figures:
@@ -74,7 +72,7 @@ def many_section(
     items += drawn(plots, folder)
     items += pairwise_wins(evidence, policy)
     items.append(hardest_table(evidence, policy, shown))
-    gallery = hardest_gallery(evidence, policy, shown, inspections)
+    gallery = hardest_gallery(evidence, shown, inspections)
     if gallery:
         items.append(gallery)
     return Section("many", f"Over {len(evidence.surfaces)} surfaces", tuple(items))

@@ -86,7 +86,7 @@ def build_report(
     """Compute the contents of a run's report, and draw its figures into `folder`."""
     of_paper = is_of_the_paper(evidence)
     over_many = many.is_many(evidence) and not of_paper
-    shown = many.hardest(evidence, evidence.policies[0]) if over_many else evidence.surfaces
+    shown = many.hardest(evidence) if over_many else evidence.surfaces
     n = len(shown) + 1
     inspections: dict[str, Inspection] = {}
     pages = []
@@ -170,7 +170,8 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
         ("backend", ", ".join(sorted({r.cell.backend for r in evidence.records}))),
     ]
     if evidence.superseded:
-        found.append(("left out", f"{evidence.superseded} older records of cells measured again"))
+        older = len(evidence.superseded)
+        found.append(("left out", f"{older} older records of cells measured again"))
     used = {record.environment for record in evidence.records}
     for key, machine in evidence.store.environments().items():
         if key in used:
@@ -200,7 +201,7 @@ def not_ok(evidence: Evidence) -> Table | Text:
     """Return a table of cells that did not end ok or are missing; a sentence if there is none."""
     declared = own_tables()["not-ok"]
     table = declared_table(evidence, "not-ok")
-    held = {record.cell.key for record in evidence.store.records()}
+    held = evidence.superseded | evidence.by_key.keys()
     again = "requested but not finished: run the same `cembench run` again to resume"
     missing = tuple(
         tuple(map(words, (cell.mesh, cell.algorithm, cell.solves, "missing", again)))

@@ -71,6 +71,7 @@ SIGNS: Mapping[Verdict, str] = {
 DATA_BYTES = 200_000
 #: Characters of a record's key in the page, more if they would not be unique.
 KEY = 12
+_ENCODED = json.JSONEncoder(default=str, ensure_ascii=False).encode
 _PIXELS = (".png", ".jpg", ".jpeg", ".webp")
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 
@@ -390,9 +391,11 @@ def _entries(value: Any) -> list[tuple[str, str]]:
 def _words(value: Any) -> str:
     if isinstance(value, str):
         return value
+    if type(value) in (int, float):
+        return repr(value)
     if isinstance(value, list | tuple) and all(isinstance(v, str) for v in value):
         return "; ".join(value)
-    return json.dumps(value, default=str, ensure_ascii=False)
+    return _ENCODED(value)
 
 
 # --- the page --------------------------------------------------------------------------------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,11 +10,7 @@ from numpy.typing import NDArray
 from cembench.conformal.metrics import in_common_gauge, is_disk_map
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.content.evidence import ANGLE, DISK, Evidence
 from cembench.report.surface_facts import factor_spans
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -36,33 +31,11 @@ class Difficulty:
     crowding: float
 
 
-def difficulties(evidence: Evidence, policy: str) -> dict[str, Difficulty]:
-    """Return the difficulty of each surface that has a map to the disk, by its hash."""
-    found = {}
-    best = best_maps(evidence, policy)
-    surfaces = {surface.mesh_hash: surface for surface in evidence.surfaces}
-    for of_surface, key in best["key"][best["target"] == DISK].items():
-        mesh = evidence.mesh(surfaces[str(of_surface)])
-        uv = evidence.uv(evidence.by_key[key])
-        if mesh is None or uv is None:
-            continue
-        crowded = boundary_crowding(mesh, uv)
-        span = factor_spans(mesh, uv)["conformal_factor_span_99_8"]
-        if crowded is not None:
-            found[str(of_surface)] = Difficulty(span, crowded)
-    return found
-
-
-def best_maps(evidence: Evidence, policy: str) -> pd.DataFrame:
-    """Return the rows of the maps with the smallest mean angle errors, by the surface's hash.
-
-    Maps to the disk are preferred.
-    """
-    frame = evidence.frame
-    maps = frame[frame["ok"] & (frame["solves"] == policy) & frame[ANGLE].notna()]
-    ranked = maps.assign(elsewhere=maps["target"] != DISK)
-    ranked = ranked.sort_values(["elsewhere", ANGLE], kind="stable")
-    return ranked.drop_duplicates("place").set_index("mesh_hash").sort_values("place")
+def difficulty(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> Difficulty | None:
+    """Return the difficulty of a surface by a map (n,); None if that has no common gauge."""
+    crowded = boundary_crowding(mesh, uv)
+    span = factor_spans(mesh, uv)["conformal_factor_span_99_8"]
+    return None if crowded is None else Difficulty(span, crowded)
 
 
 def boundary_crowding(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> float | None:
