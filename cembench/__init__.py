@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from cembench.workflows.map_files import map_files
     from cembench.workflows.morph_surfaces import morph
     from cembench.workflows.parameterize import Result, parameterize
+    from cembench.workflows.parameterize_many import parameterize_many
     from cembench.workflows.repair import Repair, repair
     from cembench.workflows.theory_verb import theory
     from cembench.workflows.validate import validate
@@ -70,6 +71,7 @@ _PLACES = {
     "cembench.workflows.map_files": ("map_files",),
     "cembench.workflows.morph_surfaces": ("morph",),
     "cembench.workflows.parameterize": ("Result", "parameterize"),
+    "cembench.workflows.parameterize_many": ("parameterize_many",),
     "cembench.workflows.repair": ("Repair", "repair"),
     "cembench.workflows.theory_verb": ("theory",),
     "cembench.workflows.validate": ("validate",),
@@ -108,6 +110,7 @@ __all__ = [
     "map_files",
     "morph",
     "parameterize",
+    "parameterize_many",
     "read_mesh",
     "repair",
     "surface",

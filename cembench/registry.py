@@ -63,6 +63,10 @@ class Parameter:
     annotation: Any
     default: Any
 
+    @functools.cached_property
+    def _type(self) -> TypeAdapter[Any]:
+        return TypeAdapter(self.annotation)
+
     def parse(self, value: Any, owner: str) -> Any:
         """Return a value as the parameter's type; text is converted, as from ``-p NAME=VALUE``.
 
@@ -73,7 +77,7 @@ class Parameter:
 
         """
         try:
-            parsed = TypeAdapter(self.annotation).validate_python(value)
+            parsed = self._type.validate_python(value)
             if type(parsed) is int and abs(parsed) >= LARGEST:
                 raise ParameterError(
                     f"{owner}: {self.name}={value!r} is not allowed: beyond 64 bits (default "

@@ -77,7 +77,7 @@ BUDGETS = {
     "drawing": 1_600,
     "report": 7_800,
     "validation": 2_250,
-    "workflows": 7_000,
+    "workflows": 7_150,
     "commands": 3_200,
 }
 

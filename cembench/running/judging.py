@@ -99,10 +99,19 @@ def kept_from_call_to_call(apart: float, scatter: float) -> Fault | None:
     return Fault(kind=FaultKind.KEPT_RESULT, detail=told)
 
 
-def judged_check(promise: Promise, mesh: TriangleMesh, called: Outcome, uv: Complex) -> Outcome:
-    """Return the outcome of the checked call, with the judgement of its map."""
+def judged_check(
+    promise: Promise, mesh: TriangleMesh, called: Outcome, uv: Complex, *, figures: bool = True
+) -> Outcome:
+    """Return the outcome of the checked call, with the judgement of its map.
+
+    Without `figures`, it has faults, but no metrics and no remarks.
+    """
     try:
-        about, more = _judged(promise, mesh, uv, called.extras)
+        if figures:
+            about, more = _judged(promise, mesh, uv, called.extras)
+        else:
+            with _warnings_ignored():
+                about, more = {}, faults(promise, mesh, uv)
     except MemoryError as error:
         return outcome_of_error(error, mesh)
     except Exception as error:
@@ -194,22 +203,31 @@ def _judged(
     """Return the fields of an outcome for a map, and the faults."""
     with _warnings_ignored():
         problems = faults(promise, mesh, uv)
+        metrics = _metrics(promise.target, mesh, uv)
+        finite = {name: _finite(value) for name, value in metrics.items()}
         if promise.target == "atlas":
-            metrics = atlas_metrics(mesh, uv.reshape(-1, 3))
             told = [] if problems else lost_in_rounding(metrics)
-            finite = {name: _finite(v) for name, v in metrics.items()}
             return {"metrics": finite, "notes": tuple(told)}, problems
-        metrics = all_metrics(mesh, uv)
         told = [] if problems else [*remarks(promise, mesh, uv), *lost_in_rounding(metrics)]
         if not problems:
             error = float(metrics["angle_error_mean_deg"])
             told += quality_notes(promise.target, mesh, uv, extras, error)
         about = {
-            "metrics": {name: _finite(v) for name, v in metrics.items()},
+            "metrics": finite,
             "boundaries": _boundaries(mesh, uv),
             "notes": tuple(told),
         }
     return about, problems
+
+
+def figures(target: str, mesh: TriangleMesh, uv: Complex) -> dict[str, float | None]:
+    """Return the metrics of a map to a target, by name; None for one that is not finite."""
+    with _warnings_ignored():
+        return {name: _finite(value) for name, value in _metrics(target, mesh, uv).items()}
+
+
+def _metrics(target: str, mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
+    return atlas_metrics(mesh, uv.reshape(-1, 3)) if target == "atlas" else all_metrics(mesh, uv)
 
 
 @contextmanager

@@ -154,9 +154,17 @@ class Timed:
 
 
 def check_cell(
-    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
+    algorithm: Algorithm,
+    mesh: TriangleMesh,
+    cell: Cell,
+    *,
+    memory: bool = True,
+    figures: bool = True,
 ) -> tuple[Outcome, Complex | None]:
     """Call once, judge the map, and measure the memory of the call.
+
+    Without `memory`, in a process that has other work too, memory is neither measured nor tidied
+    up. Without `figures` the map is searched for faults alone: no metrics, no remarks.
 
     This never raises because of the algorithm: an exception, even one that would end the process,
     becomes a status with its cause. The only round of the outcome is this call, without a warm-up.
@@ -165,12 +173,12 @@ def check_cell(
     What a handler of signals raises, such as KeyboardInterrupt for Ctrl-C, is raised.
     """
     with _raised_by_signals() as raised:
-        called, uv = call_cell(algorithm, mesh, cell)
+        called, uv = call_cell(algorithm, mesh, cell, memory=memory)
     if raised:
         raise raised[0]
     if uv is None:
         return called, None
-    return judged_check(Promise.of(algorithm), mesh, called, uv), uv
+    return judged_check(Promise.of(algorithm), mesh, called, uv, figures=figures), uv
 
 
 @contextmanager
@@ -204,20 +212,20 @@ def _noting(handler: Any, raised: list[BaseException]) -> Callable[[int, Any], A
 
 
 def call_cell(
-    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, *, memory: bool = True
 ) -> tuple[Outcome, Complex | None]:
     """Call once, like :func:`check_cell`, but leave the map to be judged elsewhere.
 
     If the algorithm suggests other parameters (``alternative`` in its extras), these are tried
     after the measured call, and a notice says so where they are much better.
     """
-    called, uv = _called(algorithm, mesh, cell)
+    called, uv = _called(algorithm, mesh, cell, memory=memory)
     suggested = called.extras.get("alternative")
     if uv is None or algorithm.target == "atlas" or not isinstance(suggested, dict):
         return called, uv
     other = cell.model_copy(update={"parameters": cell.parameters | suggested})
     try:
-        found = _called(algorithm, mesh, other)[1]
+        found = _called(algorithm, mesh, other, memory=memory)[1]
     except ParameterError:  # these are no parameters of the algorithm
         found = None
     if found is None:
@@ -226,7 +234,9 @@ def call_cell(
     return called.model_copy(update={"notes": (*called.notes, *better)}), uv
 
 
-def _called(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> tuple[Outcome, Complex | None]:
+def _called(
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, *, memory: bool
+) -> tuple[Outcome, Complex | None]:
     """Call once, and return the outcome without a judgement, and the map."""
     call = _call(algorithm, mesh, cell)
     program: dict[str, Any] = {}
@@ -234,11 +244,12 @@ def _called(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> tuple[Outco
     try:
         if isinstance(call, ProgramCalls):
             returned, timing = call(mesh, watched=True)
-            memory = Memory(call.peak, call.peak)
+            used = Memory(call.peak, call.peak)
             program = _about_program(call)
         else:
             with linear_algebra(cell.solves, cell.backend), counting() as work:
-                (returned, timing), memory = memory_of_call(
+                measured = memory_of_call if memory else _without_memory
+                (returned, timing), used = measured(
                     lambda: _without_collector(lambda: call(mesh.fresh()))
                 )
     except BaseException as error:
@@ -247,7 +258,7 @@ def _called(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> tuple[Outco
         program = {"program": ProgramRun(version=library_version(algorithm.library))}
     uv = finite(returned.uv, algorithm.target)
     if isinstance(uv, Fault):
-        return _with_memory(not_ok("invalid", uv).model_copy(update=program), memory), None
+        return _with_memory(not_ok("invalid", uv).model_copy(update=program), used), None
     report, problems = report_of(returned.result)
     seconds = phases_fault(timing)
     problems += [seconds] if seconds else []
@@ -259,7 +270,7 @@ def _called(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> tuple[Outco
     described = report | program | {"uv_hash": hash_of(uv)}
     if seconds is None:
         described["rounds"] = (_program_round(_round([timing]), call, 1, start),)
-    return _with_memory(outcome.model_copy(update=described), memory), uv
+    return _with_memory(outcome.model_copy(update=described), used), uv
 
 
 def timed_together(
@@ -436,12 +447,19 @@ def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
 
 
 def _without_collector(call: Callable[[], tuple[Returned, Timing]]) -> tuple[Returned, Timing]:
-    gc.collect()
+    was_enabled = gc.isenabled()
     gc.disable()
     try:
         return call()
     finally:
-        gc.enable()
+        if was_enabled:
+            gc.enable()
+
+
+def _without_memory(
+    call: Callable[[], tuple[Returned, Timing]],
+) -> tuple[tuple[Returned, Timing], Memory]:
+    return call(), Memory(None, None)
 
 
 def _round(

@@ -8,8 +8,9 @@ import os
 import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +23,7 @@ from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
+from cembench.running.judging import figures
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import SurfaceInput, load_surface
@@ -31,6 +33,9 @@ from cembench.workflows.settings import Placement
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+#: How thoroughly a map is checked.
+Check = Literal["full", "fast"]
 
 
 @dataclass(frozen=True)
@@ -79,10 +84,10 @@ class Result:
         """Why the map is not valid; None if it is valid."""
         return self.outcome.cause
 
-    @property
+    @cached_property
     def metrics(self) -> Mapping[str, float | int | None]:
         """Figures by name, computed by the harness; None if one is infinite."""
-        return _Figures(self.outcome.metrics)
+        return _Figures(self.outcome.metrics or figures(self.algorithm.target, self.mesh, self.z))
 
     @property
     def notices(self) -> tuple[str, ...]:
@@ -327,6 +332,7 @@ def parameterize(
     *faces_and_algorithm: ArrayLike | str,
     algorithm: str | None = None,
     keep_invalid: bool = False,
+    check: Check = "full",
     plugins: Iterable[str] = (),
     **parameters: Any,
 ) -> Result:
@@ -345,6 +351,9 @@ def parameterize(
     keep_invalid : bool
         Whether to return an invalid map (for example, one with folds) instead of raising; see
         :attr:`Result.ok`.
+    check : {"full", "fast"}
+        With "fast" only the promises of the map's class are checked, such as no folds: there are
+        no notices on its quality, and :attr:`Result.metrics` are computed when asked for.
     plugins : iterable of str
         Python files or ``module:name`` with more algorithms.
     **parameters
@@ -362,7 +371,7 @@ def parameterize(
     RegistryError
         The algorithm is unknown.
     ParameterError
-        A parameter is unknown, its value is out of range, or two algorithms are named.
+        A parameter or a check is unknown, a value is out of range, or two algorithms are named.
     AlgorithmFailed
         No map was found, or the map is not valid and `keep_invalid` is False.
 
@@ -379,6 +388,9 @@ def parameterize(
     'cem'
 
     """
+    if check not in get_args(Check):
+        allowed = ", ".join(map(repr, get_args(Check)))
+        raise ParameterError(f"check={check!r} is unknown; allowed: {allowed}.")
     arrays = [one for one in faces_and_algorithm if one is not None and not isinstance(one, str)]
     named = [one for one in (*faces_and_algorithm, algorithm) if isinstance(one, str)]
     if len(named) > 1:
@@ -389,7 +401,8 @@ def parameterize(
     mesh = load_surface(given, [a.mesh_type for a in candidates], registry=registry)
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
-    outcome, z = check_cell(chosen, task.mesh, task.cell)
+    full = check == "full"
+    outcome, z = check_cell(chosen, task.mesh, task.cell, memory=False, figures=full)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)
