@@ -19,18 +19,16 @@ why it has no number.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, partial
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from cembench.core.errors import ParameterError
 from cembench.core.names import slug
 from cembench.report.content.evidence import DISK, Evidence
+from cembench.report.declarations import Declaration, filled, own, parsed, read
 from cembench.report.document import (
     Column,
     Item,
@@ -91,10 +89,8 @@ _NAMES: Mapping[str, Callable[[Mapping[str, Any], Record], str]] = {
 _HEADINGS = dict.fromkeys(("starred", "marked", "called", "named"), "algorithm") | {"ending": ""}
 
 
-class DeclaredColumn(BaseModel):
+class DeclaredColumn(Declaration):
     """A column: of a record's figure (`column`) or of an expression over a group (`value`)."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     column: str = ""
     value: str = ""
@@ -138,10 +134,8 @@ def _unit(column: FrameColumn) -> str:
     return column.unit if column.unit in ("s", "MiB") else ""
 
 
-class DeclaredTable(BaseModel):
+class DeclaredTable(Declaration):
     """A table; `where` is an expression, true for the records that it is about."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     title: str
     columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
@@ -164,7 +158,7 @@ class DeclaredTable(BaseModel):
         return self
 
 
-def read_declarations(path: Path) -> dict[str, DeclaredTable]:
+def read_tables(path: Path) -> dict[str, DeclaredTable]:
     """Return the tables that a TOML file declares, by name.
 
     Raises
@@ -173,35 +167,15 @@ def read_declarations(path: Path) -> dict[str, DeclaredTable]:
         The file cannot be read, or a declaration is wrong.
 
     """
-    try:
-        return _declarations(path.read_text(encoding="utf-8"), str(path))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ParameterError(f"{path} cannot be read: {error}. Name a TOML file.") from error
-
-
-def _declarations(text: str, where: str) -> dict[str, DeclaredTable]:
-    try:
-        given = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ParameterError(f"{where} is not TOML: {error}.") from error
-    found = {}
-    for name, table in given.items():
-        if name == "plots":  # cembench.report.declared_plots reads these
-            continue
-        try:
-            found[name] = DeclaredTable.model_validate(table)
-        except ValidationError as error:
-            first = error.errors()[0]
-            place = " / ".join([name, *map(str, first["loc"])])
-            raise ParameterError(f"{where}, {place}: {first['msg']}.") from error
-    return found
+    # cembench.report.declared_plots reads the plots.
+    tables = {name: table for name, table in read(path).items() if name != "plots"}
+    return parsed(tables, DeclaredTable, str(path))
 
 
 @cache
 def own_tables() -> Mapping[str, DeclaredTable]:
     """Return the tables that every report can have."""
-    text = (files("cembench.report") / "tables.toml").read_text(encoding="utf-8")
-    return _declarations(text, "tables.toml")
+    return parsed(own("tables.toml"), DeclaredTable, "tables.toml")
 
 
 def declared_table(
@@ -245,10 +219,10 @@ def declared_table(
     told = {"policy": policy, "n": str(len(chosen)), **texts}
     return Table(
         called or name,
-        spec.title.format_map(told),
+        filled(spec.title, told),
         columns,
         tuple(zip(*entries, strict=True)),
-        spec.caption.format_map(told),
+        filled(spec.caption, told),
         tuple(dict.fromkeys(_notes(evidence, spec, chosen))),
     )
 
@@ -279,7 +253,7 @@ def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
     sections: list[Section] = []
     for number, path in enumerate(paths, start=1):
         items: list[Item] = []
-        for name, declared in read_declarations(path).items():
+        for name, declared in read_tables(path).items():
             called = f"declared-{number}-{slug(name)}"
             made = declared_table(evidence, name, declared, called=called)
             items.append(made or Text(f"{declared.title}: no record of this run is in this table."))
@@ -313,8 +287,9 @@ def _entry(evidence: Evidence, row: Mapping[str, Any], one: DeclaredColumn) -> V
         return of_status(_NAMES[name](row, record), record=row["key"], why=cause)
     if name in _NAMES:
         return words(_NAMES[name](row, record))
-    if one.words:
-        return words(str(COLUMNS[name].of(record) or "-"))
+    found = COLUMNS[name].of(record)
+    if one.words or isinstance(found, str):
+        return words(str(found or "-"))
     return figure_entry(evidence, record, COLUMNS[name])
 
 

@@ -16,20 +16,18 @@ Points are rows of the run's frame, or of one that is made of it (:mod:`cembench
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cache
-from importlib.resources import files
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from cembench.core.errors import ParameterError
 from cembench.core.names import slug
 from cembench.report.content.evidence import AS_GOOD, DEGREES, Evidence, MeasuredSurface
+from cembench.report.declarations import Declaration, filled, own, parsed, read
 from cembench.report.document import Text
 from cembench.report.palette import SeriesStyle, phase_style, series_styles
 from cembench.report.plot_rows import ROWS, UNSEEN, Inspections
@@ -42,11 +40,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class DeclaredAxis(_Part):
+class DeclaredAxis(Declaration):
     """An axis: an expression for the values on it; its title is by default that of the column."""
 
     value: str = ""
@@ -70,7 +64,7 @@ class DeclaredAxis(_Part):
         return Axis(self.value if title is None else title, self.log, self.low, self.high)
 
 
-class DeclaredPanel(_Part):
+class DeclaredPanel(Declaration):
     """What makes one or more pairs of axes; see docs/tables.md for the keys."""
 
     rows: Literal["record", "iteration", "phase", "angle", "difficulty", "printed"] = "record"
@@ -108,7 +102,7 @@ class DeclaredPanel(_Part):
         return self
 
 
-class DeclaredPlot(_Part):
+class DeclaredPlot(Declaration):
     """A plot; keys of a panel that are beside `title` are those of each of its `panels`."""
 
     title: str
@@ -133,44 +127,16 @@ class DeclaredPlot(_Part):
         return own | {"panels": [shared | p if isinstance(p, dict) else p for p in panels]}
 
 
-def parse_plots(declared: Mapping[str, Any], where: str) -> dict[str, DeclaredPlot]:
-    """Return the plots that tables of TOML declare, by name.
-
-    Raises
-    ------
-    ParameterError
-        A declaration is wrong; `where` is the file that it is in.
-
-    """
-    parsed = {}
-    if not isinstance(declared, Mapping):
-        raise ParameterError(f"{where}, plots: write each plot as a table [plots.NAME].")
-    for name, table in declared.items():
-        try:
-            parsed[name] = DeclaredPlot.model_validate(table)
-        except ValidationError as error:
-            first = error.errors()[0]
-            place = " / ".join([name, *map(str, first["loc"])])
-            raise ParameterError(f"{where}, {place}: {first['msg']}.") from error
-    return parsed
-
-
-@cache
-def _own() -> Mapping[str, Any]:
-    text = (files("cembench.report") / "plots.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
-
-
 def own_plots(evidence: Evidence) -> dict[str, DeclaredPlot]:
     """Return the plots that every report can have, and those of the run's paper, by name.
 
     A paper may add to one that every report has, with "_" for "-" in its name.
     """
-    known, paper = dict(_own()), evidence.paper
+    known, paper = dict(own("plots.toml")), evidence.paper
     for name, one in paper.plots.items():
         usual = name.replace("_", "-")
         known[usual] = known.get(usual, {}) | one.model_dump(exclude_unset=True)
-    return parse_plots(known, f"plots.toml or {paper.folder / 'figures.toml'}")
+    return parsed(known, DeclaredPlot, f"plots.toml or {paper.folder / 'figures.toml'}")
 
 
 def further_plots(evidence: Evidence, path: Path, number: int) -> list[Plot | Text]:
@@ -182,11 +148,11 @@ def further_plots(evidence: Evidence, path: Path, number: int) -> list[Plot | Te
         A declaration is wrong, or does not fit the run.
 
     """
-    declared = tomllib.loads(path.read_text(encoding="utf-8")).get("plots", {})
+    declared = parsed(read(path).get("plots", {}), DeclaredPlot, f"{path}, plots")
     return [
         declared_plot(evidence, name, one, called=f"declared-{number}-{slug(name)}")
         or Text(f"{one.title}: no record of this run is in this plot.")
-        for name, one in parse_plots(declared, str(path)).items()
+        for name, one in declared.items()
     ]
 
 
@@ -244,23 +210,13 @@ def declared_plot(
     }
     return Plot(
         called or spec.figure.lower().replace(" ", "-") or name,
-        _filled(spec.title, texts),
+        filled(spec.title, texts),
         tuple(one.panel for one in drawn),
-        _filled(spec.caption, texts),
+        filled(spec.caption, texts),
         spec.alternative,
         spec.figure,
         spec.columns,
     )
-
-
-def _filled(text: str, known: Mapping[str, Any]) -> str:
-    try:
-        return text.format_map(known)
-    except (LookupError, ValueError, TypeError) as error:
-        raise ParameterError(
-            f"{text!r} of a plot cannot be filled in ({error}); known in braces are "
-            f"{', '.join(sorted(map(str, known)))}."
-        ) from error
 
 
 def _panels(
@@ -282,7 +238,7 @@ def _panels(
         if drawn := make(evidence, spec, group):
             about = group.iloc[0].to_dict() | {"n": drawn.n}
             about["origins"] = ", ".join(sorted(set(group.get("origin", ()))))
-            title = _filled(spec.panel, about)
+            title = filled(spec.panel, about)
             yield drawn._replace(panel=replace(drawn.panel, title=title, of=str(value)))
 
 

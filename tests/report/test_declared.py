@@ -6,7 +6,7 @@ from dataclasses import fields
 import pytest
 
 from cembench.core.errors import ParameterError
-from cembench.report.declared import declared_table, further_tables, own_tables, read_declarations
+from cembench.report.declared import declared_table, further_tables, own_tables, read_tables
 from cembench.report.document import Table, Text
 from cembench.report.write_report import write_report
 from cembench.results.columns import COLUMNS
@@ -87,7 +87,7 @@ def test_a_wrong_declaration_says_where_and_what_is_allowed(tmp_path, text, said
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(ParameterError) as caught:
-        read_declarations(file)
+        read_tables(file)
     assert said in str(caught.value)
 
 
@@ -95,6 +95,22 @@ def test_a_file_that_is_not_there_is_an_error_before_anything_is_written(small_r
     with pytest.raises(ParameterError, match="cannot be read"):
         write_report(small_run, tmp_path / "report", "x", tables=[tmp_path / "no.toml"])
     assert not (tmp_path / "report").exists()
+
+
+def test_a_column_of_texts_needs_no_mark(evidence, tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('[a]\ntitle = "A"\ncolumns = ["mesh", "seconds"]')
+    (table,) = further_tables(evidence, [file])[0].items
+    assert {row[0].text for row in table.rows} == set(evidence.frame["mesh"])
+
+
+@pytest.mark.parametrize("text", ["{colour}", "{", "{0}"])
+def test_braces_that_stand_for_nothing_are_an_error(evidence, tmp_path, text):
+    file = tmp_path / "mine.toml"
+    file.write_text(f'[a]\ntitle = "{text}"\ncolumns = ["mesh"]')
+    with pytest.raises(ParameterError) as caught:
+        further_tables(evidence, [file])
+    assert "known in braces are n, policy" in str(caught.value)
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from cembench.core.errors import ParameterError
+from cembench.report.declarations import parsed
 from cembench.report.declared_plots import (
+    DeclaredPlot,
     declared_plot,
     further_plots,
     own_plots,
-    parse_plots,
 )
 from cembench.report.document import Text
 from cembench.report.plot_statistics import cost_ratios, fit, front
@@ -26,7 +27,7 @@ LEAST = 'title = "A"\nx = "faces"\ny = "seconds"\n'
 
 
 def declared(text, name="a"):
-    return parse_plots(tomllib.loads(f"[{name}]\n{text}"), "mine.toml")[name]
+    return parsed(tomllib.loads(f"[{name}]\n{text}"), DeclaredPlot, "mine.toml")[name]
 
 
 @pytest.fixture
@@ -107,14 +108,17 @@ def test_a_wrong_declaration_says_where_and_what_is_allowed(text, said):
 
 
 def test_plots_that_are_no_tables_are_an_error():
-    with pytest.raises(ParameterError, match=r"write each plot as a table \[plots.NAME\]"):
-        parse_plots(3, "mine.toml")
+    with pytest.raises(ParameterError, match="write each declaration as a table"):
+        parsed(3, DeclaredPlot, "mine.toml")
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (LEAST + 'panel = "{n} {colour}"', r"cannot be filled in \('colour'\); known in braces"),
+        (
+            LEAST + 'panel = "{n} {colour}"',
+            r"cannot be filled in \(KeyError: 'colour'\); known in braces",
+        ),
         (LEAST + 'caption = "{colour}"', "known in braces are as_good, counts"),
         (LEAST + 'facet = "colour"', "facet = 'colour' names no column; known: mesh"),
         (LEAST + 'series = "colour"', "series = 'colour' names no column; known: mesh"),
