@@ -24,6 +24,13 @@ from cembench.conformal.planar import (
     polygon_area,
     signed_areas,
 )
+from cembench.conformal.texel_density import (
+    SIDE,
+    extent_of,
+    texel_density_ratio,
+    texture_words,
+    undersampled_share,
+)
 from cembench.core.blocks import blocks, in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
@@ -265,6 +272,11 @@ class MapFigures:
         return image_area(self.mesh, self.uv)
 
     @cached_property
+    def image_areas(self) -> Real:
+        """Signed areas of the triangles' images, (m,)."""
+        return signed_areas(self.uv, self.mesh.F)
+
+    @cached_property
     def angle_errors(self) -> Real:
         """Absolute change of every corner's angle in degrees, (m, 3)."""
         return angle_errors(self.mesh, self.uv)
@@ -453,6 +465,18 @@ METRICS: tuple[Metric, ...] = (
         "share of the image that covers other parts of it, by the boundary's winding numbers",
         lambda f: f.overlap,
     ),
+    Metric(
+        "texel_density_ratio", "texel density", "texels", ": 1", ".3g", ".4g",
+        "largest over smallest texels per length on the surface, but for a hundredth of it at "
+        "either end",
+        lambda f: texel_density_ratio(f.areas, f.image_areas), gauge_invariant=False,
+    ),
+    Metric(
+        "undersampled_share", "undersampled", "undersampled", "of the surface", ".1e", ".2g",
+        f"share of the surface with less than one texel per ten-thousandth of it, at {SIDE:,} px",
+        lambda f: undersampled_share(f.areas, f.image_areas, extent_of(f.uv)),
+        gauge_invariant=False,
+    ),
 )  # fmt: skip
 
 
@@ -462,11 +486,13 @@ def metrics_shown(*places: str) -> tuple[Metric, ...]:
 
 
 def caption(metrics: Mapping[str, float | int | None]) -> str:
-    """Return the overview metrics in one line, as a caption of a picture."""
-    shown = (m for m in metrics_shown("overview") if m.name in metrics)
-    return "   ".join(
-        f"{m.title} {m.text(metrics[m.name])}{f' {m.unit}' if m.unit else ''}" for m in shown
-    )
+    """Return the overview metrics and the texel density in one line, as a caption of a picture."""
+    shown = [
+        f"{m.title} {m.text(metrics[m.name])}{f' {m.unit}' if m.unit else ''}"
+        for m in metrics_shown("overview")
+        if m.name in metrics
+    ]
+    return "   ".join(filter(None, [*shown, texture_words(metrics)]))
 
 
 def metrics_markdown() -> str:

@@ -32,12 +32,15 @@ class Checkerboard:
         Number of squares of side 1 along the board's width; they are stored row by row.
     first_part : int64 (k,)
         For each square the number of its first part, row by row; -1 for an undivided square.
+    depth : int
+        How often the smallest squares are divided; 0 if none is.
 
     """
 
     low: Ints
     across: int
     first_part: Ints
+    depth: int = 0
 
     @classmethod
     def of(cls, places: Real, fineness: Real, weights: Real) -> Checkerboard:
@@ -57,7 +60,7 @@ class Checkerboard:
         across, up = np.floor(places.max(axis=0)).astype(np.int64) - low + 1
         board = np.full(int(across * up), -1, dtype=np.int64)
         node = _roots(places, low, int(across))
-        here, start = np.arange(len(places)), 0
+        here, start, depth = np.arange(len(places)), 0, 0
         for level in range(MOST_LEVELS):
             size = len(board)
             weight = np.bincount(node[here], weights[here], minlength=size)
@@ -69,13 +72,8 @@ class Checkerboard:
             board = np.concatenate([board, np.full(FINER**2 * len(divided), -1, dtype=np.int64)])
             here = here[board[node[here]] >= 0]
             node[here] = board[node[here]] + _part(places[here], level + 1)
-            start = size
-        return cls(low, int(across), board)
-
-    @property
-    def is_divided(self) -> bool:
-        """Whether any square is divided."""
-        return bool((self.first_part >= 0).any())
+            start, depth = size, level + 1
+        return cls(low, int(across), board, depth)
 
     def at(self, places: Real) -> tuple[NDArray[np.bool_], Ints]:
         """Return whether the board is dark at points (k, 2), and the depth of subdivision there.

@@ -90,7 +90,7 @@ def preview_png(
     outline = scene.image_in_window(uv)[:, :2]
     loops = tuple(outline[loop] for loop in mesh.loops)
     overlay = compose.Overlay(loops, scene.small_folds(uv, mesh.F))
-    words = (title, caption, _note(divided=board.squares.is_divided, turned=turned))
+    words = (title, caption, _note(board.squares.depth, turned=turned))
     return compose.page(surface, image, overlay, words, size)
 
 
@@ -134,14 +134,14 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
         )
 
 
-def _note(*, divided: bool, turned: bool) -> str:
+def _note(depth: int, *, turned: bool) -> str:
     """Return the note below a picture on how it was drawn."""
     up = "The image is turned so that up on the surface is up in it." if turned else ""
     finer = (
         f"Squares that would be large on the surface are divided {FINER} by {FINER}, in both "
-        "panels alike."
+        f"panels alike; the smallest are 1/{FINER**depth:,} as wide."
     )
-    return f"{up} {finer if divided else ''}".strip()
+    return f"{up} {finer if depth else ''}".strip()
 
 
 def _draw(mesh: TriangleMesh, uv: Complex, side: int) -> tuple[Picture, Picture, scene.Board]:

@@ -34,7 +34,8 @@ Complex = NDArray[np.complex128]
 MOST = 50_000
 #: Triangles of all surfaces on one page together, to keep it small; each gets some.
 TOGETHER, LEAST = 105_000, 5_000
-#: Ends of the colour scales: degrees, abs(mu), and powers of two of the area scaling.
+#: Ends of the colour scales: degrees, abs(mu), and powers of two of the area scaling,
+#: which is the square of the texel density.
 DEGREES, MU, DOUBLINGS = 10.0, 0.3, 6.0
 #: Steps of coordinates of the surface, of its images, and of distortions.
 STEPS = {"V": 2**14 - 1, "uv": 2**16 - 1, "share": 2**5 - 1}

@@ -48,12 +48,14 @@ def to_unit_square(z: Complex) -> Complex:
     return np.asarray(moved.real.clip(0, 1) + 1j * moved.imag.clip(0, 1))
 
 
-def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
+def packed(
+    maps: Sequence[Complex], areas: Sequence[float], *, equal: bool = False
+) -> list[Complex]:
     """Pack several maps into the unit square, one shell each.
 
     Shells are placed in rows, the largest first, each in its own square and undistorted. The side
     of a square is proportional to the root of its surface's area, but at least a sixteenth of the
-    largest, because files come in different units.
+    largest, because files come in different units. If `equal`, all squares have the same size.
 
     Parameters
     ----------
@@ -61,6 +63,8 @@ def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
         Images of the vertices of each surface.
     areas : sequence of float
         Area of each surface.
+    equal : bool
+        Whether every surface gets an equal part.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def packed(maps: Sequence[Complex], areas: Sequence[float]) -> list[Complex]:
     """
     if len(maps) == 1:
         return [to_unit_square(maps[0])]
-    sides = np.sqrt(np.asarray(areas) / np.max(areas)).clip(min=_SMALLEST)
+    sides = np.sqrt(np.asarray(areas) / np.max(areas)).clip(min=1.0 if equal else _SMALLEST)
     order = np.argsort(-sides, kind="stable")
     low, high = 0.0, 1.0  # find the largest scale at which the rows fit
     for _ in range(50):

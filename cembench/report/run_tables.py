@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from statistics import median, quantiles
 
+from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
 from cembench.report.document import (
@@ -208,11 +209,19 @@ def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
         angles, folds = (outcome.metrics[n] for n in ("angle_error_mean_deg", "flipped_triangles"))
         shown = f"{angles:.2f} degrees mean angle error, {folds} folds"
         yield "quality", f"{shown}; -v prints all figures"
+    if texture := texture_words(outcome.metrics):
+        yield "texture", texture
     if outcome.median_seconds is not None:
         yield "seconds", seconds_words(record) or f"{outcome.median_seconds:.3f}"
     if outcome.folded_before_repair:
         yield "folded before repair", str(outcome.folded_before_repair)
-    yield from (("note", str(note)) for note in outcome.notes)
+    yield from _notes(record)
+
+
+def _notes(record: Record) -> Iterator[tuple[str, str]]:
+    yield from (("note", str(note)) for note in record.outcome.notes)
+    if record.outcome.status == "ok" and needs_islands(record.outcome.metrics):
+        yield "note", ISLANDS
 
 
 def _figures(record: Record) -> Iterator[tuple[str, str]]:
@@ -251,7 +260,7 @@ def _figures(record: Record) -> Iterator[tuple[str, str]]:
         more = f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
         whose = "of the program's processes" if record.is_program else more
         yield "memory", f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, {whose}"
-    yield from (("note", str(note)) for note in outcome.notes)
+    yield from _notes(record)
 
 
 def _printed(record: Record) -> str:

@@ -35,6 +35,7 @@ def map_files(
     parameters: Mapping[str, Any] | None = None,
     output: AnyPath | None = None,
     uv: Placement = "unit",
+    equal_parts: bool = False,
     checker: bool = False,
     bake: AnyPath | None = None,
     geometry_image: AnyPath | None = None,
@@ -76,6 +77,8 @@ def map_files(
         all of them.
     uv : {"unit", "disk"}
         Move the UVs into the unit square, or keep the map as it is (a disk).
+    equal_parts : bool
+        Give several surfaces in one file equal parts of the unit square.
     checker : bool
         Add a checkerboard texture; GLB always has one.
     bake : path, optional
@@ -166,7 +169,7 @@ def map_files(
         check_takes_disks(candidates)
     given, target = [Path(mesh) for mesh in meshes], path_of(output)
     outputs = output_files(given, target)
-    file_options = FileOptions(uv, checker, path_of(bake))
+    file_options = FileOptions(uv, checker, path_of(bake), equal_parts)
     extras = Extras(path_of(geometry_image), path_of(remesh), side, uv, path_of(html))
     check_extras(given, outputs, file_options, extras)
     is_atlas = any(a.target == "atlas" for a in candidates)

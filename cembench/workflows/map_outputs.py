@@ -217,7 +217,9 @@ def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, reco
     write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
 
 
-def draw_shells(shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path) -> None:
+def draw_shells(
+    shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path, *, equal: bool
+) -> None:
     """Draw the surfaces of a file and their maps, placed as in its UVs, as a PNG."""
     from cembench.drawing.preview import write_preview
 
@@ -226,4 +228,5 @@ def draw_shells(shells: Shells, maps: Sequence[NDArray[np.complex128]], picture:
     F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])
     mesh = TriangleMesh.trusted(V, F, shells.path.stem)
     title = f"{shells.path.stem}: {len(maps)} surfaces"
-    write_preview(mesh, np.concatenate(shells.packed(maps)), picture, title=title, turned=False)
+    uv = np.concatenate(shells.packed(maps, equal=equal))
+    write_preview(mesh, uv, picture, title=title, turned=False)

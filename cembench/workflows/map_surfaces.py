@@ -216,7 +216,7 @@ class Maps:
             told = write_shells(file.output, file.shells, maps, self.file_options)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
-                draw_shells(file.shells, maps, file.picture)
+                draw_shells(file.shells, maps, file.picture, equal=self.file_options.equal)
         return tuple((file.output or file.shells.path, notice) for notice in told)
 
     def _mapped(self, file: FileJobs, job: Job) -> Mapped:

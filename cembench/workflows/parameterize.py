@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.conformal.texel_density import ISLANDS, needs_islands
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.extras import Extra, require
@@ -92,7 +93,8 @@ class Result:
     @property
     def notices(self) -> tuple[str, ...]:
         """Remarks on the surface and the map, e.g. a broken premise of the paper."""
-        return (*map(str, self.mesh.notices), *map(str, self.outcome.notes))
+        islands = (ISLANDS,) if self.ok and needs_islands(self.outcome.metrics) else ()
+        return (*map(str, self.mesh.notices), *map(str, self.outcome.notes), *islands)
 
     @property
     def phases(self) -> Mapping[str, float]:

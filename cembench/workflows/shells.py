@@ -60,13 +60,12 @@ class Shells:
         """The whole file as one mesh, for writers and pictures only."""
         return TriangleMesh.trusted(self.V, self.F, self.path.stem)
 
-    def packed(self, maps: Sequence[Complex]) -> list[Complex]:
-        """Place the maps side by side in the unit square; larger surfaces get larger parts."""
-        areas = [float(corner_products(p.mesh.V, p.mesh.F)[1].sum()) for p in self.parts]
-        return packed(maps, areas)
+    def packed(self, maps: Sequence[Complex], *, equal: bool) -> list[Complex]:
+        """Place the maps side by side in the unit square, in parts by area or in equal ones."""
+        return packed(maps, areas_of(self.parts), equal=equal)
 
-    def together(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
-        """Place the maps side by side in the unit square, per corner where surfaces were cut.
+    def together(self, maps: Sequence[Complex], *, equal: bool) -> tuple[Complex, Ints | None]:
+        """Place the maps as :meth:`packed` does, per corner where surfaces were cut.
 
         Returns
         -------
@@ -79,7 +78,7 @@ class Shells:
         uv, copies = np.zeros(len(self.V), np.complex128), []
         corners, size = self.F.copy(), len(self.V)
         for part, z, own, faces in zip(
-            self.parts, self.packed(maps), self.vertices, self.faces, strict=True
+            self.parts, self.packed(maps, equal=equal), self.vertices, self.faces, strict=True
         ):
             uv[own] = z[: len(own)]
             copies.append(z[len(own) :])
@@ -88,6 +87,11 @@ class Shells:
             size += len(copies[-1])
         is_cut = any(part.cut for part in self.parts)
         return np.concatenate([uv, *copies]), corners if is_cut else None
+
+
+def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
+    """Return the area of each surface, twice."""
+    return [float(corner_products(one.mesh.V, one.mesh.F)[1].sum()) for one in surfaces]
 
 
 def read_shells(

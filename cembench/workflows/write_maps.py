@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.atlas import cut_map
-from cembench.conformal.laplacian import corner_products
 from cembench.conformal.planar import orientations
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
@@ -23,7 +22,7 @@ from cembench.mesh.unit_square import packed, to_unit_square
 from cembench.mesh.uvs import uv_of_faces
 from cembench.running.surfaces import SurfaceFile
 from cembench.workflows.settings import Placement
-from cembench.workflows.shells import Shells
+from cembench.workflows.shells import Shells, areas_of
 
 Complex = NDArray[np.complex128]
 
@@ -40,12 +39,15 @@ class FileOptions:
         Whether to add a checkerboard texture. GLB always has one.
     bake : Path, optional
         A texture for the file's own coordinates, to be repainted for the new ones.
+    equal : bool
+        Whether several surfaces get equal parts of the unit square, not parts by their areas.
 
     """
 
     place: Placement = "unit"
     checker: bool = False
     bake: Path | None = None
+    equal: bool = False
 
     @property
     def textured(self) -> bool:
@@ -151,7 +153,7 @@ def write_shells(
 
     Otherwise like :func:`write_map`: an OBJ file keeps its content.
     """
-    uv, corners = shells.together(maps)
+    uv, corners = shells.together(maps, equal=file_options.equal)
     mesh = shells.whole
     whole = SurfaceFile(shells.path, mesh)
     textured = Soup.of_triangles(mesh.V, mesh.F, uv, corners, name=mesh.name)
@@ -212,8 +214,7 @@ def write_atlas(
 
     A GLB file gets a node for each surface; other formats get one mesh.
     """
-    areas = [float(corner_products(file.mesh.V, file.mesh.F)[1].sum()) for file in surfaces]
-    moved = packed(maps, areas)
+    moved = packed(maps, areas_of(surfaces), equal=file_options.equal)
     parts = [_textured(file, z) for file, z in zip(surfaces, moved, strict=True)]
     texture = _checker(file_options, output)
     if output.suffix.lower() == ".glb":

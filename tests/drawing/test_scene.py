@@ -66,7 +66,7 @@ def test_a_finer_board_covers_the_same_surface_with_smaller_squares():
     uv = (z - 0.7) / (1 - 0.7 * z)  # a Moebius map of the disk: the scale varies by a factor of 32
     space = surface_in_window(mesh)
     board = Board.of(mesh.F, space, uv)
-    assert board.squares.is_divided
+    assert board.squares.depth
     corners = board.places[mesh.F]
     _, level = board.squares.at(corners.mean(axis=1))
     sides = np.sqrt(doubled_areas(space[mesh.F]) / doubled_areas(corners))

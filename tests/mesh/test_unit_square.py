@@ -34,3 +34,11 @@ def test_shells_share_the_square_without_overlap(areas):
     assert (high - low).prod(axis=1).sum() > 0.4  # a few shells waste no more
     larger = np.argsort(areas, kind="stable")
     assert (np.diff((high - low)[larger, 0]) > -1e-12).all()
+
+
+def test_equal_parts_are_equal_whatever_the_areas():
+    square = np.array([0, 1, 1 + 1j, 1j])
+    first, second = packed([square, square], [100.0, 1.0], equal=True)
+    assert np.ptp(first.real) == pytest.approx(np.ptp(second.real))
+    by_area = packed([square, square], [100.0, 1.0])
+    assert np.ptp(by_area[0].real) == pytest.approx(10 * np.ptp(by_area[1].real))

@@ -42,7 +42,7 @@
       colour = vec4(c * light, 1.);
     }`;
   const MODES = [
-    ["checkerboard", null], ["angle error", "angle"], ["|\u03bc|", "mu"], ["area scaling", "area"],
+    ["checkerboard", null], ["angle error", "angle"], ["|\u03bc|", "mu"], ["texel density", "area"],
   ];
   const RAMPS = {
     even: "linear-gradient(90deg,#f2f2ed,#ed9940,#73141f)",
@@ -297,7 +297,7 @@
       this.give("folded", perTriangle((t) => (folds.has(t) ? 1 : 0)), 1);
       const { degrees, mu, doublings } = head.scales;
       const ends = { angle: ["0\u00b0", `${degrees}\u00b0 and more`], mu: ["0", `${mu} and more`],
-        area: [`1/${2 ** doublings}`, `${2 ** doublings} times as large`] }[name];
+        area: [`1/${2 ** (doublings / 2)}`, `${2 ** (doublings / 2)} times the mean`] }[name];
       this.scale.hidden = !name;
       if (name) {
         const ramp = make("i");
