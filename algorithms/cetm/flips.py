@@ -30,6 +30,13 @@ Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
 
+#: The rows of a matrix are ordered anew after flips of more than this share of the triangles.
+FEW = 0.0005
+#: Edges whose opposite angles sum to pi less this, in radians, are looked at for flips.
+NEARLY = 1e-6
+#: Below this error of an angle sum, in radians, steps keep the factor until an edge is flipped.
+KEPT = 1e-3
+
 
 @algorithm(
     "cetm-flips",
@@ -74,7 +81,7 @@ def cetm_flips(
     with phase("flips"):
         T = Triangulation.doubled(mesh.F, mesh.V, double.mirror)
         T.make_delaunay(np.zeros(double.size), flat=True)
-    u, residual, iterations = _flattened(T, double.size, cones, tolerance, max_iterations)
+    u, residual, iterations = _flattened(T, double.half, cones, tolerance, max_iterations)
     with phase("layout"):
         z, off = _laid_out(T, u, cones, mesh.n)
         uv = disk_of_triangle(z)
@@ -108,37 +115,56 @@ def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:
 
 def _sides(T: Triangulation, u: Real) -> Real:
     """Return the lengths (m, 3) opposite to each corner, scaled to longest side 1 per triangle."""
-    log_length = T.scaled(u).reshape(-1, 3)
-    log_length = log_length - log_length.max(axis=1, keepdims=True)
-    return np.exp(np.roll(log_length, -1, axis=1))
+    a, b, c = T.scaled(u).reshape(-1, 3).T
+    longest = np.maximum(np.maximum(a, b), c)
+    return np.exp(np.stack([b - longest, c - longest, a - longest], axis=1))
 
 
 def _flattened(
-    T: Triangulation, n: int, cones: Indices, tolerance: float, most: int
+    T: Triangulation, half: Indices, cones: Indices, tolerance: float, most: int
 ) -> tuple[Real, float, int]:
-    """Return the scale u (n,) after flipping along; the residual; the number of Newton steps."""
+    """Return the scale u of the double after flipping along; the residual; the number of steps.
+
+    `half` gives the surface's vertex of each vertex of the double. Copies have the same scale, so
+    the unknowns are those of the surface alone, and equations of copies are added.
+    """
+    n = int(half.max()) + 1
+    copies = np.bincount(half)
     flat = np.full(n, 2 * np.pi)
     flat[cones] = 2 * np.pi / 3
+    flat *= copies
     u = np.zeros(n)
     free = np.arange(n) != cones[0]
 
     def missing(u: Real) -> tuple[Real, Real, NDArray[np.bool_]]:
-        with phase("flips"):
-            T.make_delaunay(u)
+        v, before = u[half], T.flips
         with phase("angles"):
-            here, broken = angles(_sides(T, u))
-            return flat - angle_sums(T.F, here, n), here, broken
+            here, broken = angles(_sides(T, v))
+        with phase("flips"):
+            opposite = np.roll(here, -2, axis=1).ravel()
+            T.make_delaunay(v, np.flatnonzero(opposite + opposite[T.twin] > np.pi - NEARLY))
+        with phase("angles"):
+            if T.flips > before:
+                here, broken = angles(_sides(T, v))
+            return flat - angle_sums(half[T.F], here, n), here, broken
 
     gradient, here, broken = missing(u)
-    best = float(np.abs(gradient).max())
+    best = float(np.abs(gradient / copies).max())
+    factor: Cholesky | None = None
+    ordered = flips = 0
     for iteration in range(most):
         if best <= tolerance:
-            return u, best, iteration
-        with phase("assembly"):
-            H = laplacian_of_weights(T.F, half_cotangents_of(here, broken), n)
-            H = H[free][:, free]
+            return u[half], best, iteration
+        if factor is None or best > KEPT or T.flips > flips:
+            with phase("assembly"):
+                H = laplacian_of_weights(half[T.F], half_cotangents_of(here, broken), n)
+                H = H[free][:, free]
+            few = T.flips - ordered <= FEW * len(T.F)
+            factor = Cholesky(H, like=factor if few else None)
+            ordered = ordered if few and factor is not None else T.flips
+            flips = T.flips
         step = np.zeros(n)
-        step[free] = -Cholesky(H).solve(gradient[free])
+        step[free] = -factor.solve(gradient[free])
         slope, share = float(gradient @ step), 1.0
         for _ in range(SHORTER):
             there, now, lost = missing(u + share * step)
@@ -146,7 +172,7 @@ def _flattened(
                 break
             share /= 2
         u, gradient, here, broken = u + share * step, there, now, lost
-        best = float(np.abs(gradient).max())
+        best = float(np.abs(gradient / copies).max())
     raise AlgorithmFailed(
         f"the angle sums are still off by up to {best:.2g} rad after {most} Newton steps, "
         f"tolerance {tolerance:g}. Allow more with max_iterations"
@@ -167,19 +193,22 @@ def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Comple
     P[root] = [0, sides[root, 0], sides[root, 2] * np.exp(1j * corner[root, 0])]
     reached = np.zeros(len(T.F), dtype=bool)
     reached[root] = True
+    reached_from = np.empty(len(T.F), dtype=np.int64)
     front = np.array([root])
     while len(front):
         h = (3 * front[:, None] + np.arange(3)).ravel()
         g = T.twin[h]
         new = ~reached[g // 3]
         h, g = h[new], g[new]
-        front, first = np.unique(g // 3, return_index=True)
+        reached_from[g // 3] = np.arange(len(g))
+        first = reached_from[g // 3] == np.arange(len(g))
         h, g = h[first], g[first]
-        t, c, s, d = h // 3, h % 3, g // 3, g % 3
+        front, t, c, d = g // 3, h // 3, h % 3, g % 3
         p, q = P[t, c], P[t, (c + 1) % 3]
         direction = (p - q) / np.maximum(np.abs(p - q), np.finfo(float).tiny)
-        P[s, d], P[s, (d + 1) % 3] = q, p
-        P[s, (d + 2) % 3] = q + direction * sides[s, (d + 2) % 3] * np.exp(1j * corner[s, d])
+        P[front, d], P[front, (d + 1) % 3] = q, p
+        far = sides[front, (d + 2) % 3] * np.exp(1j * corner[front, d])
+        P[front, (d + 2) % 3] = q + direction * far
         reached[front] = True
     off = np.abs(np.abs(np.roll(P, -1, axis=1) - P) / sides - 1)
     to_disk = _to_corners(T, P, cones)

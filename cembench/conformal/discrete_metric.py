@@ -33,13 +33,13 @@ def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
     Sec. 3).
     """
     a, b, c = lengths.T
-    # Sum of two sides less the third: the three factors of Heron's formula.
-    spare = np.stack([b + c - a, c + a - b, a + b - c], axis=1)
-    broken = np.asarray((spare <= 0).any(axis=1))
-    spare[broken] = 1.0
-    whole = spare.sum(axis=1)
-    root = np.sqrt(spare.prod(axis=1) / whole)
-    found = 2 * np.arctan2(root[:, None], spare)
+    # Sum of two sides less the third: the three factors of Heron's formula. Column by column, which
+    # is several times as fast as reductions of rows of three.
+    spare = np.stack([b + c - a, c + a - b, a + b - c])
+    broken = np.asarray((spare[0] <= 0) | (spare[1] <= 0) | (spare[2] <= 0))
+    spare[:, broken] = 1.0
+    x, y, z = spare
+    found = 2 * np.arctan2(np.sqrt(x * y * z / (x + y + z)), spare).T
     found[broken] = np.where(
         lengths[broken] == lengths[broken].max(axis=1, keepdims=True), np.pi, 0.0
     )

@@ -32,6 +32,11 @@ class DoubledSurface:
     mirror: NDArray[np.int64]
     size: int
 
+    @property
+    def half(self) -> NDArray[np.int64]:
+        """The surface's own vertex of each vertex of the double, int64 (size,)."""
+        return self.on_both(np.arange(len(self.mirror)))
+
     def on_both(self, values: NDArray[Any]) -> NDArray[Any]:
         """Extend values at the surface's vertices (n, ...) to both copies (size, ...)."""
         both = np.empty((self.size, *values.shape[1:]), dtype=values.dtype)

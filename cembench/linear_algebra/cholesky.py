@@ -136,7 +136,9 @@ SolverOf = Callable[["scipy.sparse.csc_array"], Solver]
 
 
 class _Factor(Protocol):
-    """The interface of the factors of all back ends."""
+    """The interface of the factors of all back ends; `order` is that of the rows, if known."""
+
+    order: NDArray[np.int64] | None
 
     def update(self, A: scipy.sparse.csc_array) -> None: ...
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]: ...
@@ -171,6 +173,9 @@ class Cholesky:
         unless more than :data:`LARGEST_DENSE` rows follow the block; then it has its own factor.
     lower : bool
         A holds its lower triangle alone, each column from top to bottom.
+    like : Cholesky, optional
+        Order the rows as in that factorisation of another matrix of the same order, whose pattern
+        is nearly the same; not with a leading block. CHOLMOD does, other libraries order again.
 
     Raises
     ------
@@ -189,14 +194,22 @@ class Cholesky:
     """
 
     def __init__(
-        self, A: scipy.sparse.sparray, *, leading: int | None = None, lower: bool = False
+        self,
+        A: scipy.sparse.sparray,
+        *,
+        leading: int | None = None,
+        lower: bool = False,
+        like: Cholesky | None = None,
     ) -> None:
+        if like is not None and leading is not None:
+            raise ValueError("like needs a matrix without a leading block")
         self._given, self._lower = scipy.sparse.csc_array(A), lower
         self._leading = leading
         self._how = _current.get()
         self._kept: _Factor | None = None
         if self._how.solves == "reuse":
-            self._kept = _factor(self._how.backend, self._read, leading)
+            order = like._kept.order if like is not None and like._kept is not None else None
+            self._kept = _factor(self._how.backend, self._read, leading, order)
 
     @property
     def _read(self) -> scipy.sparse.csc_array:
@@ -391,23 +404,30 @@ def _count(b: NDArray[Any], share: float = 1.0) -> None:
     count_columns(share * columns * (2 if np.iscomplexobj(b) else 1))
 
 
-def _factor(backend: Backend, A: scipy.sparse.csc_array, leading: int | None) -> _Factor:
-    """Factor a matrix with a back end."""
-    of_class = _factor_class(backend)
+def _factor(
+    backend: Backend,
+    A: scipy.sparse.csc_array,
+    leading: int | None,
+    order: NDArray[np.int64] | None = None,
+) -> _Factor:
+    """Factor a matrix with a back end, its rows in this order if that is known."""
+    of_class = _factor_class(backend, order)
     if uses_cholmod(backend) and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
         return _SeparateFactors(lambda block: of_class(block, None).solve, A, leading)
     return of_class(A, leading)
 
 
-def _factor_class(backend: Backend) -> Callable[[scipy.sparse.csc_array, int | None], _Factor]:
-    """Return the constructor of a back end's factors."""
+def _factor_class(
+    backend: Backend, known: NDArray[np.int64] | None = None
+) -> Callable[[scipy.sparse.csc_array, int | None], _Factor]:
+    """Return the constructor of a back end's factors, which takes a known order if it can."""
     # Imported on demand: an extra may be missing, and start-up should not load a solver.
     if uses_cholmod(backend):
         from cembench.linear_algebra.cholmod import CholmodFactor
         from cembench.linear_algebra.orderings import minimum_degree, nested_dissection
 
         order = nested_dissection if backend == "cvxopt-metis" else minimum_degree
-        return partial(CholmodFactor, order=order)
+        return partial(CholmodFactor, order=order if known is None else lambda _: known)
     if backend == "superlu":
         from cembench.linear_algebra.superlu import superlu_solver
 
@@ -422,6 +442,8 @@ class _SeparateFactors:
 
     The leading block is factored when first used; nothing is kept after an update.
     """
+
+    order: NDArray[np.int64] | None = None
 
     def __init__(self, solver_of: SolverOf, A: scipy.sparse.csc_array, leading: int | None) -> None:
         self._solver_of, self._leading = solver_of, leading

@@ -43,7 +43,9 @@ class CholmodFactor:
         self._leading = leading
         with phase("ordering"):
             self._lower, self._below = _lower_triangle(A)
-            self._permutation = _permutation(self._lower, leading, order)
+            found = _order(self._lower, leading, order)
+            self._permutation = as_permutation(found)
+            self.order: NDArray[np.int64] | None = found
         self._analyse()
         self._factor()
 
@@ -189,9 +191,9 @@ def _in_order(A: sparse.csc_array) -> sparse.csc_array:
     return A if A.has_sorted_indices else A.sorted_indices()
 
 
-def _permutation(lower: spmatrix, leading: int | None, order: Order) -> matrix:
+def _order(lower: spmatrix, leading: int | None, order: Order) -> NDArray[np.int64]:
     """Return the order of all rows, or that of the leading block with the others after it."""
     if leading is None:
-        return as_permutation(order(lower))
+        return order(lower)
     first = order(lower[:leading, :leading]) if leading else np.zeros(0, dtype=np.int64)
-    return as_permutation(np.concatenate([first, np.arange(leading, lower.size[0])]))
+    return np.concatenate([first, np.arange(leading, lower.size[0])])

@@ -71,11 +71,13 @@ class Triangulation:
 
     def scaled(self, u: Real) -> Real:
         """Return the log lengths (3 m,) after scaling vertices by exp(u)."""
-        following = np.roll(self.F, -1, axis=1)
-        return np.asarray(self.log_length + (u[self.F] + u[following]).ravel() / 2)
+        at = u[self.F]
+        return np.asarray(self.log_length + (at + at[:, [1, 2, 0]]).ravel() / 2)
 
-    def make_delaunay(self, u: Real, *, flat: bool = False) -> None:
+    def make_delaunay(self, u: Real, among: Indices | None = None, *, flat: bool = False) -> None:
         """Flip edges until all are Delaunay, with vertices scaled by u (n,).
+
+        `among` (k,) are half-edges, in order and with their twins, that alone may not be Delaunay.
 
         With `flat` the triangles are Euclidean, and a flipped edge gets the distance of its ends in
         them (u must be 0). Otherwise it gets its length from Ptolemy's rule, which preserves the
@@ -88,23 +90,30 @@ class Triangulation:
 
         """
         apart = Independence(len(self.F))
-        candidates = np.flatnonzero(np.arange(len(self.twin)) < self.twin)
-        most = min(MOST_ROUNDS, LEAST_ROUNDS + ROUNDS_AN_EDGE * len(candidates))
+        h = np.arange(len(self.twin)) if among is None else among
+        h = h[h < self.twin[h]]
+        sums = self._cosine(h, u) + self._cosine(self.twin[h], u)
+        most = min(MOST_ROUNDS, LEAST_ROUNDS + ROUNDS_AN_EDGE * len(self.twin) // 2)
+        moved = np.arange(len(self.twin))
         for _ in range(most):
-            h = candidates
-            h = h[h // 3 != self.twin[h] // 3]
-            cosines = self._cosine(h, u) + self._cosine(self.twin[h], u)
-            bad = h[cosines < SURELY]
-            if not len(bad):
+            bad = (sums < SURELY) & (h // 3 != self.twin[h] // 3)
+            if not bad.any():
                 return
-            bad = bad[np.argsort(cosines[cosines < SURELY], kind="stable")]
-            chosen = bad[apart(bad // 3, self.twin[bad] // 3)]
-            touched = self._flip(chosen, flat=flat)
-            rest = np.setdiff1d(bad, chosen, assume_unique=True)
-            around = (3 * touched[:, None] + np.arange(3)).ravel()
-            candidates = np.unique(np.concatenate([self._moved[rest], around]))
-            candidates = np.unique(np.minimum(candidates, self.twin[candidates]))
+            h = h[bad][np.argsort(sums[bad], kind="stable")]
+            flipped = apart(h // 3, self.twin[h] // 3)
+            chosen = h[flipped]
+            before = np.concatenate([3 * x[:, None] + np.arange(3) for x in self._beside(chosen)])
+            self._flip(chosen, moved, flat=flat)
+            around = np.concatenate([moved[h[~flipped]], before.ravel()])
+            moved[before.ravel()] = before.ravel()
+            around = np.sort(np.minimum(around, self.twin[around]))
+            h = around[np.diff(around, prepend=-1) > 0]
+            sums = self._cosine(h, u) + self._cosine(self.twin[h], u)
         raise AlgorithmFailed(f"edges are still being flipped after {most} rounds")
+
+    def _beside(self, h: Indices) -> tuple[Indices, Indices]:
+        """Return the triangles on either side of half-edges."""
+        return h // 3, self.twin[h] // 3
 
     def _cosine(self, h: Indices, u: Real) -> Real:
         """Return the cosine of the angle opposite to half-edges in Euclidean triangles."""
@@ -116,8 +125,11 @@ class Triangulation:
         with np.errstate(over="ignore"):
             return np.asarray((np.exp(a - b) + np.exp(b - a) - np.exp(2 * e - a - b)) / 2)
 
-    def _flip(self, h: Indices, *, flat: bool) -> Indices:
-        """Flip edges that share no triangle; return the triangles that changed."""
+    def _flip(self, h: Indices, moved: Indices, *, flat: bool) -> None:
+        """Flip edges that share no triangle; `moved` (3 m,), each at its own place, says where to.
+
+        Half-edges of the triangles that change are found at other places after that.
+        """
         g = self.twin[h]
         t, s = h // 3, g // 3
         n1, n2 = (3 * t + (h + d) % 3 for d in (1, 2))
@@ -131,16 +143,16 @@ class Triangulation:
             new = np.log(distance_across(np.ones(len(h)), *sides)) + e
         else:
             new = np.logaddexp(lam[n2] + lam[m2], lam[n1] + lam[m1]) - e
-        moved = np.arange(len(self.twin))
-        for old, now in ((n2, 3 * t), (m1, 3 * t + 1), (h, 3 * t + 2)):
-            moved[old] = now
-        for old, now in ((m2, 3 * s), (n1, 3 * s + 1), (g, 3 * s + 2)):
-            moved[old] = now
-        twin, lengths = np.empty_like(self.twin), np.empty_like(lam)
-        twin[moved], lengths[moved] = moved[self.twin], lam
-        lengths[3 * t + 2] = lengths[3 * s + 2] = new
+        old, now = (
+            np.concatenate([n2, m1, m2, n1]),
+            np.concatenate([3 * t, 3 * t + 1, 3 * s, 3 * s + 1]),
+        )
+        length, partner = lam[old], self.twin[old]
+        moved[old], moved[h], moved[g] = now, 3 * t + 2, 3 * s + 2
+        partner = moved[partner]
+        self.twin[now], self.twin[partner], lam[now] = partner, now, length
+        self.twin[3 * t + 2], self.twin[3 * s + 2] = 3 * s + 2, 3 * t + 2
+        lam[3 * t + 2] = lam[3 * s + 2] = new
         self.F[t] = np.stack([k, i, ell], axis=1)
         self.F[s] = np.stack([ell, j, k], axis=1)
-        self.twin, self.log_length, self._moved = twin, lengths, moved
         self.flips += len(h)
-        return np.concatenate([t, s])

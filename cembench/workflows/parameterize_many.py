@@ -56,9 +56,9 @@ def parameterize_many(
     **parameters
         Parameters of the algorithm.
 
-    Yields
-    ------
-    Result or CembenchError
+    Returns
+    -------
+    iterator of Result or CembenchError
         In the order of the surfaces.
 
     Raises

@@ -137,3 +137,26 @@ def test_after_an_indefinite_matrix_the_next_is_solved_again(matrix, backend, so
 def solved_after_update(factor, A, b):
     factor.update(A)
     return factor.solve(b)
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+@pytest.mark.parametrize("solves", BOTH)
+def test_an_order_serves_another_matrix(matrix, backend, solves):
+    A, _ = matrix
+    B = sparse.csc_array(A + sparse.diags_array(np.ones(A.shape[0] - 9), offsets=9) * 1e-3)
+    B = sparse.csc_array((B + B.T) / 2 + sparse.eye_array(A.shape[0]))
+    b = np.random.default_rng(0).standard_normal(A.shape[0])
+    with linear_algebra(solves, backend):
+        x = Cholesky(B, like=Cholesky(A)).solve(b)
+    assert abs(B @ x - b).max() < 1e-9 * abs(x).max()
+
+
+def test_an_order_is_not_computed_again(matrix, monkeypatch):
+    A, k = matrix
+    with linear_algebra(backend="cvxopt"):
+        first = Cholesky(A)
+        monkeypatch.setattr("cembench.linear_algebra.orderings.minimum_degree", None)
+        second = Cholesky(2 * A, like=first)
+        with pytest.raises(ValueError, match="leading block"):
+            Cholesky(A, like=first, leading=k)
+    np.testing.assert_array_equal(first._kept.order, second._kept.order)
