@@ -18,7 +18,8 @@ import json
 import os
 import sys
 import typing
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import ChainMap
+from collections.abc import Callable, Iterable, Iterator, Mapping, MutableMapping
 from contextlib import ExitStack, contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass, field, fields, replace
 from importlib.metadata import EntryPoint, entry_points
@@ -587,7 +588,7 @@ class Registry:
 
     def algorithm(self, name: str) -> Algorithm:
         """Return the algorithm of this name; :class:`RegistryError` lists the known ones."""
-        return _look_up("algorithm", {**self.peers, **self.algorithms}, name)
+        return _look_up("algorithm", ChainMap(self.algorithms, self.peers), name)  # type: ignore[arg-type]  # never written
 
     def surface(self, name: str) -> Surface:
         """Return the surface of this name; :class:`RegistryError` lists the known ones."""
@@ -662,27 +663,88 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
 
     """
     installed = _installed()
-    algorithms = dict(installed.algorithms)
-    surfaces = dict(installed.surfaces)
+    algorithms: ChainMap[str, Algorithm] = ChainMap({}, installed.algorithms)  # type: ignore[arg-type]  # only the first is written
+    surfaces: ChainMap[str, Surface] = ChainMap({}, installed.surfaces)  # type: ignore[arg-type]  # as above
     for plugin in plugins:
         for spec in declared_by(plugin):
             _add(algorithms if isinstance(spec, Algorithm) else surfaces, spec)
-    peers = {name: peer for name, peer in installed.peers.items() if name not in algorithms}
+    peers = installed.peers
+    if shadowed := peers.keys() & algorithms.keys():
+        peers = {name: peer for name, peer in peers.items() if name not in shadowed}
     return Registry(algorithms, surfaces, installed.datasets, peers, installed.parts)
 
 
 @functools.lru_cache(maxsize=1)
 def _installed() -> Registry:
-    """Return the registry of all entry points."""
+    """Return the registry of all entry points, each loaded when it is first asked for."""
     installed = entry_points()  # once: it reads the files of every installed package
-    found = _all_datasets(installed)
-    surfaces = {name: dataset for name, dataset in found.items() if dataset.part is None}
-    parts = {name: dataset for name, dataset in found.items() if dataset.part is not None}
+    found = functools.cache(functools.partial(_all_datasets, installed))
     algorithms, peers = (
-        _all_declared(installed, Algorithm, group) for group in (_GROUPS[Algorithm], PEERS)
+        _Declared.by_name(installed, Algorithm, group) for group in (_GROUPS[Algorithm], PEERS)
     )
-    families = _all_declared(installed, Surface, _GROUPS[Surface])
-    return Registry(algorithms, families, surfaces, peers, parts)
+    families = _Declared.by_name(installed, Surface, _GROUPS[Surface])
+    return Registry(
+        algorithms,
+        families,
+        _Late(lambda: {name: one for name, one in found().items() if one.part is None}),
+        peers,
+        _Late(lambda: {name: one for name, one in found().items() if one.part is not None}),
+    )
+
+
+class _Declared(Mapping[str, R]):
+    """What entry points of one kind declare, by name; an entry is loaded when it is asked for."""
+
+    def __init__(self, entries: Mapping[str, EntryPoint], kind: type[R]) -> None:
+        self._entries = entries
+        self._kind: type[R] = kind
+        self._loaded: dict[str, R] = {}
+
+    @classmethod
+    def by_name(cls, installed: Any, kind: type[R], group: str) -> _Declared[R]:
+        """Return those of a group; :class:`RegistryError` if a name is declared twice."""
+        entries: dict[str, EntryPoint] = {}
+        for entry in _by_name(installed, group):
+            if entry.name in entries:
+                _add(
+                    {entry.name: _declared_at(entries[entry.name], kind)}, _declared_at(entry, kind)
+                )
+            entries[entry.name] = entry
+        return cls(entries, kind)
+
+    def __getitem__(self, name: str) -> R:
+        if name not in self._loaded:
+            self._loaded[name] = _declared_at(self._entries[name], self._kind)
+        return self._loaded[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._entries
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+
+class _Late(Mapping[str, R]):
+    """A mapping that is made when it is first read."""
+
+    def __init__(self, make: Callable[[], Mapping[str, R]]) -> None:
+        self._make: Callable[[], Mapping[str, R]] = make
+
+    @functools.cached_property
+    def _made(self) -> Mapping[str, R]:
+        return self._make()
+
+    def __getitem__(self, name: str) -> R:
+        return self._made[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._made)
+
+    def __len__(self) -> int:
+        return len(self._made)
 
 
 def _all_datasets(installed: Any) -> dict[str, Dataset]:
@@ -699,13 +761,6 @@ def _all_datasets(installed: Any) -> dict[str, Dataset]:
 def _by_name(installed: Any, group: str) -> list[EntryPoint]:
     """Return the entry points of a group; the type of what is installed changed in Python 3.12."""
     return sorted(installed.select(group=group), key=lambda entry: entry.name)
-
-
-def _all_declared(installed: Any, kind: type[R], group: str) -> dict[str, R]:
-    known: dict[str, R] = {}
-    for entry in _by_name(installed, group):
-        _add(known, _declared_at(entry, kind))
-    return known
 
 
 def load_algorithm(name: str, plugins: Iterable[str] = ()) -> Algorithm:
@@ -752,7 +807,7 @@ def _load_entry(entry: Any) -> Any:
         ) from error
 
 
-def _add(known: dict[str, Any], spec: _Registered | Dataset) -> None:
+def _add(known: MutableMapping[str, Any], spec: _Registered | Dataset) -> None:
     if spec.name in known:
         raise RegistryError(
             f"the name {spec.name!r} is declared twice: by {known[spec.name].origin} and by "

@@ -71,14 +71,14 @@ BUDGETS = {
     "mesh": 5_900,
     "linear_algebra": 1_500,
     "conformal": 5_500,
-    "registry": 900,
-    "results": 4_150,
+    "registry": 950,
+    "results": 4_200,
     "running": 7_250,
     "drawing": 1_600,
     "report": 7_850,
     "validation": 2_250,
     "workflows": 7_150,
-    "commands": 3_200,
+    "commands": 3_250,
 }
 
 

@@ -1,4 +1,5 @@
 import textwrap
+from types import SimpleNamespace
 
 import pytest
 
@@ -8,9 +9,10 @@ from cembench import (
     Parameterization,
     RegistryError,
     algorithm,
+    registry,
     surface_family,
 )
-from cembench.registry import load_algorithm, load_registry
+from cembench.registry import Algorithm, load_algorithm, load_registry
 
 GOOD = """
     from typing import Annotated
@@ -39,6 +41,21 @@ def plugin(tmp_path):
         return str(path)
 
     return write
+
+
+def test_an_entry_point_is_loaded_when_it_is_asked_for(monkeypatch):
+    entries = {
+        name: SimpleNamespace(name=name, value=name, group="g") for name in ("cem", "broken")
+    }
+    for entry in entries.values():
+        entry.load = lambda: load_registry().algorithm("cem").function
+    entries["broken"].load = lambda: 1 / 0
+    found = registry._Declared(entries, Algorithm)
+    assert list(found) == ["cem", "broken"]
+    assert "broken" in found
+    assert found["cem"].name == "cem"
+    with pytest.raises(RegistryError, match="division by zero"):
+        found["broken"]
 
 
 def test_the_built_in_ones_come_by_entry_points():

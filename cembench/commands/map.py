@@ -95,7 +95,7 @@ def _repair_of(mapped: Mapped) -> dict[str, Any]:
 
 def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
     """Print the figures of a single mapped surface, and the files written."""
-    from cembench.report.run_tables import figures_table
+    from cembench.report.record_table import figures_table
 
     out.print(figures_table(mapped.record, full=verbose))
     for what, where in mapped.written.items():

@@ -167,7 +167,7 @@ def show(
 
 
 def _show_records(found: list[Record]) -> None:
-    from cembench.report.run_tables import figures_table
+    from cembench.report.record_table import figures_table
 
     for record in found:
         outcome = record.outcome

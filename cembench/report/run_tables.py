@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from statistics import median, quantiles
 
-from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
 from cembench.report.document import (
@@ -21,20 +20,16 @@ from cembench.report.document import (
     entry,
     words,
 )
-from cembench.results.columns import FIGURES
 from cembench.results.comparison import (
     Comparison,
     circumstances,
     compare,
-    is_unstable,
     references,
-    seconds_interval,
 )
-from cembench.results.external_words import marks_explained, seconds_words
+from cembench.results.external_words import marks_explained
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.many import corrected
-from cembench.results.papers import paper_of
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.results.runs_compared import Change
 from cembench.running.estimate import Estimate
@@ -190,90 +185,6 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table
     costs_columns = [Column(title) for title in ("faces", "a call", "in all", "memory")]
     solves, basis = Column("solves", numeric=False), Column("from", numeric=False)
     return Table.of("plan", "", [SURFACE, ALGORITHM, solves, *costs_columns, basis], rows)
-
-
-def figures_table(record: Record, *, full: bool = True) -> Table:
-    """Return the figures of one record, one row each: all of them, or those most looked at."""
-    columns = [Column("", numeric=False)] * 2
-    return Table.of("record", "", columns, list((_figures if full else _few_figures)(record)))
-
-
-def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
-    facts, outcome = record.mesh, record.outcome
-    size = f"{facts.vertices:,} vertices, {facts.faces:,} triangles"
-    yield "surface", f"{record.cell.mesh}: {size}"
-    if facts.paper_row:
-        yield "in the paper", _printed(record)
-    yield "algorithm", f"{record.title} ({record.target})"
-    if outcome.metrics.get("angle_error_mean_deg") is not None:
-        angles, folds = (outcome.metrics[n] for n in ("angle_error_mean_deg", "flipped_triangles"))
-        shown = f"{angles:.2f} degrees mean angle error, {folds} folds"
-        yield "quality", f"{shown}; -v prints all figures"
-    if texture := texture_words(outcome.metrics):
-        yield "texture", texture
-    if outcome.median_seconds is not None:
-        yield "seconds", seconds_words(record) or f"{outcome.median_seconds:.3f}"
-    if outcome.folded_before_repair:
-        yield "folded before repair", str(outcome.folded_before_repair)
-    yield from _notes(record)
-
-
-def _notes(record: Record) -> Iterator[tuple[str, str]]:
-    yield from (("note", str(note)) for note in record.outcome.notes)
-    if record.outcome.status == "ok" and needs_islands(record.outcome.metrics):
-        yield "note", ISLANDS
-
-
-def _figures(record: Record) -> Iterator[tuple[str, str]]:
-    outcome, facts = record.outcome, record.mesh
-    yield (
-        "surface",
-        f"{record.cell.mesh}: {facts.vertices:,} vertices, {facts.faces:,} "
-        f"faces, {facts.boundary_vertices:,} on the boundary, "
-        f"{facts.non_delaunay_share:.1%} of the edges not Delaunay",
-    )
-    if facts.paper_row:
-        yield "in the paper", _printed(record)
-    given = ", ".join(f"{name}={value}" for name, value in record.cell.parameters.items())
-    with_given = f" with {given}" if given else ""
-    yield "algorithm", f"{record.title} ({record.target}){with_given}"
-    if record.external is not None:
-        yield f"external {record.external.kind}", record.external.name
-    for metric in FIGURES:
-        if metric.name in outcome.metrics:
-            text = metric.text(outcome.metrics[metric.name], precise=True)
-            yield metric.title, f"{text} {metric.unit}".rstrip()
-    if outcome.folded_before_repair is not None:
-        yield "folded before repair", str(outcome.folded_before_repair)
-    if outcome.iterations:
-        yield "iterations", str(outcome.iterations)
-    if outcome.seconds:
-        phases = ", ".join(f"{name} {seconds:.3f}" for name, seconds in outcome.phases.items())
-        yield "seconds", seconds_words(record) or f"{outcome.median_seconds:.3f} ({phases})"
-    interval = seconds_interval(record)
-    if interval is not None:
-        unstable = ", unstable" if is_unstable(record) else ""
-        ends = f"{interval.low:.4f} to {interval.high:.4f} s"
-        yield "95 % interval", f"{ends} over {len(outcome.rounds)} rounds{unstable}"
-        yield "fastest call", f"{min(min(r.calls) for r in outcome.rounds):.4f} s"
-    if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
-        more = f"{outcome.memory_increase_bytes / 2**20:,.0f} more than before the call"
-        whose = "of the program's processes" if record.is_program else more
-        yield "memory", f"{outcome.peak_memory_bytes / 2**20:,.0f} MiB at most, {whose}"
-    yield from _notes(record)
-
-
-def _printed(record: Record) -> str:
-    """Return the paper's printed figures for this surface and algorithm, as text."""
-    row, name = record.mesh.paper_row, record.cell.algorithm
-    what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
-    energy, mean, sd = (
-        paper_of(row).printed_figure(column, name, row)
-        for column in ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
-    )
-    if energy is None or mean is None or sd is None:
-        return what
-    return f"{what}; printed: E_C {energy:.4f}, mean angle error {mean:.2f}, SD {sd:.2f}"
 
 
 def many_table(records: Sequence[Record]) -> Table:

@@ -29,7 +29,7 @@ from cembench.report.content.report import build_report
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.results.machines import machine_of, machine_of_record, software_differences
-from cembench.results.record_rows import REFERENCE
+from cembench.results.records import REFERENCE
 
 #: Is told which run's report is made, how many are done, and how many there are.
 Progress = Callable[[str, int, int], None]

@@ -15,10 +15,8 @@ from cembench.results.comparison import (
     references,
 )
 from cembench.results.many import corrected
-from cembench.results.records import Record
+from cembench.results.records import REFERENCE, Record
 
-#: The algorithm that others are compared with where neither a paper nor an option names one.
-REFERENCE = "cem"
 _METRICS = frozenset(metric.name for metric in FIGURES)
 
 

@@ -30,6 +30,9 @@ from cembench.results.intervals import DEFAULT_ROUNDS as DEFAULT_ROUNDS
 #: Raised when the meaning of records changes; runs do not resume from other versions.
 SCHEMA_VERSION = 1
 
+#: The algorithm that others are compared with where neither a paper nor an option names one.
+REFERENCE = "cem"
+
 #: With this many cores busy with other work, a process counts as measured on a busy machine.
 BUSY_CORES = 0.25
 

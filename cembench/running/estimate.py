@@ -17,7 +17,7 @@ from typing import Literal
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
-from cembench.running.usual_costs import FACES, USUAL, USUAL_BYTES
+from cembench.running.usual_costs import FACES, ROUGH_BYTES_A_FACE, USUAL, USUAL_BYTES
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
@@ -30,9 +30,8 @@ FORK_SECONDS = 0.1
 CALLS_A_ROUND = 2.5
 #: Seconds per triangle of a check besides its call: computing metrics.
 CHECK_SECONDS_A_FACE = 2e-6
-#: Bytes of an empty process, and per triangle, if nothing is recorded.
+#: Bytes of an empty process, if nothing is recorded.
 ROUGH_BYTES = 150e6
-ROUGH_BYTES_A_FACE = 2500.0
 #: From this number of triangles on, memory is estimated before a call is tried.
 LARGE = 500_000
 #: Typical rounds until a cell is precise, on a quiet machine.

@@ -6,6 +6,8 @@ own are for what is compared, for plug-ins and programs, and where a limit has t
 
 from __future__ import annotations
 
+import importlib
+
 import numpy as np
 import psutil
 from numpy.typing import NDArray
@@ -13,32 +15,33 @@ from threadpoolctl import threadpool_limits
 
 from cembench.results.records import Record
 from cembench.running.environment import describe_environment
-from cembench.running.estimate import LARGE, ROUGH_BYTES_A_FACE
 from cembench.running.measure import check_cell
 from cembench.running.plan import Task
 from cembench.running.recorder import now, record_of
-from cembench.running.worker import load_libraries
+from cembench.running.usual_costs import ROUGH_BYTES_A_FACE
 
 #: Package of the algorithms that are called here.
 BUILT_IN = "cembench.algorithms."
+#: Modules that are loaded on demand elsewhere, and that most calls need.
+_CALLED = ("scipy.linalg", "scipy.sparse.linalg")
 #: Share of the free memory that a call may need by a rough estimate.
 _SHARE = 0.5
 
 
 def may_run_here(task: Task) -> bool:
-    """Whether a cell can do without a process of its own: built in, one thread, and not large."""
+    """Whether a cell can do without a process of its own: built in, one thread, enough memory."""
     algorithm, mesh = task.algorithm, task.mesh
     if not algorithm.module.startswith(BUILT_IN) or algorithm.program or algorithm.library:
         return False
     free = psutil.virtual_memory().available
-    small = mesh.m < LARGE and ROUGH_BYTES_A_FACE * mesh.m < _SHARE * free
-    return small and task.cell.threads == 1
+    return ROUGH_BYTES_A_FACE * mesh.m < _SHARE * free and task.cell.threads == 1
 
 
 def map_here(task: Task) -> tuple[Record, NDArray[np.complex128] | None]:
     """Call once in this process, and keep nothing on disk; see :func:`local.map_once`."""
     started = now()
-    load_libraries()
+    for name in _CALLED:  # else the call would load them
+        importlib.import_module(name)
     with threadpool_limits(limits=1):
         outcome, uv = check_cell(task.algorithm, task.mesh, task.cell)
     return record_of(task, outcome, describe_environment()["id"], started), uv

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from cembench.results.looks import USUAL_MOST_ROUNDS
-from cembench.results.record_rows import REFERENCE
-from cembench.results.records import Record
+from cembench.results.records import REFERENCE, Record
 from cembench.running.pairing import Pairing
 
 #: Default limit of a call in wall-clock seconds.

@@ -17,7 +17,7 @@ import sysconfig
 from collections.abc import Iterator, Mapping
 from functools import cache
 from importlib.machinery import all_suffixes
-from importlib.metadata import entry_points
+from importlib.metadata import distribution
 from pathlib import Path
 
 from cembench.core.errors import RegistryError
@@ -84,8 +84,8 @@ def _root(file: Path, module: str) -> tuple[Path, str]:
 @cache
 def _own_modules() -> frozenset[str]:
     """Return the modules of cembench's own algorithms."""
-    found = entry_points(group="cembench.algorithms")
-    return frozenset(e.module for e in found if e.dist and e.dist.name == "cembench")
+    found = distribution("cembench").entry_points.select(group="cembench.algorithms")
+    return frozenset(entry.module for entry in found)
 
 
 @cache

@@ -12,6 +12,9 @@ from __future__ import annotations
 #: Number of triangles to which the seconds refer.
 FACES = 10_000
 
+#: Bytes per triangle of an algorithm that is not known.
+ROUGH_BYTES_A_FACE = 2500.0
+
 #: By algorithm name: seconds and exponent with reused factorisations, and the same without.
 USUAL: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
     "abf++": ((0.15, 1.06), (0.19, 1.14)),
@@ -21,7 +24,7 @@ USUAL: dict[str, tuple[tuple[float, float], tuple[float, float]]] = {
     "bff-free": ((0.033, 1.0), (0.067, 1.4)),
     "cem": ((0.029, 0.93), (0.10, 0.84)),
     "cetm": ((0.088, 1.3), (0.11, 1.4)),
-    "cetm-flips": ((0.30, 1.22), (0.32, 1.18)),
+    "cetm-flips": ((0.13, 1.22), (0.32, 1.18)),
     "cetm-free": ((0.060, 1.32), (0.090, 1.17)),
     "circle-packing": ((0.52, 1.29), (0.52, 1.29)),
     "direct-cem": ((0.05, 0.95), (0.12, 1.2)),

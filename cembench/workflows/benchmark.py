@@ -371,7 +371,7 @@ def benchmark(
     from cembench.results import run_folder
     from cembench.results.exhibits import write_exhibit
     from cembench.results.profiles import Profile, algorithms_of, surfaces_of
-    from cembench.results.record_rows import REFERENCE
+    from cembench.results.records import REFERENCE
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
     from cembench.running.external.present import missing

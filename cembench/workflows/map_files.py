@@ -112,7 +112,7 @@ def map_files(
         Threads of the numerical libraries.
     timeout : float
         Time limit of a call, in seconds. The default applies to calls that have their own process:
-        those of plug-ins and programs, on large surfaces, or with several threads.
+        those of plug-ins and programs, with several threads, or where memory may be short.
     memory_bytes : int or str, optional
         Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
     reporter : Reporter

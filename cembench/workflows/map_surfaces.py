@@ -12,12 +12,10 @@ from numpy.typing import NDArray
 
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
-from cembench.drawing.own_pictures import check_replaceable
 from cembench.mesh import datasets
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.here import map_here, may_run_here
-from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
 from cembench.running.surfaces import SurfaceFile
@@ -142,8 +140,11 @@ def with_pictures(files: Sequence[FileJobs], *, overwrite: bool) -> list[FileJob
     sources = [file.shells.path for file in files]
     chosen = [file.jobs[0].task.algorithm for file in files]
     pictures = picture_files(sources, chosen, [file.output for file in files])
-    for picture in pictures if not overwrite else ():
-        check_replaceable(picture)
+    if not overwrite:
+        from cembench.drawing.own_pictures import check_replaceable
+
+        for picture in pictures:
+            check_replaceable(picture)
     return [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
 
 
@@ -223,6 +224,8 @@ class Maps:
         mesh, algorithm = job.surface.mesh, job.task.algorithm
         with self.reporter.busy(f"{algorithm.title} on {mesh.name}, {mesh.m:,} triangles"):
             if self.apart or not may_run_here(job.task):
+                from cembench.running.local import map_once
+
                 record, uv = map_once(job.task, self.options)
             else:
                 record, uv = map_here(job.task)

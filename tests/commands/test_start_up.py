@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+import cembench
+
 #: Each takes a tenth of a second to load, or more.
 SLOW = ("numpy", "scipy", "pydantic", "matplotlib", "igl", "shapely", "cvxopt", "PIL")
 PARTS_OF_SCIPY = ("scipy.sparse", "scipy.linalg", "scipy.spatial", "scipy.ndimage")
@@ -40,6 +42,20 @@ def test_a_help_text_needs_no_numerical_library(words):
 def test_a_list_needs_no_scipy_and_no_records():
     # The command line library itself loads pydantic, where a command has options.
     assert loaded(command("list")) == {"numpy", "scipy", "pydantic"}
+
+
+def test_a_map_loads_neither_other_algorithms_nor_what_draws(tmp_path):
+    cembench.write_mesh(tmp_path / "a.obj", cembench.surface("flat-disk", 200))
+    words = ["map", str(tmp_path / "a.obj"), "-a", "lscm", "-o", str(tmp_path / "b.obj")]
+    others = ("cembench.algorithms.cem", "cembench.surfaces.cone", "cembench.running.local")
+    slow = ("matplotlib", "PIL", "scipy.optimize", "pandas", "plotly", "igl", *others)
+    code = f"""if True:
+        import sys
+        {command(*words)}
+        print(*[name for name in {slow!r} if name in sys.modules], file=sys.stderr)
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stderr.split() == []
 
 
 def test_the_modules_are_seen_where_they_are_loaded():

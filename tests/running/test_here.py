@@ -5,6 +5,7 @@ import signal
 import sys
 import threading
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -44,7 +45,8 @@ def test_what_is_not_ours_large_or_of_several_threads_has_its_own_process(monkey
     assert here.may_run_here(task)
     assert not here.may_run_here(replace(task, algorithm=replace(ours, module=__name__)))
     assert not here.may_run_here(task_of(ours, threads=2))
-    monkeypatch.setattr(here, "LARGE", 100)
+    little = SimpleNamespace(available=here.ROUGH_BYTES_A_FACE * task.mesh.m)
+    monkeypatch.setattr(here.psutil, "virtual_memory", lambda: little)
     assert not here.may_run_here(task)
 
 

@@ -19,13 +19,13 @@ from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.difficulty import Difficulty, difficulty
 from cembench.report.palette import SeriesStyle, series_styles
-from cembench.results import record_rows as frame
+from cembench.results import record_rows
 from cembench.results.columns import COLUMNS, DERIVED
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.papers import NO_PAPER, Paper, papers
-from cembench.results.records import Cell, MeshOrigin, Record
+from cembench.results.records import REFERENCE, Cell, MeshOrigin, Record
 from cembench.results.store import Store
 
 if TYPE_CHECKING:
@@ -145,12 +145,12 @@ class Evidence:
     @property
     def reference(self) -> str:
         """The algorithm that the others are compared with: the paper's, or the usual one."""
-        return self.paper.reference or frame.REFERENCE
+        return self.paper.reference or REFERENCE
 
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
-        return {row["key"]: row for row in frame.rows(self.records, self.reference)}
+        return {row["key"]: row for row in record_rows.rows(self.records, self.reference)}
 
     @cached_property
     def frame(self) -> pd.DataFrame:
