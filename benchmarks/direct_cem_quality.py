@@ -21,7 +21,7 @@ from cembench.conformal.beltrami import beltrami_coefficients
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.metrics import angle_errors, dirichlet_energy, flipped_triangles, image_area
 from cembench.mesh.files import read_mesh
-from cembench.workflows.morphing.align import to_centre
+from cembench.morphing.align import to_centre
 
 PAPER = {"CEM": cem, "FDM": fdm, "LDM": ldm, "QIEM": qiem}
 #: What is compared, by the parameters besides the weights.

@@ -39,11 +39,11 @@ def measure(names: list[str], faces: int | None) -> dict[str, Any]:
     """Return medians over the rounds; the peak is that of the whole process."""
     import numpy as np
 
+    from cembench.morphing.landmarks import common_landmarks
+    from cembench.morphing.morph import morph
     from cembench.registry import load_registry
     from cembench.running.memory import peak_memory_bytes
     from cembench.running.surfaces import generate_surface
-    from cembench.workflows.morphing.landmarks import common_landmarks
-    from cembench.workflows.morphing.morph import morph
 
     registry = load_registry()
     meshes = [generate_surface(registry, name, faces) for name in names]

@@ -16,16 +16,16 @@ from scipy import optimize
 
 from benchmarks.measuring import png, progress
 from benchmarks.pages import Section, Table
+from cembench.api.parameterize import parameterize
 from cembench.conformal.moebius import Moebius
 from cembench.conformal.planar import signed_areas
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.morphing.align import aligned, centred, to_centre, vertex_areas
+from cembench.morphing.landmarks import check_order
+from cembench.morphing.registration import register
+from cembench.morphing.transport import locate
 from cembench.results.intervals import median_interval
-from cembench.workflows.morphing.align import aligned, centred, to_centre, vertex_areas
-from cembench.workflows.morphing.landmarks import check_order
-from cembench.workflows.morphing.registration import register
-from cembench.workflows.morphing.transport import locate
-from cembench.workflows.parameterize import parameterize
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -16,6 +16,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cembench.api.benchmark import Run, benchmark
+    from cembench.api.catalogue import list_algorithms, list_surfaces, surface
+    from cembench.api.cut import cut
+    from cembench.api.holes import holes
+    from cembench.api.map_files import map_files
+    from cembench.api.morph_surfaces import morph
+    from cembench.api.parameterize import Result, parameterize
+    from cembench.api.parameterize_many import parameterize_many
+    from cembench.api.repair import Repair, repair
+    from cembench.api.theory_verb import theory
+    from cembench.api.validate import validate
     from cembench.core.errors import (
         AlgorithmFailed,
         CembenchError,
@@ -33,17 +44,6 @@ if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
     from cembench.registry import algorithm, external_program, surface_family
     from cembench.running.surfaces import load_surface
-    from cembench.workflows.benchmark import Run, benchmark
-    from cembench.workflows.catalogue import list_algorithms, list_surfaces, surface
-    from cembench.workflows.cut import cut
-    from cembench.workflows.holes import holes
-    from cembench.workflows.map_files import map_files
-    from cembench.workflows.morph_surfaces import morph
-    from cembench.workflows.parameterize import Result, parameterize
-    from cembench.workflows.parameterize_many import parameterize_many
-    from cembench.workflows.repair import Repair, repair
-    from cembench.workflows.theory_verb import theory
-    from cembench.workflows.validate import validate
 
 #: Where each public name lies.
 _PLACES = {
@@ -64,17 +64,17 @@ _PLACES = {
     "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
     "cembench.registry": ("algorithm", "external_program", "surface_family"),
     "cembench.running.surfaces": ("load_surface",),
-    "cembench.workflows.benchmark": ("Run", "benchmark"),
-    "cembench.workflows.catalogue": ("list_algorithms", "list_surfaces", "surface"),
-    "cembench.workflows.cut": ("cut",),
-    "cembench.workflows.holes": ("holes",),
-    "cembench.workflows.map_files": ("map_files",),
-    "cembench.workflows.morph_surfaces": ("morph",),
-    "cembench.workflows.parameterize": ("Result", "parameterize"),
-    "cembench.workflows.parameterize_many": ("parameterize_many",),
-    "cembench.workflows.repair": ("Repair", "repair"),
-    "cembench.workflows.theory_verb": ("theory",),
-    "cembench.workflows.validate": ("validate",),
+    "cembench.api.benchmark": ("Run", "benchmark"),
+    "cembench.api.catalogue": ("list_algorithms", "list_surfaces", "surface"),
+    "cembench.api.cut": ("cut",),
+    "cembench.api.holes": ("holes",),
+    "cembench.api.map_files": ("map_files",),
+    "cembench.api.morph_surfaces": ("morph",),
+    "cembench.api.parameterize": ("Result", "parameterize"),
+    "cembench.api.parameterize_many": ("parameterize_many",),
+    "cembench.api.repair": ("Repair", "repair"),
+    "cembench.api.theory_verb": ("theory",),
+    "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 

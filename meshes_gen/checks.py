@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from cembench.api.doctor import InstallationFinding
 from cembench.core.extras import Extra, command
-from cembench.workflows.doctor import InstallationFinding
 
 from . import remesh
 

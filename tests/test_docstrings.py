@@ -25,7 +25,7 @@ ROOMS = (
     "cembench/results",
     "cembench/running",
     "cembench/validation",
-    "cembench/workflows",
+    "cembench/api",
     "meshes_gen",
     "papers",
 )

@@ -26,7 +26,7 @@ SUBSET = (
     "tests/report/test_report.py",
     "tests/results/test_store.py",
     "tests/results/test_verify.py",
-    "tests/workflows/morphing/test_writers.py",
+    "tests/morphing/test_writers.py",
 )
 
 

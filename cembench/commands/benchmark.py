@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.text import Text
 
+from cembench.api.benchmark import benchmark
 from cembench.commands.cluster import hours, show_hours
 from cembench.commands.console import SHOWN, Json, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
-from cembench.workflows.benchmark import benchmark
 
 if TYPE_CHECKING:
-    from cembench.workflows.benchmark import Run
-    from cembench.workflows.plan_benchmark import Plan
+    from cembench.api.benchmark import Run
+    from cembench.api.plan_benchmark import Plan
 
 
 @from_api(
@@ -98,9 +98,9 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
 
 def _print_plan(plan: Plan, *, as_json: bool) -> None:
     """Print which cells would be measured, and their estimated cost."""
+    from cembench.api.plan_benchmark import plan_summary
     from cembench.commands.progress import duration
     from cembench.report.run_tables import plan_table
-    from cembench.workflows.plan_benchmark import plan_summary
 
     costs, held, summary = plan.costs(), plan.held(), plan_summary(plan)
     on_cluster = hours(plan.tasks, costs, plan.options.budget) if plan.cluster else None

@@ -146,7 +146,7 @@ _MARKS = {True: ("bad", "bold red"), False: ("--", "yellow")}
 @app.command(epilog="Example:  cembench doctor --json")
 def doctor(*, as_json: Json = False) -> None:
     """Check the installation, and say how to install what is missing."""
-    from cembench.workflows.doctor import examine
+    from cembench.api.doctor import examine
 
     with err.status("checking", spinner="line"):
         findings = examine()

@@ -174,7 +174,7 @@ SHOWN = Shown()
 
 def registry_with(plugins: Sequence[str]) -> Registry:
     """Load the registry with the user's plug-ins, behind a spinner that names them."""
-    from cembench.workflows.settings import registry_with as loaded
+    from cembench.api.settings import registry_with as loaded
 
     return loaded(plugins, SHOWN)
 

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
+from cembench.api.cut import cut as cut_surface
 from cembench.commands.console import Json, err, note, out, print_json
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.repair import print_steps
 from cembench.core.errors import MeshError
-from cembench.workflows.cut import cut as cut_surface
 
 
 @from_api(cut_surface, without=("surface", "through"))
@@ -42,11 +42,11 @@ def cut(
     as_json: Json = False,
 ) -> None:
     """Write the disk and its seam, and print the length of the cut."""
+    from cembench.api.repair import repair
     from cembench.core.notices import NoticeKind
     from cembench.core.outputs import refuse_inputs, refuse_present
     from cembench.mesh.cut import write_seam
     from cembench.mesh.files import check_writable_format, write_mesh
-    from cembench.workflows.repair import repair
 
     check_writable_format(output, with_uv=False)
     if output.suffix.lower() == ".stl":

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cembench.api.settings import LONGEST
 from cembench.commands.console import Json, complain, err, out, print_json
 from cembench.commands.from_api import finite
-from cembench.workflows.settings import LONGEST
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bars

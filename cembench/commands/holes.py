@@ -46,12 +46,12 @@ def holes(
     number of sweeps, by conformal energy, and with every other algorithm for this
     class. docs/holes.md explains it.
     """
+    from cembench.api.holes_exhibits import examine_holes, write_holes_table
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
     from cembench.report.content.exhibits import tables_shown
     from cembench.results import run_folder
     from cembench.running.surfaces import load_surface
-    from cembench.workflows.holes_exhibits import examine_holes, write_holes_table
 
     run_folder.check(run)
     registry = load_registry()

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cembench.api.map_files import map_files
 from cembench.commands.console import (
     SHOWN,
     Json,
@@ -19,10 +20,9 @@ from cembench.commands.console import (
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
-from cembench.workflows.map_files import map_files
 
 if TYPE_CHECKING:
-    from cembench.workflows.map_surfaces import Mapped, Maps
+    from cembench.api.map_surfaces import Mapped, Maps
 
 EXAMPLES = (
     "Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "

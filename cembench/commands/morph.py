@@ -10,10 +10,10 @@ from typing import Annotated, Any
 
 import typer
 
+from cembench.api.morph_surfaces import morph as morph_surfaces
 from cembench.commands.console import SHOWN, Json, complain, out, print_json, print_pair, split
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import AlgorithmFailed
-from cembench.workflows.morph_surfaces import morph as morph_surfaces
 
 
 @from_api(morph_surfaces, without=("reporter",), lam="--lambda")
@@ -50,16 +50,16 @@ def morph(
 ) -> None:
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
     from cembench.core.outputs import refuse_inputs
-    from cembench.registry import load_registry
-    from cembench.results import run_folder
-    from cembench.workflows.morphing.drawing import check_views
-    from cembench.workflows.morphing.exhibit import write_morph_exhibits
-    from cembench.workflows.morphing.surfaces_and_films import (
+    from cembench.morphing.drawing import check_views
+    from cembench.morphing.exhibit import write_morph_exhibits
+    from cembench.morphing.surfaces_and_films import (
         rows_of_paper,
         write_films,
         write_path,
     )
-    from cembench.workflows.morphing.writers import FILMS, check_output, files_of
+    from cembench.morphing.writers import FILMS, check_output, files_of
+    from cembench.registry import load_registry
+    from cembench.results import run_folder
 
     chosen_views, given = split([views]), call.keywords
     check_views(chosen_views)
@@ -120,8 +120,8 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
+    from cembench.morphing.exhibit import morph_tables
     from cembench.report.content.exhibits import exhibit_table
-    from cembench.workflows.morphing.exhibit import morph_tables
 
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from cembench.workflows.settings import MOST_FACES
+from cembench.api.settings import MOST_FACES
 
 Plugins = Annotated[
     list[str],

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cembench.api.benchmark import benchmark
+from cembench.api.settings import LONGEST, MOST_FACES
 from cembench.commands.console import SHOWN, Json, complain, out, print_json, registry_with, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, finite, from_api
-from cembench.workflows.benchmark import benchmark
-from cembench.workflows.settings import LONGEST, MOST_FACES
 
 if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry

@@ -8,9 +8,9 @@ from typing import Annotated, Any
 
 import typer
 
+from cembench.api.repair import repair as repair_surface
 from cembench.commands.console import SHOWN, Json, note, out, print_json
 from cembench.commands.from_api import Call, from_api
-from cembench.workflows.repair import repair as repair_surface
 
 
 @from_api(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cembench.api.settings import budget_seconds, bytes_of
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands.console import SHOWN, Json, complain, err, print_json
@@ -15,7 +16,6 @@ from cembench.commands.ending import resumable
 from cembench.commands.options import Fresh
 from cembench.core.extras import Extra, require
 from cembench.results.profiles import Profile
-from cembench.workflows.settings import budget_seconds, bytes_of
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
@@ -98,11 +98,11 @@ def _surfaces(
     registry: Registry, algorithms: Sequence[Algorithm], *, offline: bool
 ) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
     """Return a surface for each row: the model if it is there, else its stand-in; and the roles."""
+    from cembench.api.plan_benchmark import read_surfaces
+    from cembench.api.reproduce import fetch_models, public_models
     from cembench.mesh.datasets import is_fetched, surface_file
     from cembench.results.profiles import surfaces_of
     from cembench.running.plan import paper_roles
-    from cembench.workflows.plan_benchmark import read_surfaces
-    from cembench.workflows.reproduce import fetch_models, public_models
 
     stand_ins = {registry.surface(s).paper_row: s for s in surfaces_of(Profile.quick, registry)}
     public = public_models(registry, list(stand_ins))
@@ -125,8 +125,8 @@ def _surfaces(
 
 def _made(registry: Registry, names: Sequence[str]) -> list[TriangleMesh]:
     """Return the stand-ins of these names, made side by side where several are missing."""
+    from cembench.api.reproduce import STAND_IN_BYTES, make_stand_ins
     from cembench.running.environment import usable_cores
-    from cembench.workflows.reproduce import STAND_IN_BYTES, make_stand_ins
 
     jobs = min(usable_cores(), bytes_of(None) // STAND_IN_BYTES)
     with err.status("making stand-ins", spinner="line") as status:

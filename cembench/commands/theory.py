@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cembench.api.theory_verb import theory as examine
 from cembench.commands.console import Json, err, out, print_json
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
-from cembench.workflows.theory_verb import theory as examine
 
 if TYPE_CHECKING:
     from cembench.results.exhibits import Exhibit
@@ -32,12 +32,12 @@ def theory(
     as_json: Json = False,
 ) -> None:
     """Print what was tested; exit with 1 if a statement fails although all premises hold."""
+    from cembench.api.theory_exhibit import examine_theory
+    from cembench.api.theory_facts import RIVAL
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.running.surfaces import load_surface
-    from cembench.workflows.theory_exhibit import examine_theory
-    from cembench.workflows.theory_facts import RIVAL
 
     run_folder.check(run)
     registry = load_registry()

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from cembench.api.validate import validate as validate_solver
+from cembench.api.validate import written_files
 from cembench.commands.console import SHOWN, Json, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
-from cembench.workflows.validate import validate as validate_solver
-from cembench.workflows.validate import written_files
 
 if TYPE_CHECKING:
     from cembench.validation.verdict import Validation

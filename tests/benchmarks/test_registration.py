@@ -8,7 +8,7 @@ import pytest
 from benchmarks import registration
 from benchmarks.pages import ROOT, Section, filled
 from benchmarks.registration import FITTED, METHODS, PAPER, PLAIN, Row, differences, fitted, parts
-from cembench.workflows.morphing.align import to_centre
+from cembench.morphing.align import to_centre
 
 
 def table(rows, modes):

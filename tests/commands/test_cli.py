@@ -207,11 +207,11 @@ def test_doctor_tells_of_remeshing_and_of_what_was_fetched(cli, monkeypatch, tmp
 def test_a_check_that_breaks_is_a_finding(monkeypatch):
     from importlib.metadata import EntryPoint
 
-    from cembench.workflows.doctor import CHECKS, examine
+    from cembench.api.doctor import CHECKS, examine
 
     broken = EntryPoint("mine", "cembench.core.clock:nothing", CHECKS)
     monkeypatch.setattr(
-        "cembench.workflows.doctor.entry_points", lambda group: [broken] if group == CHECKS else []
+        "cembench.api.doctor.entry_points", lambda group: [broken] if group == CHECKS else []
     )
     (found,) = [finding for finding in examine() if finding.name == "mine"]
     assert not found.ok

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from cembench.surfaces.holed_disk import holed_disk
 
+from cembench.api.holes_exhibits import examine_holes
 from cembench.registry import load_registry
 from cembench.results.exhibits import read_exhibits
-from cembench.workflows.holes_exhibits import examine_holes
 from tests import gallery
 
 

@@ -6,9 +6,9 @@ import json
 import pytest
 import typer
 
+from cembench.api.benchmark import usual_budget
 from cembench.commands.cli import app
 from cembench.results.profiles import Profile
-from cembench.workflows.benchmark import usual_budget
 
 SMALL = ("--surfaces", "flat-disk", "--faces", 100, "-a", "cem", "--dry-run")
 

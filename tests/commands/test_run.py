@@ -200,7 +200,7 @@ def test_ctrl_c_says_that_the_same_command_resumes(cli, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cembench.workflows.plan_benchmark.run_tasks", interrupted)
+    monkeypatch.setattr("cembench.api.plan_benchmark.run_tasks", interrupted)
     code, _, err = cli("run", "--surfaces", "flat-disk", "--faces", "60", "-a", "cem")
     assert code == 130
     assert "Stopped; the same command resumes." in err
@@ -214,7 +214,7 @@ def test_ctrl_c_in_a_command_that_keeps_nothing_says_only_that_it_stopped(cli, m
 
     from cembench.mesh.files import write_mesh
 
-    monkeypatch.setattr("cembench.workflows.map_surfaces.map_here", interrupted)
+    monkeypatch.setattr("cembench.api.map_surfaces.map_here", interrupted)
     write_mesh(cli.folder / "disk.obj", flat_disk(60))
     code, _, err = cli("map", "disk.obj")
     assert code == 130

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import cembench
+from cembench.api.benchmark import Run
 from cembench.core.extras import MODULES, Extra, MissingExtra, command, missing, require
 from cembench.report.export import Format, export_rows
-from cembench.workflows.benchmark import Run
 
 ROOT = Path(__file__).parents[2]
 #: Where the name of a module is not that of what is installed.
@@ -92,7 +92,7 @@ def a_stand_in(folder):
 
 
 def a_film(folder):
-    from cembench.workflows.morphing.writers import check_output
+    from cembench.morphing.writers import check_output
 
     check_output(folder / "a.mp4")
 

@@ -8,6 +8,7 @@ import pytest
 from cembench.surfaces.cone import cone
 from cembench.surfaces.flat_disk import flat_disk
 
+from cembench.api.benchmark import benchmark
 from cembench.core.errors import ClusterError
 from cembench.registry import load_registry
 from cembench.results.records import FaultKind
@@ -18,7 +19,6 @@ from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.watcher import Watcher
-from cembench.workflows.benchmark import benchmark
 from tests.running.test_local import FAULTY
 
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")

@@ -1,0 +1,473 @@
+"""Benchmark algorithms on surfaces: separate processes, rounds and records."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from cembench.api.notebook import html_table
+from cembench.api.settings import (
+    AnyPath,
+    Backend,
+    Faces,
+    Rounds,
+    Seed,
+    Solves,
+    Threads,
+    Timeout,
+    budget_seconds,
+    bytes_of,
+    installed_backend,
+    precision_share,
+    registry_with,
+)
+from cembench.core.arguments import Range, checked
+from cembench.core.errors import ParameterError
+from cembench.core.extras import Extra, require
+from cembench.core.reporter import SILENT, Reporter
+from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from distributed import Client
+
+    from cembench.api.plan_benchmark import Plan
+    from cembench.report.document import Report
+    from cembench.results.profiles import Profile
+    from cembench.results.records import Record
+    from cembench.running.surfaces import SurfaceInput
+    from cembench.running.watcher import Watcher
+
+#: Columns of :meth:`Run.table`.
+FEW = (
+    "mesh",
+    "algorithm",
+    "solves",
+    "status",
+    "seconds",
+    "seconds_low",
+    "seconds_high",
+    "speedup",
+    "conformal_energy",
+    "angle_error_mean_deg",
+    "flipped_triangles",
+)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A folder of records: what `cembench run` writes and `cembench report` reads.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder with the records and maps.
+    asked : tuple of Record
+        The records of the cells that were asked for, in their order.
+    plan : Plan, optional
+        What was planned: the cells, and what each is expected to cost.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import cembench
+    >>> cembench.Run(Path("results/run")).folder.name
+    'run'
+
+    """
+
+    folder: Path
+    asked: tuple[Record, ...] = field(default=(), compare=False, repr=False)
+    plan: Plan | None = field(default=None, compare=False, repr=False)
+
+    def records(self) -> list[Record]:
+        """Return every record.
+
+        Returns
+        -------
+        list of Record
+            The records, sorted by file name.
+
+        Raises
+        ------
+        RecordError
+            The folder is not a run, or one of its records is damaged.
+
+        """
+        from cembench.results.store import Store
+
+        return Store(self.folder).records()
+
+    def table(self, reference: str = "cem", *, full: bool = False) -> pd.DataFrame:
+        """Return a table with one row per cell.
+
+        Parameters
+        ----------
+        reference : str
+            The algorithm whose speedup over the others is included.
+        full : bool
+            Whether to return all columns, about eighty, instead of those most looked at.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Figures, seconds with a 95 % interval, and status of each cell.
+
+        Raises
+        ------
+        MissingExtra
+            pandas is not installed; :meth:`rows` works without it.
+
+        """
+        require(Extra.TABLES, "a DataFrame")
+        import pandas as pd
+
+        table = pd.DataFrame(self.rows(reference))
+        return table if full else table[[name for name in FEW if name in table]]
+
+    def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
+        """Return the data of :meth:`table` as one dictionary per cell.
+
+        Parameters
+        ----------
+        reference : str
+            The algorithm whose speedup over the others is included.
+
+        Returns
+        -------
+        list of dict
+            The rows.
+
+        """
+        from cembench.results.record_rows import rows
+
+        return rows(self.records(), reference)
+
+    def speedups(self, reference: str = "cem") -> pd.DataFrame:
+        """Return the speedup of the reference over each other algorithm, t / t_ref - 1.
+
+        Parameters
+        ----------
+        reference : str
+            Name of the reference algorithm.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row per surface, algorithm and policy, with the interval from paired rounds; empty
+            if the reference was not measured.
+
+        """
+        columns = ["mesh", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
+        table = self.table(reference, full=True)
+        compared = table[table["reference"].notna()]
+        return compared[[*columns, "verdict"]].reset_index(drop=True)
+
+    def report(self, folder: str | os.PathLike[str] | None = None) -> Report:
+        """Write the report, like `cembench report`.
+
+        Parameters
+        ----------
+        folder : path, optional
+            The report's folder; default: ``report`` in the run's folder.
+
+        Returns
+        -------
+        Report
+            The contents of the report.
+
+        Raises
+        ------
+        MissingExtra
+            A package for reports is not installed.
+        RecordError
+            The run has no records, or the folder cannot be written.
+
+        """
+        from cembench.report.write_report import write_report
+
+        target = Path(folder) if folder is not None else self.folder / "report"
+        command = f"cembench report {self.folder} -o {target}"
+        return write_report(self.folder, target, command)
+
+    def _repr_html_(self) -> str:
+        from cembench.conformal.metrics import METRICS
+
+        names = (
+            "conformal_energy",
+            "angle_error_mean_deg",
+            "flipped_triangles",
+            "beltrami_area_mean",
+        )
+        shown = [metric for metric in METRICS if metric.name in names]
+        heads = ["surface", "algorithm", "status", "seconds", *(m.title for m in shown)]
+        lines = []
+        for row in self.rows():
+            seconds = row["seconds"]
+            line = [row["mesh"], row["algorithm"], row["status"]]
+            line.append("" if seconds is None else f"{seconds:.3g}")
+            lines.append([*line, *(m.text(row[m.name]) if m.name in row else "" for m in shown)])
+        return html_table(lines, heads)
+
+
+@checked
+def benchmark(
+    surfaces: Iterable[SurfaceInput] = (),
+    algorithms: Sequence[str] | None = None,
+    *,
+    profile: Literal["quick", "standard", "paper"] | None = None,
+    mesh_dir: Sequence[AnyPath] = (),
+    sets: Sequence[str] = (),
+    limit: Annotated[int, Range(1, 1_000_000)] | None = None,
+    faces: Faces | None = None,
+    repair: bool = False,
+    parameters: Mapping[str, Any] | None = None,
+    plugins: Sequence[str] = (),
+    precision: float | str | None = None,
+    rounds: Rounds | None = None,
+    max_rounds: Annotated[int, Range(LOOKS[1], LOOKS[-1])] = USUAL_MOST_ROUNDS,
+    budget: float | str | None = "auto",
+    pairing: Literal["auto", "separate", "process"] = "auto",
+    repeat_busy: Annotated[int, Range(0, 10)] = 0,
+    jobs: Annotated[int, Range(1, 256)] | None = None,
+    seed: Seed = 0,
+    timeout: Timeout = 600.0,
+    memory_bytes: int | str | None = None,
+    solves: Sequence[Solves] = ("reuse",),
+    backend: Backend | None = None,
+    threads: Threads = 1,
+    reference: str | None = None,
+    cluster: Client | str | None = None,
+    same_environment: bool = False,
+    out: AnyPath | None = None,
+    fresh: bool = False,
+    rerun_failed: bool = False,
+    dry_run: bool = False,
+    watcher: Watcher | None = None,
+    reporter: Reporter = SILENT,
+) -> Run:
+    """Measure algorithms on surfaces, with fresh processes for every round.
+
+    Rounds continue until the figures are precise (`precision`); wide intervals get more rounds.
+    Each result is saved at once, and what the folder already holds is not measured again.
+    docs/measuring.md explains what is timed and what an interval means.
+
+    Parameters
+    ----------
+    surfaces : iterable of meshes, paths, names or pairs of arrays (V, F)
+        V is (n, 3), F is (m, 3) and counts from 0. Surfaces given as arrays are named
+        ``surface-1``, ``surface-2``, ... Names are those of generated surfaces, or of public ones,
+        which are fetched.
+    algorithms : sequence of str, optional
+        Names of algorithms (see :func:`cembench.list_algorithms`), all, or usual, which is the
+        default: the usual ones, or the paper's own for the profile quick.
+    profile : {"quick", "standard", "paper"}, optional
+        The paper's models: the smallest, those up to a number of faces, or all.
+    mesh_dir : sequence of paths
+        All mesh files in a folder but NPZ; those that cannot be used are left out.
+    sets : sequence of str
+        Many surfaces: real-disks, real-holes, closed, stress, ict-faces, ict-faces-holes,
+        thingi10k, a folder, or an archive. One round each, unless `rounds` or `precision` is given.
+    limit : int, optional
+        Surfaces of each of the `sets`, at most.
+    faces : int, optional
+        Number of triangles of generated surfaces.
+    repair : bool
+        Repair the mesh files first, like :func:`cembench.repair`.
+    parameters : mapping, optional
+        Parameters of the algorithms: NAME sets it for every algorithm that has it, ALGORITHM.NAME
+        for one.
+    plugins : sequence of str
+        Python files or ``module:name`` with more algorithms.
+    precision : float or str, optional
+        Measure until the half-width of the 95 % intervals, of the seconds and of their ratios to
+        the reference, is at most this share, e.g. 5% or 0.05 (default: 5%).
+    rounds : int, optional
+        Fixed number of rounds, instead of `precision`; fewer than 6 give no interval.
+    max_rounds : int
+        Maximum number of rounds with `precision`.
+    budget : float or str, optional
+        Time of the run, e.g. 30m; in Python also seconds. While it lasts cells get rounds, the
+        cheapest their first 7 before others; each has one. auto: 105s for the profile quick, 1h for
+        standard, 4h for paper, else 30m. None in Python: no limit.
+    pairing : {"auto", "separate", "process"}
+        Besides a process for each cell, a round may have one that the algorithms of a surface
+        share, where processes differ more than calls (process). auto: where this machine's scatter
+        promises narrower ratios in the same time. Not on a cluster.
+    repeat_busy : int
+        Repeat a process up to so many times if the machine was busy with other work.
+    jobs : int, optional
+        Number of checks run in parallel; timed rounds always run alone (default: 1; with `sets`,
+        the number of cores).
+    seed : int
+        Seed of the random order within a round.
+    timeout : float
+        Time limit of a call, in seconds.
+    memory_bytes : int or str, optional
+        Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
+    solves : sequence of "reuse" and "backslash"
+        Reuse factorisations, factor at every solve, or both.
+    backend : str, optional
+        The library that factors matrices (default: cvxopt if it is installed, else superlu).
+        cvxopt-metis suits large meshes.
+    threads : int
+        Threads of the numerical libraries.
+    reference : str, optional
+        Show this algorithm's speedup over the others (default: cem).
+    cluster : str, optional
+        Measure on local:N workers, on those of tls://HOST:PORT, or on
+        slurm:partition=cpu,cores=16,machines=10: see docs/cluster.md. In Python also a
+        ``distributed.Client``.
+    same_environment : bool
+        Of a cluster, leave out machines with other software.
+    out : path, optional
+        The run's folder; an existing run is resumed. Default in Python: a new temporary folder.
+    fresh : bool
+        Measure again what is already recorded.
+    rerun_failed : bool
+        Measure again the cells that did not end ok.
+    dry_run : bool
+        Plan the cells and estimate their cost; measure nothing.
+    watcher : Watcher, optional
+        Receives the progress of the cells.
+    reporter : Reporter
+        Receives what is being done.
+
+    Returns
+    -------
+    Run
+        The records, as rows, tables or a report.
+
+    Raises
+    ------
+    MeshError
+        A surface is unknown or damaged, or no algorithm takes it.
+    RegistryError
+        An algorithm or a surface is unknown, or a plug-in cannot be loaded.
+    ParameterError
+        An argument is out of range, or excludes another.
+    RecordError
+        The folder is not a run, or cannot be written to.
+    ClusterError
+        The scheduler cannot be reached, or is gone; what is finished is in the folder.
+
+    Notes
+    -----
+    All errors but the last are raised before anything is measured.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> run = cembench.benchmark(["flat-disk"], ["harmonic-circle"], rounds=1)
+    >>> [record.outcome.status for record in run.records()]
+    ['ok']
+
+    """
+    import tempfile
+
+    from cembench.api.plan_benchmark import (
+        Plan,
+        check_cluster,
+        check_reference,
+        chosen_algorithms,
+        gather_sets,
+        read_surfaces,
+    )
+    from cembench.api.sets import exhibit_of
+    from cembench.results import run_folder
+    from cembench.results.exhibits import write_exhibit
+    from cembench.results.profiles import Profile, algorithms_of, surfaces_of
+    from cembench.results.records import REFERENCE
+    from cembench.results.store import Store
+    from cembench.running.environment import usable_cores
+    from cembench.running.external.present import missing
+    from cembench.running.options import Options
+    from cembench.running.plan import MeasurementSettings, plan_cells
+
+    given, models = list(surfaces), Profile(profile) if profile else None
+    if out is not None:
+        run_folder.check(Path(out))
+    check_cluster(cluster, pairing, reporter)
+    if same_environment and cluster is None:
+        raise ParameterError.about("{same_environment} is of {cluster}: name one, or leave it out.")
+    if rounds is not None and precision is not None:
+        raise ParameterError.about(
+            "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of "
+            "them."
+        )
+    if sets and rounds is None and precision is None:
+        rounds = 1
+    share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)
+    options = Options(
+        timeout,
+        None if cluster is not None and memory_bytes is None else bytes_of(memory_bytes),
+        fresh,
+        rerun_failed,
+        seed,
+        reference=reference or REFERENCE,
+        most_rounds=max_rounds,
+        budget=usual_budget(models)
+        if budget == "auto"
+        else None
+        if budget is None
+        else budget_seconds(budget),
+        pairing=pairing,
+        repeat_busy=repeat_busy,
+        jobs=jobs or (usable_cores() if sets else 1),
+    )
+    library = installed_backend(backend)
+    registry = registry_with(plugins, reporter)
+    usual = algorithms_of(models, registry) if models else registry.usual_algorithms
+    chosen = chosen_algorithms(registry, algorithms, usual)
+    check_reference(reference, chosen)
+    for algorithm in chosen:
+        if why := missing(algorithm):
+            reporter.note(f"{algorithm.name} is not available: {why}.")
+    given += surfaces_of(models, registry) if models else []
+    if not given and not mesh_dir and not sets:
+        raise ParameterError.about(
+            "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
+            "{sets}; `cembench list surfaces` and `cembench fetch` list names."
+        )
+    if limit is not None and not sets:
+        raise ParameterError.about("{limit} needs {sets}: add one, or leave {limit} out.")
+    if repair and sets:
+        raise ParameterError.about(
+            "{repair} works with single files and with {mesh_dir}: repair the files of a set with "
+            "`cembench repair`, or leave it out."
+        )
+    with reporter.busy("reading surfaces"):
+        meshes, roles = read_surfaces(
+            *(given, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair
+        )
+    many = gather_sets(sets, registry, chosen, limit, reporter) if sets else None
+    if many is not None:
+        meshes, roles = [*meshes, *many.meshes], {**roles, **many.roles}
+    tasks = []
+    for policy in dict.fromkeys(solves):
+        settings = MeasurementSettings(policy, library, threads, rounds or 0, share)
+        tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
+    folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
+    plan = Plan(tasks, Store(folder), options, cluster)
+    if dry_run:
+        return Run(folder, plan=plan)
+    if many is not None:
+        write_exhibit(folder, exhibit_of(many, sets, reporter.command))
+    else:
+        for mesh in meshes:
+            for notice in mesh.notices:
+                reporter.note(f"{mesh.name}: {notice}")
+    with reporter.watching(len(tasks), on_cluster=cluster is not None) as shown:
+        records = plan.measure(watcher or shown, faces=faces, same_environment=same_environment)
+    return Run(folder, tuple(records), plan)
+
+
+def usual_budget(profile: Profile | None) -> float:
+    """Return the seconds after which cells get no more rounds: those of the profile, if any."""
+    from cembench.results.papers import usual_paper
+    from cembench.running.options import USUAL_BUDGET
+
+    return usual_paper().profiles.budgets.get(profile, USUAL_BUDGET) if profile else USUAL_BUDGET

@@ -1,0 +1,212 @@
+"""Map the surfaces of mesh files, each in a process of its own, and write them with their UVs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cembench.api.settings import (
+    AnyPath,
+    Backend,
+    Placement,
+    Solves,
+    Threads,
+    Timeout,
+    bytes_of,
+    installed_backend,
+    registry_with,
+)
+from cembench.core.arguments import Range, checked
+from cembench.core.errors import ParameterError
+from cembench.core.reporter import SILENT, Reporter
+
+if TYPE_CHECKING:
+    from cembench.api.map_surfaces import Maps
+
+#: The recommended algorithms, in order of preference; the first that takes the surface is used.
+DEFAULT_ALGORITHMS = ("direct-cem", "direct-cem-holes")
+
+
+@checked
+def map_files(
+    meshes: Sequence[AnyPath],
+    algorithm: str | None = None,
+    *,
+    parameters: Mapping[str, Any] | None = None,
+    output: AnyPath | None = None,
+    uv: Placement = "unit",
+    equal_parts: bool = False,
+    checker: bool = False,
+    bake: AnyPath | None = None,
+    geometry_image: AnyPath | None = None,
+    remesh: AnyPath | None = None,
+    side: Annotated[int, Range(4, 8192)] = 129,
+    html: AnyPath | None = None,
+    preview: bool = False,
+    keep_invalid: bool = False,
+    overwrite: bool = False,
+    repair: bool = False,
+    cut: bool = False,
+    plugins: Sequence[str] = (),
+    solves: Solves = "reuse",
+    backend: Backend | None = None,
+    threads: Threads = 1,
+    timeout: Timeout = 600.0,
+    memory_bytes: int | str | None = None,
+    reporter: Reporter = SILENT,
+) -> Maps:
+    """Map the surfaces of files, check the maps, and write them.
+
+    The UVs are the map, moved into the unit square: (z + 1 + i) / 2 for a disk. OBJ, VTP and NPZ
+    hold all digits; PLY and GLB single precision. An OBJ file keeps its groups, materials, normals,
+    colours and polygons. With `cut`, the uncut surface is written, with one UV per corner. Several
+    surfaces written to one file share the unit square, each in its own part; larger surfaces get
+    larger parts.
+
+    Parameters
+    ----------
+    meshes : sequence of paths or names
+        Mesh files (OBJ, OFF, PLY, STL, MAT), or names of public surfaces, which are fetched.
+    algorithm : str, optional
+        Name of an algorithm, see :func:`cembench.list_algorithms`; default: direct-cem, or
+        direct-cem-holes for surfaces with holes.
+    parameters : mapping, optional
+        Parameters of the algorithm.
+    output : path, optional
+        Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. For several surfaces: a folder, or a file with
+        all of them.
+    uv : {"unit", "disk"}
+        Move the UVs into the unit square, or keep the map as it is (a disk).
+    equal_parts : bool
+        Give several surfaces in one file equal parts of the unit square.
+    checker : bool
+        Add a checkerboard texture; GLB always has one.
+    bake : path, optional
+        A texture for the OBJ's own UVs, to be repainted for the new ones.
+    geometry_image : path, optional
+        Sample the surface on a grid: NPY, EXR or PNG.
+    remesh : path, optional
+        Remesh the surface through the map, and write it to this file.
+    side : int
+        Samples along a side, for `geometry_image` and `remesh`.
+    html : path, optional
+        Write a page with a 3-D view of surface and map; works offline.
+    preview : bool
+        Draw a PNG beside the output; folded triangles are red.
+    keep_invalid : bool
+        Write invalid maps too.
+    overwrite : bool
+        Overwrite the input, a picture not made by cembench, or files in a folder.
+    repair : bool
+        Repair the mesh files first, like :func:`cembench.repair`.
+    cut : bool
+        Cut the surface into a disk first, like :func:`cembench.cut`.
+    plugins : sequence of str
+        Python files or ``module:name`` with more algorithms.
+    solves : {"reuse", "backslash"}
+        Reuse factorisations, or factor at every solve.
+    backend : str, optional
+        The library that factors matrices (default: cvxopt if it is installed, else superlu).
+        cvxopt-metis suits large meshes.
+    threads : int
+        Threads of the numerical libraries.
+    timeout : float
+        Time limit of a call, in seconds. The default applies to calls that have their own process:
+        those of plug-ins and programs, with several threads, or where memory may be short.
+    memory_bytes : int or str, optional
+        Memory limit per process, e.g. 4GiB; at least 256MiB (default: 90 % of free memory).
+    reporter : Reporter
+        Receives what is being done.
+
+    Returns
+    -------
+    Maps
+        An iterable: each surface is mapped and written when it is asked for.
+
+    Raises
+    ------
+    MeshError
+        A file cannot be read, or its surface is not of a kind that the algorithm takes.
+    ParameterError
+        Options exclude each other, or a file would be overwritten.
+    RegistryError
+        The algorithm is unknown.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> (mapped,) = cembench.map_files(["flat.obj"], output="flat_uv.obj")
+    >>> mapped.ok, mapped.written["output"]
+    (True, 'flat_uv.obj')
+
+    """
+    from pathlib import Path
+
+    from cembench.api.map_outputs import (
+        Extras,
+        check_extras,
+        check_shells,
+        check_takes_disks,
+        output_files,
+    )
+    from cembench.api.map_surfaces import FileJobs, Maps, jobs_of, local_files, with_pictures
+    from cembench.api.write_maps import FileOptions, beside
+    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.running.options import Options
+    from cembench.running.plan import MeasurementSettings
+
+    def path_of(path: AnyPath | None) -> Path | None:
+        return None if path is None else Path(path)
+
+    options = Options(timeout=timeout, memory_bytes=bytes_of(memory_bytes))
+    settings = MeasurementSettings(solves, installed_backend(backend), threads, repeats=1)
+    registry = registry_with(plugins, reporter)
+    candidates = [
+        registry.algorithm(name) for name in ([algorithm] if algorithm else DEFAULT_ALGORITHMS)
+    ]
+    if cut:
+        check_takes_disks(candidates)
+    given, target = [Path(mesh) for mesh in meshes], path_of(output)
+    outputs = output_files(given, target)
+    file_options = FileOptions(uv, checker, path_of(bake), equal_parts)
+    extras = Extras(path_of(geometry_image), path_of(remesh), side, uv, path_of(html))
+    check_extras(given, outputs, file_options, extras)
+    is_atlas = any(a.target == "atlas" for a in candidates)
+    if is_atlas and (extras.files or bake or len(given) > 1):
+        raise ParameterError.about(
+            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
+            "{html} and {bake}, which need one UV per vertex.",
+            name=candidates[0].name,
+        )
+    sources = local_files(given, registry, reporter)
+    written = list(dict.fromkeys(path for path in outputs if path is not None))
+    others = [path for file in written for path in beside(file, file_options)]
+    inputs = [*sources, *([file_options.bake] if file_options.bake else [])]
+    for path in (*written, *others, *extras.files):
+        refuse_inputs(path, inputs, force=overwrite)
+    refuse_present(others if target in outputs else [*written, *others], force=overwrite)
+    together = target if len(given) > 1 and target in outputs else None
+    files = []
+    for source, place in zip(sources, outputs, strict=True):
+        with reporter.busy(f"reading {source}"):
+            shells, jobs = jobs_of(
+                *(source, registry, candidates, parameters or {}, settings, plugins),
+                repair=repair,
+                cut=cut,
+            )
+        check_shells(len(shells.parts), source, file_options, extras)
+        files.append(FileJobs(shells, jobs, None if together else place))
+    if preview and is_atlas:
+        reporter.note(
+            "no picture was drawn: the islands of an atlas have no fixed positions in the plane"
+        )
+    elif preview:
+        files = with_pictures(files, overwrite=overwrite)
+    for folder in {path.parent for path in written}:
+        folder.mkdir(exist_ok=True)
+    return Maps(
+        *(files, options, file_options, extras, together, reporter),
+        keep_invalid=keep_invalid,
+        apart=timeout != Options.timeout or memory_bytes is not None,
+    )

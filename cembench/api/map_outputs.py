@@ -1,0 +1,232 @@
+"""Outputs of `map_files`: their paths, the pictures, and what is written besides the maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cembench.api.settings import Placement
+from cembench.api.shells import Shells
+from cembench.api.write_maps import FileOptions, check_file_options, save_map
+from cembench.conformal.metrics import caption
+from cembench.core.errors import MeshError, ParameterError
+from cembench.core.extras import Extra, require
+from cembench.core.names import file_name
+from cembench.core.notices import Notice
+from cembench.mesh.files import check_writable_format
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.registry import Algorithm
+from cembench.results.records import Record
+
+
+@dataclass(frozen=True)
+class Extras:
+    """Extra files to write with a map.
+
+    Parameters
+    ----------
+    samples : Path, optional
+        Path of a geometry image: NPY, EXR or PNG.
+    remeshed : Path, optional
+        Path of the surface remeshed through the map.
+    side : int
+        Samples along a side, for both files.
+    place : "unit" or "disk"
+        Placement of the texture coordinates of the new mesh.
+    page : Path, optional
+        Path of an interactive page with surface and map.
+
+    """
+
+    samples: Path | None = None
+    remeshed: Path | None = None
+    side: int = 129
+    place: Placement = "unit"
+    page: Path | None = None
+
+    @property
+    def files(self) -> list[Path]:
+        """The files to write."""
+        return list(self.named.values())
+
+    @property
+    def named(self) -> dict[str, Path]:
+        """The files to write, by kind."""
+        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
+        return {what: path for what, path in named.items() if path is not None}
+
+
+def write_extras(
+    extras: Extras, mesh: TriangleMesh, z: NDArray[np.complex128], record: Record
+) -> tuple[Notice, ...]:
+    """Write the files; return notices about triangles that rounding folds in the new mesh."""
+    told: tuple[Notice, ...] = ()
+    if extras.samples is not None:
+        from cembench.api.geometry_images import write_geometry_image
+
+        write_geometry_image(extras.samples, mesh, z, extras.side)
+    if extras.remeshed is not None:
+        from cembench.conformal.resample import regular_remesh
+
+        new, new_z = regular_remesh(mesh, z, extras.side)
+        told = save_map(extras.remeshed, new, new_z, FileOptions(extras.place))
+    if extras.page is not None:
+        from cembench.api.view import map_page
+        from cembench.report.render.view_page import write_view_page
+
+        notes = [*map(str, mesh.notices), *map(str, record.outcome.notes)]
+        write_view_page(extras.page, map_page(mesh, z, record.outcome, record.title, notes))
+    return told
+
+
+def check_extras(
+    meshes: Sequence[Path],
+    outputs: Sequence[Path | None],
+    file_options: FileOptions,
+    extras: Extras,
+) -> None:
+    """Raise the errors of textures and extra files before anything is mapped."""
+    check_file_options(meshes, file_options)
+    if file_options.textured and None in outputs:
+        raise ParameterError.about(
+            "{checker} and {bake} need a file that uses the texture: add {output}."
+        )
+    if len(set(outputs)) < len(outputs) and outputs[0] and file_options.place != "unit":
+        raise ParameterError.about("surfaces in one file share the unit square: leave out {uv}.")
+    if extras.files and len(meshes) > 1:
+        raise ParameterError.about(
+            "{geometry_image}, {remesh} and {html} take one surface; map them one by one."
+        )
+    if extras.page is not None:
+        require(Extra.REPORT, "a page with a view of the map", "jinja2", "markupsafe")
+    if extras.page is not None and extras.page.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError.about(
+            "{page}: {html} writes a web page; use the suffix .html.", page=extras.page
+        )
+    if extras.page is not None and not extras.page.parent.is_dir():
+        raise MeshError(f"{extras.page}: there is no folder {extras.page.parent}. Make it first.")
+    if extras.samples is not None:
+        from cembench.api.geometry_images import check_image_format
+
+        check_image_format(extras.samples)
+    if extras.remeshed is not None:
+        check_writable_format(extras.remeshed, with_uv=True)
+
+
+def check_shells(surfaces: int, path: Path, file_options: FileOptions, extras: Extras) -> None:
+    """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
+    if surfaces < 2:
+        return
+    if extras.files:
+        raise ParameterError.about(
+            "{path} holds {surfaces} surfaces; {geometry_image}, {remesh} and {html} take one. "
+            "`cembench repair --components all` writes each to its own file.",
+            path=path,
+            surfaces=surfaces,
+        )
+    if file_options.place != "unit":
+        raise ParameterError.about(
+            "{path} holds {surfaces} surfaces, which share the unit square: leave out {uv}.",
+            path=path,
+            surfaces=surfaces,
+        )
+
+
+def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
+    """Raise :class:`ParameterError` if no algorithm takes the disk that a cut makes."""
+    if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
+        raise ParameterError.about(
+            "{cut} makes a disk, which {name} does not take; name an algorithm for disks (see "
+            "`cembench list algorithms`).",
+            name=candidates[0].name,
+        )
+
+
+def picture_files(
+    sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
+) -> list[Path]:
+    """Return the path of each surface's picture: beside its output, or in the current folder.
+
+    Raises
+    ------
+    ParameterError
+        Two pictures would have the same path.
+
+    """
+    pictures = [
+        Path(f"{file_name(f'{source.stem}_{algorithm.name}')}.png")
+        if target is None
+        else target.with_suffix(".png")
+        for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
+    ]
+    twice = [picture for picture in pictures if pictures.count(picture) > 1]
+    if twice:
+        raise ParameterError(
+            f"two pictures would be written to {twice[0]}; draw them one at a time."
+        )
+    return pictures
+
+
+def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | None]:
+    """Return the output path of each surface: a file, or files in a folder for several.
+
+    If several surfaces go to one file, it is returned once for each.
+
+    Raises
+    ------
+    MeshError
+        The format cannot hold UVs, or the folder does not exist.
+    ParameterError
+        Two surfaces have the same name.
+
+    """
+    if output is None:
+        return [None] * len(meshes)
+    if not output.is_dir() and (len(meshes) == 1 or output.suffix):
+        check_writable_format(output, with_uv=True)
+        return [output] * len(meshes)
+    if output.is_file():
+        raise ParameterError.about(
+            "{path} is a file, but there are {count} surfaces; name a folder with {output}.",
+            path=output,
+            count=len(meshes),
+        )
+    if not output.parent.is_dir():
+        raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")
+    files = [
+        output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' else '.obj'}"
+        for path in meshes
+    ]
+    twice = [file for file in files if files.count(file) > 1]
+    if twice:
+        raise ParameterError(
+            f"two surfaces would be written to {twice[0]}; write them to different folders."
+        )
+    return list(files)
+
+
+def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, record: Record) -> None:
+    """Draw a surface and its map as a PNG, with the recorded figures."""
+    from cembench.drawing.preview import write_preview
+
+    title = f"{record.cell.mesh}: {record.title}"
+    write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
+
+
+def draw_shells(
+    shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path, *, equal: bool
+) -> None:
+    """Draw the surfaces of a file and their maps, placed as in its UVs, as a PNG."""
+    from cembench.drawing.preview import write_preview
+
+    starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
+    V = np.concatenate([part.mesh.V for part in shells.parts])
+    F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])
+    mesh = TriangleMesh.trusted(V, F, shells.path.stem)
+    title = f"{shells.path.stem}: {len(maps)} surfaces"
+    uv = np.concatenate(shells.packed(maps, equal=equal))
+    write_preview(mesh, uv, picture, title=title, turned=False)

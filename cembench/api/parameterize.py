@@ -1,0 +1,410 @@
+"""Map one surface in this process and check the map."""
+
+from __future__ import annotations
+
+import base64
+import html
+import os
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from cembench.api.map_files import DEFAULT_ALGORITHMS
+from cembench.api.notebook import html_table, is_notebook, show_page
+from cembench.api.settings import Placement
+from cembench.conformal.texel_density import ISLANDS, needs_islands
+from cembench.core.arguments import checked
+from cembench.core.errors import AlgorithmFailed, ParameterError
+from cembench.core.extras import Extra, require
+from cembench.core.names import file_name, unknown
+from cembench.mesh.files import check_writable_format
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.registry import Algorithm, load_registry
+from cembench.results.records import Outcome
+from cembench.running.judging import figures
+from cembench.running.measure import check_cell
+from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.surfaces import SurfaceInput, load_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: How thoroughly a map is checked.
+Check = Literal["full", "fast"]
+
+
+@dataclass(frozen=True)
+class Result:
+    """A checked map of a surface to the plane.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    algorithm : Algorithm
+        The algorithm that mapped it.
+    z : complex128 (n,)
+        Image of each vertex.
+    outcome : Outcome
+        Result of the check: figures, notices and seconds.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> result = cembench.parameterize(cembench.surface("flat-disk", 200), "harmonic-circle")
+    >>> result.ok, result.z.shape == (result.mesh.n,)
+    (True, True)
+    >>> result.save("flat.obj").name
+    'flat.obj'
+
+    """
+
+    mesh: TriangleMesh
+    algorithm: Algorithm
+    z: NDArray[np.complex128]
+    outcome: Outcome
+
+    @property
+    def uv(self) -> NDArray[np.float64]:
+        """Image of each vertex as two columns, float64 (n, 2)."""
+        return np.stack([self.z.real, self.z.imag], axis=1)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the map keeps what its target class promises (see docs/measuring.md)."""
+        return self.outcome.status == "ok"
+
+    @property
+    def cause(self) -> str | None:
+        """Why the map is not valid; None if it is valid."""
+        return self.outcome.cause
+
+    @cached_property
+    def metrics(self) -> Mapping[str, float | int | None]:
+        """Figures by name, computed by the harness; None if one is infinite."""
+        return _Figures(self.outcome.metrics or figures(self.algorithm.target, self.mesh, self.z))
+
+    @property
+    def notices(self) -> tuple[str, ...]:
+        """Remarks on the surface and the map, e.g. a broken premise of the paper."""
+        islands = (ISLANDS,) if self.ok and needs_islands(self.outcome.metrics) else ()
+        return (*map(str, self.mesh.notices), *map(str, self.outcome.notes), *islands)
+
+    @property
+    def phases(self) -> Mapping[str, float]:
+        """Seconds by phase; they add up to :attr:`seconds`."""
+        return self.outcome.phases
+
+    @property
+    def seconds(self) -> float | None:
+        """Wall-clock seconds of the call, without warm-up; use `benchmark` for reliable timings."""
+        return self.outcome.median_seconds
+
+    @property
+    def iterations(self) -> int | None:
+        """Number of iterations; 0 for a direct method."""
+        return self.outcome.iterations
+
+    @property
+    def energy_history(self) -> tuple[float, ...]:
+        """E_C (Eq. 7) at the start and after each iteration."""
+        return self.outcome.energy_history
+
+    @property
+    def extras(self) -> Mapping[str, Any]:
+        """Additional data reported by the algorithm."""
+        return self.outcome.extras
+
+    @checked
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        uv: Placement = "unit",
+        checker: bool = False,
+        overwrite: bool = False,
+    ) -> Path:
+        """Write the surface with the map as its texture coordinates.
+
+        Parameters
+        ----------
+        path : path
+            OBJ, PLY, GLB, VTP or NPZ, by its suffix. GLB gets a checkerboard texture.
+        uv : {"unit", "disk"}
+            Whether the map is moved into the unit square, where engines look for textures
+            (``(z + 1 + 1j) / 2`` for a disk), or written as it is.
+        checker : bool
+            Whether an OBJ or PLY file gets a checkerboard texture too, as separate files.
+        overwrite : bool
+            Whether existing files may be replaced.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        MeshError
+            The format is unknown, the folder does not exist, or the file exists and must not be
+            replaced. No partial file is left.
+        ParameterError
+            `uv` is neither "unit" nor "disk".
+
+        """
+        from cembench.api.write_maps import FileOptions, beside, save_map
+        from cembench.core.outputs import refuse_present
+
+        path, file_options = Path(path), FileOptions(uv, checker)
+        check_writable_format(path, with_uv=True)
+        refuse_present((path, *beside(path, file_options)), force=overwrite)
+        for notice in save_map(path, self.mesh, self.z, file_options):
+            warnings.warn(f"{path}: {notice}", stacklevel=2)
+        return path
+
+    def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
+        """Return the surface sampled on a regular grid of the map.
+
+        Parameters
+        ----------
+        side : int
+            Samples along a side.
+
+        Returns
+        -------
+        float64 (side, side, 3)
+            Points of the surface. A map onto the disk is sampled on the square, see
+            :func:`cembench.conformal.resample.geometry_image`.
+
+        """
+        from cembench.conformal.resample import geometry_image
+
+        square = self.algorithm.target == "disk"
+        return geometry_image(self.mesh, self.z, side, "square" if square else "disk")
+
+    def remesh(self, side: int = 65) -> DiskMesh:
+        """Return the surface remeshed with triangles that are equilateral in the disk.
+
+        Parameters
+        ----------
+        side : int
+            Lattice points along the disk's diameter; see
+            :func:`cembench.conformal.resample.regular_remesh`.
+
+        Returns
+        -------
+        DiskMesh
+            The new mesh.
+
+        """
+        from cembench.conformal.resample import regular_remesh
+
+        return regular_remesh(self.mesh, self.z, side)[0]
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
+        """Draw the surface and its image under the same checkerboard.
+
+        Parameters
+        ----------
+        path : path, optional
+            PNG file to write the picture to, too.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which ``matplotlib.pyplot.show()`` or a notebook displays.
+
+        """
+        import io
+
+        from matplotlib import pyplot
+        from matplotlib.figure import Figure
+        from matplotlib.image import imread
+
+        png = self._png()
+        if path is not None:
+            from cembench.core.atomic import write
+
+            write(Path(path), lambda file: file.write(png))
+        pixels = imread(io.BytesIO(png), format="png")
+        size = (pixels.shape[1] / 100, pixels.shape[0] / 100)
+        # A notebook would display a figure of pyplot twice: as such, and as the cell's result.
+        make = Figure if is_notebook() else pyplot.figure
+        figure = make(figsize=size, dpi=100)
+        axes = figure.add_axes((0, 0, 1, 1))
+        axes.imshow(pixels, aspect="auto")
+        axes.set_axis_off()
+        return figure
+
+    def show(self, path: str | os.PathLike[str] | None = None) -> Path:
+        """Show an interactive page with the surface and its image.
+
+        It is shown below the cell of a notebook, else in the browser. The page works offline and
+        needs no other file.
+
+        Parameters
+        ----------
+        path : path, optional
+            HTML file to write; it is then not shown. Default: a temporary file.
+
+        Returns
+        -------
+        Path
+            The file of the page.
+
+        Raises
+        ------
+        MissingExtra
+            A package for pages is not installed.
+        RenderError
+            The page cannot be written.
+
+        """
+        import tempfile
+        import webbrowser
+
+        require(Extra.REPORT, "a page with a view of the map", "jinja2", "markupsafe")
+        from cembench.api.view import map_page
+        from cembench.report.render.view_page import write_view_page
+
+        page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title, self.notices)
+        if path is not None:
+            write_view_page(Path(path), page)
+            return Path(path)
+        shown = Path(tempfile.mkdtemp(prefix="cembench-")) / f"{file_name(self.mesh.name)}.html"
+        write_view_page(shown, page)
+        if is_notebook():
+            show_page(page)
+        else:
+            webbrowser.open(shown.as_uri())
+        return shown
+
+    def _png(self) -> bytes:
+        from cembench.drawing.preview import preview_png
+
+        return preview_png(self.mesh, self.z, title=self._title, caption=self._caption)
+
+    @property
+    def _title(self) -> str:
+        return f"{self.mesh.name}: {self.algorithm.title}"
+
+    @property
+    def _caption(self) -> str:
+        from cembench.conformal.metrics import caption
+
+        return caption(self.metrics)
+
+    def __repr__(self) -> str:
+        state = "ok" if self.ok else f"{self.outcome.status}: {self.cause}"
+        return (
+            f"<Result of {self.algorithm.name} on {self.mesh.name} "
+            f"({self.mesh.n:,} vertices, {self.mesh.m:,} triangles): {state}; {self._caption}>"
+        )
+
+    def _repr_html_(self) -> str:
+        from cembench.api.view import metric_facts
+
+        picture = base64.b64encode(self._png()).decode()
+        rows = [("status", self.outcome.status + (f": {self.cause}" if self.cause else ""))]
+        rows += metric_facts(self.outcome)
+        rows += [("iterations", str(self.iterations)), ("seconds", f"{self.seconds:.3f}")]
+        rows += [("note", notice) for notice in self.notices]
+        words = html.escape(self._title)
+        return (
+            f"<figure><img alt='{words}' style='max-width:100%' "
+            f"src='data:image/png;base64,{picture}'/></figure>{html_table(rows)}"
+        )
+
+
+class _Figures(dict[str, "float | int | None"]):
+    """Figures by name; an unknown name is answered with the nearest known one."""
+
+    def __missing__(self, name: str) -> None:
+        raise KeyError(unknown("metric", str(name), self))
+
+
+def parameterize(
+    surface: SurfaceInput | ArrayLike,
+    *faces_and_algorithm: ArrayLike | str,
+    algorithm: str | None = None,
+    keep_invalid: bool = False,
+    check: Check = "full",
+    plugins: Iterable[str] = (),
+    **parameters: Any,
+) -> Result:
+    """Map a surface to the plane and check the map.
+
+    Parameters
+    ----------
+    surface : mesh, path, name or arrays
+        A disk or a surface with holes: a mesh, a path, a name, a pair (V, F), or V with F as the
+        next argument. V is (n, 3), F is (m, 3) and counts from 0.
+    *faces_and_algorithm
+        F, if `surface` is V; then the name of the algorithm, unless it is given by keyword.
+    algorithm : str, optional
+        A name from :func:`cembench.list_algorithms`; default: ``"direct-cem"``, or
+        ``"direct-cem-holes"`` for surfaces with holes.
+    keep_invalid : bool
+        Whether to return an invalid map (for example, one with folds) instead of raising; see
+        :attr:`Result.ok`.
+    check : {"full", "fast"}
+        With "fast" only the promises of the map's class are checked, such as no folds: there are
+        no notices on its quality, and :attr:`Result.metrics` are computed when asked for.
+    plugins : iterable of str
+        Python files or ``module:name`` with more algorithms.
+    **parameters
+        Parameters of the algorithm.
+
+    Returns
+    -------
+    Result
+        The map with its figures.
+
+    Raises
+    ------
+    MeshError
+        The surface is damaged, or the algorithm does not take surfaces of its kind.
+    RegistryError
+        The algorithm is unknown.
+    ParameterError
+        A parameter or a check is unknown, a value is out of range, or two algorithms are named.
+    AlgorithmFailed
+        No map was found, or the map is not valid and `keep_invalid` is False.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> mesh = cembench.surface("hemi-ellipsoid", 400)
+    >>> result = cembench.parameterize(mesh.V, mesh.F)
+    >>> result.uv.shape == (mesh.n, 2)
+    True
+    >>> result.metrics["flipped_triangles"]
+    0
+    >>> cembench.parameterize(mesh, "cem").algorithm.name
+    'cem'
+
+    """
+    if check not in get_args(Check):
+        allowed = ", ".join(map(repr, get_args(Check)))
+        raise ParameterError(f"check={check!r} is unknown; allowed: {allowed}.")
+    arrays = [one for one in faces_and_algorithm if one is not None and not isinstance(one, str)]
+    named = [one for one in (*faces_and_algorithm, algorithm) if isinstance(one, str)]
+    if len(named) > 1:
+        raise ParameterError(f"two algorithms are named, {' and '.join(named)}; name one.")
+    given: Any = (surface, *arrays) if arrays else surface
+    registry = load_registry(plugins)
+    candidates = [registry.algorithm(name) for name in named or DEFAULT_ALGORITHMS]
+    mesh = load_surface(given, [a.mesh_type for a in candidates], registry=registry)
+    chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
+    task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
+    full = check == "full"
+    outcome, z = check_cell(chosen, task.mesh, task.cell, memory=False, figures=full)
+    if z is None or (outcome.status != "ok" and not keep_invalid):
+        raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
+    return Result(mesh, chosen, z, outcome)

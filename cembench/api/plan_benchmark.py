@@ -1,0 +1,284 @@
+"""Plan a benchmark: its surfaces, its cells, and how they are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cembench.api.map_surfaces import local_files
+from cembench.api.providers import Provided
+from cembench.api.sets import Gathered, gathered, surfaces_of_set
+from cembench.core.errors import MeshError, ParameterError
+from cembench.core.extras import Extra, require
+from cembench.core.reporter import Reporter
+from cembench.core.wording import Setting
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import Algorithm, Registry
+from cembench.results.records import Record
+from cembench.results.store import Store
+from cembench.running.estimate import Estimate, estimate, planned_seconds
+from cembench.running.local import run_tasks
+from cembench.running.options import Options
+from cembench.running.plan import (
+    PaperRole,
+    Task,
+    mesh_files,
+    paper_role_of,
+    paper_roles,
+)
+from cembench.running.surfaces import (
+    generate_surface,
+    is_generated,
+    kinds_of,
+    load_file,
+    load_surface,
+)
+from cembench.running.watcher import Watcher
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+#: Surfaces, and their roles in the paper by name.
+Surfaces = tuple[list[TriangleMesh], dict[str, PaperRole]]
+#: Maximum number of surfaces named that cannot be measured.
+NAMED = 5
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The cells of a run, and what each is expected to cost.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        The cells with their surfaces.
+    store : Store
+        The run's folder.
+    options : Options
+        How they are measured.
+    cluster : distributed.Client or str, optional
+        Where they are measured; None: on this machine.
+
+    """
+
+    tasks: Sequence[Task]
+    store: Store
+    options: Options
+    cluster: Client | str | None = None
+
+    def held(self) -> dict[str, str]:
+        """Return the status of each cell that is recorded and not measured again, by its key."""
+        records = (r for r in self._records() if not self.options.measures_again(r))
+        return {record.cell.key: record.outcome.status for record in records}
+
+    def costs(self) -> list[Estimate | None]:
+        """Return what each cell is expected to cost; None where it is recorded."""
+        records, held = self._records(), self.held()
+        return [
+            None if t.cell.key in held else estimate(t.cell, t.facts.faces, records)
+            for t in self.tasks
+        ]
+
+    def seconds(self, costs: Iterable[Estimate | None]) -> float:
+        """Return what the run is expected to take on this machine."""
+        return planned_seconds([c for c in costs if c is not None], self.options.budget)
+
+    def measure(
+        self, watcher: Watcher | None, *, faces: int | None = None, same_environment: bool = False
+    ) -> list[Record]:
+        """Measure the cells that the folder does not hold; return the records of all."""
+        if self.cluster is None:
+            return run_tasks(self.tasks, self.store, self.options, watcher)
+        from cembench.running.cluster.client import run_on_cluster
+        from cembench.running.cluster.connect import connected, parse_cluster
+
+        where: Any = nullcontext(self.cluster)
+        if isinstance(self.cluster, str):
+            place = parse_cluster(self.cluster)
+            where = connected(place)
+            if watcher is not None:
+                watcher.shows("starting workers" if place.kind != "address" else "connecting")
+        with where as client:
+            return run_on_cluster(
+                *(self.tasks, self.store, client, self.options, watcher),
+                faces=faces,
+                same_environment=same_environment,
+            )
+
+    def _records(self) -> list[Record]:
+        return self.store.records() if (self.store.folder / "records").is_dir() else []
+
+
+def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter) -> None:
+    """Raise if a run cannot be made where it is asked for; warn of an open scheduler.
+
+    Raises
+    ------
+    ParameterError
+        The place cannot be read, or algorithms are to share processes.
+    MissingExtra
+        dask is not installed.
+
+    """
+    if cluster is None:
+        return
+    if pairing == "process":
+        raise ParameterError.about(
+            "{pairing:'process'} is for runs on this machine; leave it out, or leave {cluster} out."
+        )
+    from cembench.running.cluster.connect import MODULES, parse_cluster
+
+    if not isinstance(cluster, str):
+        require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
+        return
+    where = parse_cluster(cluster)
+    require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
+    if where.is_open:
+        reporter.warn(
+            f"{where.address} asks nobody who they are: whoever reaches it runs programs as the "
+            "users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off it."
+        )
+
+
+def read_surfaces(
+    given: Iterable[Any],
+    folders: Iterable[Path],
+    registry: Registry,
+    algorithms: Sequence[Algorithm],
+    reporter: Reporter,
+    *,
+    faces: int | None,
+    repair: bool,
+) -> Surfaces:
+    """Read and generate the surfaces of a run.
+
+    A file of a folder that cannot be used is left out with a note, unless all are so.
+    """
+    kinds = kinds_of(algorithms)
+
+    def read(path: Path) -> TriangleMesh:
+        return load_file(path, kinds, repair=repair).mesh
+
+    meshes: list[TriangleMesh] = []
+    roles: dict[str, PaperRole] = {}
+
+    def add(mesh: TriangleMesh) -> None:
+        meshes.append(mesh)
+        roles[mesh.name] = paper_role_of(registry, mesh)
+
+    for folder in folders:
+        _add_folder(folder, read, add, reporter)
+    for number, one in enumerate(given, start=1):
+        if is_generated(one, registry):
+            meshes.append(generate_surface(registry, one, faces))
+            roles |= paper_roles(registry, [one])
+        elif isinstance(one, str) and one in registry.datasets and not Path(one).exists():
+            add(read(local_files([Path(one)], registry, reporter)[0]))
+        else:
+            mesh = load_surface(one, kinds, repair=repair, registry=registry)
+            add(mesh.renamed(f"surface-{number}") if isinstance(one, tuple | list) else mesh)
+    return meshes, roles
+
+
+def _add_folder(
+    folder: Path,
+    read: Callable[[Path], TriangleMesh],
+    add: Callable[[TriangleMesh], None],
+    reporter: Reporter,
+) -> None:
+    """Add the surfaces of a folder's files; those that cannot be used are left out with a note."""
+    refused: list[MeshError] = []
+    files = mesh_files(folder)
+    for path in files:
+        try:
+            add(read(path))
+        except MeshError as error:
+            refused.append(error)
+            reporter.note(f"{path.name} is left out: {_first_problem(str(error))}")
+    if len(refused) == len(files):
+        raise refused[0]
+
+
+def gather_sets(
+    sets: Sequence[str],
+    registry: Registry,
+    algorithms: Sequence[Algorithm],
+    limit: int | None,
+    reporter: Reporter,
+) -> Gathered:
+    """Fetch and read the surfaces of sets, and note which cannot be measured.
+
+    Raises
+    ------
+    ParameterError
+        A set is unknown, or none of its surfaces can be measured.
+
+    """
+    given: list[Provided] = []
+    with reporter.downloads([]) as progress:
+        for name in dict.fromkeys(sets):
+            with reporter.busy(f"reading the surfaces of {name}"):
+                given += surfaces_of_set(name, registry, limit=limit, progress=progress)
+    found = gathered(given, registry, algorithms)
+    for one in found.refused[:NAMED]:
+        reporter.note(f"{one.name} is left out: {_first_problem(one.error)}")
+    more = len(found.refused) - NAMED
+    if more > 0:
+        reporter.note(f"{more} more are left out; the report lists them")
+    if not found.surfaces:
+        raise ParameterError.about(
+            "{given} gives no surface that the chosen algorithms take; "
+            "`cembench fetch --group disks` shows whether files can be fetched.",
+            given=", ".join(sets),
+        )
+    return found
+
+
+def _first_problem(error: str) -> str:
+    """Return the first of what may be several problems, one a line."""
+    first, *more = error.splitlines() or [""]
+    return f"{first} {more[0].strip()}{' ...' if len(more) > 1 else ''}" if more else first
+
+
+def chosen_algorithms(
+    registry: Registry, algorithms: Sequence[str] | None, usual: Sequence[str]
+) -> list[Algorithm]:
+    """Return the algorithms of these names; "all" and "usual" (the default) stand for several."""
+    several = {"all": registry.algorithms, "usual": usual}
+    names = [name for one in algorithms or ("usual",) for name in several.get(one, (one,))]
+    return [registry.algorithm(name) for name in dict.fromkeys(names)]
+
+
+def check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None:
+    """Raise :class:`ParameterError` if the reference is not one of the algorithms."""
+    names = [algorithm.name for algorithm in chosen]
+    if reference is not None and reference not in names:
+        raise ParameterError.about(
+            "{given} is not among the algorithms of this run: {names}.",
+            given=Setting("reference", repr(reference)),
+            names=", ".join(names),
+        )
+
+
+def plan_summary(plan: Plan) -> dict[str, Any]:
+    """Return the cells of a plan with their estimates as plain data."""
+    from dataclasses import asdict
+
+    held, costs = plan.held(), plan.costs()
+    cells = [
+        {
+            "key": task.cell.key,
+            "mesh": task.cell.mesh,
+            "algorithm": task.cell.algorithm,
+            "solves": task.cell.solves,
+            "faces": task.facts.faces,
+            "held": held.get(task.cell.key),
+            "estimate": None if cost is None else asdict(cost),
+        }
+        for task, cost in zip(plan.tasks, costs, strict=True)
+    ]
+    largest = max((cost.memory_bytes for cost in costs if cost is not None), default=0)
+    return {"cells": cells, "seconds": plan.seconds(costs), "memory_bytes": largest}

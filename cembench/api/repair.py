@@ -1,0 +1,124 @@
+"""Repair a mesh file or arrays into oriented manifolds."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from cembench.api.settings import MOST_FACES
+from cembench.core.arguments import Range, checked
+from cembench.core.errors import MeshError
+
+if TYPE_CHECKING:
+    from cembench.core.notices import Notice
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.running.surfaces import SurfaceInput
+
+
+@dataclass(frozen=True)
+class Repair:
+    """The result of a repair.
+
+    Parameters
+    ----------
+    meshes : tuple of TriangleMesh
+        The surfaces, the one with the most triangles first; each is a :class:`DiskMesh` or
+        :class:`HoledMesh` if possible.
+    steps : mapping of str to int
+        How often each step was applied, by name, in the order of the steps.
+    notices : tuple of Notice
+        What the reader of the file changed or ignored.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> len(cembench.repair("flat.obj").meshes)
+    1
+
+    """
+
+    meshes: tuple[TriangleMesh, ...]
+    steps: Mapping[str, int]
+    notices: tuple[Notice, ...] = ()
+
+    @property
+    def mesh(self) -> TriangleMesh:
+        """The surface with the most triangles."""
+        return self.meshes[0]
+
+
+@checked
+def repair(
+    surface: SurfaceInput,
+    *,
+    weld: Annotated[float, Range(0.0, 1e60)] | None = None,
+    fill_holes: Annotated[int, Range(0, MOST_FACES)] = 0,
+    components: Literal["largest", "all"] = "largest",
+) -> Repair:
+    """Repair a surface into an oriented manifold, and count every step.
+
+    Steps, in order: faces with missing vertices dropped, polygons cut into triangles, coincident
+    vertices welded, degenerate and duplicate triangles fixed or dropped, non-manifold edges and
+    vertices split, triangles oriented consistently, components chosen, ears dropped, holes filled,
+    isolated vertices removed. docs/repair.md describes each step.
+
+    Parameters
+    ----------
+    surface : path, pair of arrays (V, F), or mesh
+        V is (n, 3) and may hold NaN, F is (m, 3) and counts from 0.
+    weld : float, optional
+        Weld vertices up to this distance apart, in the surface's units; 0: equal ones only, which
+        is the default but for the seams of a disk.
+    fill_holes : int
+        Fill holes of at most N edges; the longest boundary loop of a component stays open.
+    components : {"largest", "all"}
+        Keep the component with the most triangles, or all of them.
+
+    Returns
+    -------
+    Repair
+        ``.mesh`` is the surface, ``.meshes`` are all components, ``.steps`` counts what was done.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read, or no surface is left.
+    ParameterError
+        `weld` or `fill_holes` is negative, or `components` is neither "largest" nor "all".
+
+    Examples
+    --------
+    A square of two triangles that do not share their vertices:
+
+    >>> import cembench
+    >>> V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0], [0, 1, 0]]
+    >>> mended = cembench.repair((V, [[0, 1, 2], [3, 4, 5]]))
+    >>> mended.mesh.n, mended.steps["vertices_welded"]
+    (4, 2)
+    >>> type(mended.mesh).__name__
+    'DiskMesh'
+
+    """
+    from cembench.mesh.defects import located
+    from cembench.mesh.files import read_soup
+    from cembench.mesh.repair import repair as repair_arrays
+    from cembench.mesh.soup import Soup
+    from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+    from cembench.running.surfaces import prepared, soup_of
+
+    path = Path(surface) if isinstance(surface, str | os.PathLike) else None
+    soup = soup_of(surface) if path is None else read_soup(path)
+    try:
+        found = repair_arrays(
+            soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
+        )
+        kinds = (TriangleMesh, DiskMesh, HoledMesh)  # every surface is of the first
+        soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in found.surfaces]
+        meshes = [prepared(one, kinds).mesh for one in soups]
+    except MeshError as error:
+        raise located(error, path) from None
+    return Repair(tuple(meshes), found.counts, soup.notices)

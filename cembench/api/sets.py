@@ -1,0 +1,259 @@
+"""Sets of surfaces for large runs: named sets, a folder, or an archive.
+
+Surfaces that are not available (a file that cannot be fetched, a surface that is not a disk) are
+listed too, with the reason, because success rates need the right denominator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+
+from cembench.api.providers import (
+    Names,
+    Provided,
+    provided,
+    surfaces_of_archive,
+    surfaces_of_folder,
+    surfaces_of_thingi10k,
+)
+from cembench.core.errors import ParameterError
+from cembench.mesh.datasets import Dataset, fetch_all, surface_file
+from cembench.mesh.download import Progress
+from cembench.mesh.files import read_mesh
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.registry import Algorithm, Registry
+from cembench.results.exhibits import Exhibit, ExhibitTable
+from cembench.running.plan import PaperRole
+
+#: Default number of surfaces from a set without an end.
+USUAL_LIMIT = 100
+#: Name of the exhibit that lists the surfaces of a run's sets.
+EXHIBIT = "surface-set"
+#: Registered name of the face model's surface family.
+FACE = "ict-face"
+
+ShowProgress = Callable[[Dataset], Progress | None]
+
+
+def _quietly(dataset: Dataset) -> None:
+    """Show no progress of a download."""
+
+
+@dataclass(frozen=True)
+class SurfaceSet:
+    """A named set: datasets of some groups, samples of the face model, or Thingi10K.
+
+    Parameters
+    ----------
+    title : str
+        Description of the set.
+    groups : tuple of str
+        Groups of datasets.
+    part : str
+        The part of the face model to sample; "" for none.
+
+    """
+
+    title: str
+    groups: tuple[str, ...] = ()
+    part: str = ""
+
+
+#: All named sets.
+SETS: Mapping[str, SurfaceSet] = MappingProxyType(
+    {
+        "real-disks": SurfaceSet("real disks, including models of the paper", ("paper", "disks")),
+        "real-holes": SurfaceSet("real surfaces with holes", ("holes",)),
+        "closed": SurfaceSet("real closed surfaces of genus 0, cut open", ("closed",)),
+        "stress": SurfaceSet("surfaces that are hard to map, or damaged", ("stress",)),
+        "ict-faces": SurfaceSet("faces of the ICT model, random expressions", part="disk"),
+        "ict-faces-holes": SurfaceSet("the same, with eyes and mouth as holes", part="face"),
+        "thingi10k": SurfaceSet("models for 3D printing, closed ones of genus 0 cut open"),
+    }
+)  # fmt: skip
+
+
+def surfaces_of_set(
+    name: str,
+    registry: Registry,
+    *,
+    limit: int | None = None,
+    progress: ShowProgress = _quietly,
+) -> Iterator[Provided]:
+    """Yield the surfaces of a set, ready to be mapped, each with its name and source.
+
+    Parameters
+    ----------
+    name : str
+        A name in :data:`SETS`, or the path of a folder or archive with mesh files.
+    registry : Registry
+        The registry of datasets and surface families.
+    limit : int, optional
+        Maximum number of surfaces; default: all, or :data:`USUAL_LIMIT` of a set without an end.
+    progress : function of a dataset
+        Returns the progress callback for a download.
+
+    Raises
+    ------
+    ParameterError
+        There is no such set, folder or archive.
+    DatasetError
+        The face model cannot be fetched.
+    MissingExtra
+        The face model needs a package that is not installed.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> from cembench.registry import load_registry
+    >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
+    >>> [one.name for one in surfaces_of_set(".", load_registry())]
+    ['flat']
+
+    """
+    if name not in SETS:
+        return _of_path(name, limit)
+    chosen = SETS[name]
+    if chosen.groups:
+        return _of_datasets(
+            [d for group in chosen.groups for d in registry.group(group)][:limit], progress
+        )
+    if chosen.part:
+        return _of_face_model(registry, chosen.part, limit or USUAL_LIMIT)
+    return surfaces_of_thingi10k(limit=limit or USUAL_LIMIT)
+
+
+def _of_path(name: str, limit: int | None) -> Iterator[Provided]:
+    place = Path(name)
+    if place.is_dir():
+        return surfaces_of_folder(place, limit=limit)
+    if place.is_file():
+        return surfaces_of_archive(place, limit=limit)
+    raise ParameterError(
+        f"there is no set {name!r}, and no folder or archive of that name; sets: {', '.join(SETS)}."
+    )
+
+
+def _of_datasets(datasets: Sequence[Dataset], progress: ShowProgress) -> Iterator[Provided]:
+    with closing(fetch_all(datasets, progress=progress)) as downloads:
+        found = {one.dataset.name: one for one in downloads}
+    for dataset in datasets:
+        one = found[dataset.name]
+        if one.error is not None:
+            why = str(one.error)
+            yield Provided(dataset.name, dataset.source_url, error=why, licence=dataset.licence)
+        else:
+            load = partial(_read, dataset)
+            yield provided(dataset.name, dataset.source_url, load, dataset.licence)
+
+
+def _read(dataset: Dataset) -> TriangleMesh:
+    return read_mesh(surface_file(dataset), TriangleMesh)
+
+
+def _of_face_model(registry: Registry, part: str, limit: int) -> Iterator[Provided]:
+    family = registry.surface(FACE)
+    for seed in range(limit):
+        given = family.arguments({"seed": seed, "expression": "random", "part": part})
+        mesh: TriangleMesh = family.function(**given)
+        name = f"{FACE}-{seed}" if part == "disk" else f"ict-{part}-{seed}"
+        yield Provided(name, f"{family.source}; seed {seed}", mesh, licence="MIT")
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """The surfaces of a run's sets.
+
+    Parameters
+    ----------
+    surfaces : tuple of Provided
+        Surfaces that can be measured, with unique names.
+    refused : tuple of Provided
+        The other surfaces, each with the reason.
+    roles : mapping
+        The role in a paper, by surface name, of those that are its models.
+
+    """
+
+    surfaces: tuple[Provided, ...]
+    refused: tuple[Provided, ...]
+    roles: Mapping[str, PaperRole]
+
+    @property
+    def meshes(self) -> list[TriangleMesh]:
+        """The meshes that can be measured."""
+        return [one.mesh.renamed(one.name) for one in self.surfaces if one.mesh is not None]
+
+
+def gathered(
+    given: Iterable[Provided], registry: Registry, algorithms: Sequence[Algorithm]
+) -> Gathered:
+    """Split the surfaces of sets into those that the algorithms can be measured on, and the rest.
+
+    A surface that occurs twice, with the same vertices and triangles, counts once.
+    """
+    names, seen = Names(), set[str]()
+    kinds = tuple({a.mesh_type for a in algorithms})
+    rows = {d.mesh_hash: d.paper_row for d in registry.datasets.values() if d.paper_row}
+    named = {d.name: d.paper_row for d in registry.datasets.values() if d.paper_row}
+    surfaces, refused, roles = [], [], {}
+    for one in given:
+        if one.mesh is None:
+            refused.append(one)
+        elif not isinstance(one.mesh, kinds):
+            kind = type(one.mesh).__name__
+            why = f"it is a {kind}, which none of the chosen algorithms accepts"
+            refused.append(replace(one, mesh=None, error=why))
+        elif one.mesh.hash not in seen:
+            seen.add(one.mesh.hash)
+            kept = replace(one, name=names.of(one.name))
+            surfaces.append(kept)
+            row = rows.get(one.mesh.hash) or named.get(one.name, "")
+            if row:
+                roles[kept.name] = PaperRole(row, "model")
+    return Gathered(tuple(surfaces), tuple(refused), MappingProxyType(roles))
+
+
+def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
+    """Return an exhibit that lists the surfaces of a run's sets."""
+    count = len(found.surfaces) + len(found.refused)
+    cut = sum(one.cut for one in found.surfaces)
+    text = (
+        f"{', '.join(sets)}: {count} surfaces were given, {len(found.surfaces)} of them can be "
+        f"mapped{f', {cut} after they were cut open' if cut else ''}. Success rates refer to "
+        "those that can be mapped."
+    )
+    tables = [
+        ExhibitTable(
+            title="Surfaces of this run",
+            columns=("surface", "vertices", "triangles", "boundaries", "from", "licence"),
+            rows=tuple(
+                (one.name, one.mesh.n, one.mesh.m, len(one.mesh.loops), one.source, one.licence)
+                for one in found.surfaces
+                if one.mesh is not None
+            ),
+        )
+    ]
+    if found.refused:
+        rows = tuple((one.name, one.error, one.source) for one in found.refused)
+        columns = ("surface", "reason", "from")
+        tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
+    return Exhibit(
+        name=EXHIBIT,
+        title="The surfaces",
+        text=text,
+        command=command,
+        origin="surface",
+        tables=tuple(tables),
+        facts={
+            "sets": list(sets),
+            "given": count,
+            "measured": len(found.surfaces),
+            "refused": {one.name: one.error for one in found.refused},
+        },
+    )

@@ -1,6 +1,0 @@
-import pytest
-
-
-@pytest.fixture(autouse=True)
-def quick_processes(one_server):
-    """The workflows are tested here, not the processes that they start."""
