@@ -25,15 +25,15 @@ def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
     yield "surface", f"{record.cell.mesh}: {size}"
     if facts.paper_row:
         yield "in the paper", _printed(record)
-    yield "algorithm", f"{record.title} ({record.target})"
+    seconds = outcome.median_seconds
+    took = "" if seconds is None else f", {seconds_words(record) or f'{seconds:.3f} s'}"
+    yield "algorithm", f"{record.title} ({record.target}){took}"
     if outcome.metrics.get("angle_error_mean_deg") is not None:
         angles, folds = (outcome.metrics[n] for n in ("angle_error_mean_deg", "flipped_triangles"))
         shown = f"{angles:.2f} degrees mean angle error, {folds} folds"
         yield "quality", f"{shown}; -v prints all figures"
     if texture := texture_words(outcome.metrics):
         yield "texture", texture
-    if outcome.median_seconds is not None:
-        yield "seconds", seconds_words(record) or f"{outcome.median_seconds:.3f}"
     if outcome.folded_before_repair:
         yield "folded before repair", str(outcome.folded_before_repair)
     yield from _notes(record)
