@@ -33,10 +33,10 @@ from cembench.results.comparison import (
     ratio_interval,
 )
 from cembench.results.intervals import ERROR
-from cembench.results.looks import LOOKS, share, share_of
-from cembench.results.many import corrected
+from cembench.results.multiple_testing import corrected
 from cembench.results.records import Outcome, Record
-from cembench.running.judging import Checked
+from cembench.results.sequential_checks import LOOKS, share, share_of
+from cembench.running.map_checks import Checked
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import generate_surface

@@ -17,9 +17,9 @@ from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster.client import run_on_cluster
 from cembench.running.cluster.connect import connected, parse_cluster
-from cembench.running.kernel import kernel_seconds
 from cembench.running.local import run_tasks
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
+from cembench.running.reference_kernel import kernel_seconds
 
 PLUGIN = str(Path(__file__).with_name("empty_algorithms.py"))
 LAYOUT = """

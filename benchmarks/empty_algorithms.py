@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cembench import DiskMesh, Parameterization, algorithm
 from cembench.results.records import Outcome, Round
-from cembench.running.judging import Checked
+from cembench.running.map_checks import Checked
 from cembench.running.plan import Task
 from cembench.running.timing import CellTimer
 

@@ -17,7 +17,7 @@ from cembench.core.errors import CembenchError
 from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm, load_registry
-from cembench.running.judge import faults
+from cembench.running.map_promises import faults
 
 #: Two of a kind are measured once.
 LEFT_OUT = ("chinese_lion.mat",)

@@ -20,8 +20,8 @@ from cembench.results.comparison import compare_ratios
 from cembench.results.records import Outcome, Round
 from cembench.results.store import Store
 from cembench.running.environment import for_measuring
-from cembench.running.judging import Checked
 from cembench.running.local import run_tasks
+from cembench.running.map_checks import Checked
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 from cembench.running.timing import CellTimer

@@ -12,7 +12,7 @@ from scipy.special import stdtr
 from benchmarks import noise
 from benchmarks.pages import Section, Table
 from cembench.results.intervals import ERROR
-from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
+from cembench.results.sequential_checks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
 from cembench.results.signed_rank import cut, walsh_averages
 
 LAYOUT = """

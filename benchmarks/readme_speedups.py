@@ -8,7 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 from benchmarks.pages import ROOT, Section, Table
-from cembench.results.many import arithmetic, geometric, rate_interval
+from cembench.results.multiple_testing import arithmetic, geometric, rate_interval
 
 #: A policy of solving, the table of its averages, and the kept report that README quotes.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}

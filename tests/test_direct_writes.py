@@ -24,7 +24,7 @@ ALLOWED = {
     "algorithms/peers/blender_unwrap.py:main": "a program's own folder, temporary",
     "examples/external/tutte.py": "a program on its own, in a folder that is deleted",
     "cembench/running/plugins.py:_main": "between processes, in a temporary folder",
-    "cembench/running/returned.py:_extras": "pydantic_core.to_json gives text",
+    "cembench/running/sanitized_result.py:_extras": "pydantic_core.to_json gives text",
     "cembench/running/process.py": "the output of a process, in the scratch folder",
     "cembench/running/worker.py": "between processes, in the scratch folder",
     "cembench/running/memory.py": "a switch of the system, not a file",

@@ -28,7 +28,7 @@ from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
-from cembench.results.looks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
+from cembench.results.sequential_checks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
 
 if TYPE_CHECKING:
     import pandas as pd

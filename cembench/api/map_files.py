@@ -152,7 +152,7 @@ def map_files(
     )
     from cembench.api.map_surfaces import FileJobs, Maps, jobs_of, local_files, with_pictures
     from cembench.api.write_maps import FileOptions, beside
-    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.core.overwriting import refuse_inputs, refuse_present
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings
 

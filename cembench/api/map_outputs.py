@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.api.components import Shells
 from cembench.api.settings import Placement
-from cembench.api.shells import Shells
 from cembench.api.write_maps import FileOptions, check_file_options, save_map
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.api.components import Shells, read_shells
 from cembench.api.map_outputs import (
     Extras,
     draw_map,
@@ -17,7 +18,6 @@ from cembench.api.map_outputs import (
     picture_files,
     write_extras,
 )
-from cembench.api.shells import Shells, read_shells
 from cembench.api.write_maps import (
     FileOptions,
     write_atlas,
@@ -141,7 +141,7 @@ def with_pictures(files: Sequence[FileJobs], *, overwrite: bool) -> list[FileJob
     chosen = [file.jobs[0].task.algorithm for file in files]
     pictures = picture_files(sources, chosen, [file.output for file in files])
     if not overwrite:
-        from cembench.drawing.own_pictures import check_replaceable
+        from cembench.drawing.replaceable_pictures import check_replaceable
 
         for picture in pictures:
             check_replaceable(picture)

@@ -27,7 +27,7 @@ from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
-from cembench.running.judging import figures
+from cembench.running.map_checks import figures
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import SurfaceInput, load_surface
@@ -159,7 +159,7 @@ class Result:
 
         """
         from cembench.api.write_maps import FileOptions, beside, save_map
-        from cembench.core.outputs import refuse_present
+        from cembench.core.overwriting import refuse_present
 
         path, file_options = Path(path), FileOptions(uv, checker)
         check_writable_format(path, with_uv=True)

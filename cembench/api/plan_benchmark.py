@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cembench.api.map_surfaces import local_files
-from cembench.api.providers import Provided
 from cembench.api.sets import Gathered, gathered, surfaces_of_set
+from cembench.api.surface_collections import Provided
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import Reporter

@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
-from cembench.api.providers import (
+from cembench.api.surface_collections import (
     Names,
     Provided,
     provided,

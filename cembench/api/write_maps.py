@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.api.components import Shells, areas_of
 from cembench.api.settings import Placement
-from cembench.api.shells import Shells, areas_of
 from cembench.conformal.atlas import cut_map
 from cembench.conformal.planar import orientations
 from cembench.core.atomic import write_bytes

@@ -64,7 +64,7 @@ def run(
 
 def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
     from cembench.report.content.evidence import Evidence
-    from cembench.report.content.many import MANY
+    from cembench.report.content.many_surfaces import MANY
     from cembench.report.run_tables import machine_lines, many_table, results_table, speedups_table
     from cembench.results.outliers import outlier_lines
     from cembench.results.record_rows import rows

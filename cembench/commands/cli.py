@@ -1,7 +1,7 @@
 """The command line. Exit code 0 if every cell ended ok, 1 if one did not, 2 on wrong usage.
 
 Other codes (a closed pipe, a signal, a fault of cembench itself) are in
-:mod:`cembench.commands.ending`.
+:mod:`cembench.commands.exit_codes`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from cembench.commands import sign as sign_verbs
 from cembench.commands import theory as theory_verbs
 from cembench.commands import validate as validate_verbs
 from cembench.commands.console import Json, err, out, print_json, registry_with
-from cembench.commands.ending import Verbs, ending
+from cembench.commands.exit_codes import Verbs, ending
 from cembench.commands.options import Plugins
 from cembench.core.errors import ParameterError
 
@@ -235,7 +235,7 @@ def _registry_as_json(
 
 
 def main() -> None:
-    """Run the command line; :mod:`cembench.commands.ending` chooses the exit code."""
+    """Run the command line; :mod:`cembench.commands.exit_codes` chooses the exit code."""
     with ending():
         app()
 

@@ -54,7 +54,7 @@ class PlainConsole(Console):
         return _PlainStatus(_literal(status), console=self, **options)
 
     def on_broken_pipe(self) -> NoReturn:
-        """Raise, so that :func:`cembench.commands.ending.ending` chooses the exit code."""
+        """Raise, so that :func:`cembench.commands.exit_codes.ending` chooses the exit code."""
         raise BrokenPipeError(errno.EPIPE, "the output pipe is closed")
 
 
@@ -157,7 +157,7 @@ class Shown(Reporter):
         self, cells: int, *, on_cluster: bool = False, resumes: bool = True
     ) -> Iterator[Any]:
         """Show a live table on a terminal, and lines elsewhere; Ctrl-C says how to resume."""
-        from cembench.commands.ending import resumable
+        from cembench.commands.exit_codes import resumable
         from cembench.commands.progress import progress_on
 
         stopping = resumable() if resumes else nullcontext()

@@ -44,7 +44,7 @@ def cut(
     """Write the disk and its seam, and print the length of the cut."""
     from cembench.api.repair import repair
     from cembench.core.notices import NoticeKind
-    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.core.overwriting import refuse_inputs, refuse_present
     from cembench.mesh.cut import write_seam
     from cembench.mesh.files import check_writable_format, write_mesh
 

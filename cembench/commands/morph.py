@@ -49,7 +49,7 @@ def morph(
     as_json: Json = False,
 ) -> None:
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
-    from cembench.core.outputs import refuse_inputs
+    from cembench.core.overwriting import refuse_inputs
     from cembench.morphing.drawing import check_views
     from cembench.morphing.exhibit import write_morph_exhibits
     from cembench.morphing.surfaces_and_films import (

@@ -9,7 +9,7 @@ import typer
 
 from cembench.commands.console import Json, err, out, print_json
 from cembench.commands.sign import RequireSigned, check_signed
-from cembench.core.outputs import refuse_inputs
+from cembench.core.overwriting import refuse_inputs
 
 
 def publish(

@@ -39,7 +39,7 @@ def repair(
     as_json: Json = False,
 ) -> None:
     """Write the repaired surfaces, and print what was done."""
-    from cembench.core.outputs import refuse_inputs, refuse_present
+    from cembench.core.overwriting import refuse_inputs, refuse_present
     from cembench.mesh.files import check_writable_format, write_mesh
     from cembench.mesh.topology import genus
 

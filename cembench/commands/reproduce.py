@@ -12,7 +12,7 @@ from cembench.api.settings import budget_seconds, bytes_of
 from cembench.commands import fetch as fetch_verbs
 from cembench.commands import report as report_verbs
 from cembench.commands.console import SHOWN, Json, complain, err, print_json
-from cembench.commands.ending import resumable
+from cembench.commands.exit_codes import resumable
 from cembench.commands.options import Fresh
 from cembench.core.extras import Extra, require
 from cembench.results.profiles import Profile
@@ -51,9 +51,9 @@ def reproduce(
     from cembench.core import folders
     from cembench.registry import load_registry
     from cembench.results import run_folder
-    from cembench.results.looks import USUAL_PRECISION
     from cembench.results.profiles import algorithms_of
     from cembench.results.record_rows import rows
+    from cembench.results.sequential_checks import USUAL_PRECISION
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
     from cembench.running.local import run_tasks

@@ -13,7 +13,7 @@ from cembench.commands.console import Json, complain, note, out, print_json, pri
 from cembench.commands.options import Verify
 from cembench.commands.sign import RequireSigned, check_signed
 from cembench.core.errors import ParameterError, RecordError
-from cembench.core.outputs import refuse_inputs
+from cembench.core.overwriting import refuse_inputs
 from cembench.report.export_format import Format
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
 
     from cembench.report.run_tables import changes_table
     from cembench.results.machines import COMPARED, differences
-    from cembench.results.many import corrected
+    from cembench.results.multiple_testing import corrected
     from cembench.results.runs_compared import compare_runs
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 from PIL.PngImagePlugin import PngInfo
 
-from cembench.drawing.own_pictures import SOFTWARE
+from cembench.drawing.replaceable_pictures import SOFTWARE
 from cembench.drawing.scene import FOLDED
 
 Picture = NDArray[np.uint8]

@@ -29,7 +29,7 @@ from cembench.results.comparison import (
 from cembench.results.external_words import marks_explained
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
-from cembench.results.many import corrected
+from cembench.results.multiple_testing import corrected
 from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
 from cembench.results.runs_compared import Change
 from cembench.running.estimate import Estimate

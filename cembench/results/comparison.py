@@ -5,11 +5,11 @@ whatever slows the machine for a while slows both. If both had the same cost, ei
 slower one of a round by the same amount with the same probability. The logarithm of the ratio is
 then symmetric about 0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact
 under any noise: "faster" is wrong in at most 5 % of all comparisons, even if rounds continued until
-the interval was narrow (:mod:`cembench.results.looks`). Where the algorithms of a round shared a
-process too (:mod:`cembench.running.pairing`), the ratios within it decide, unless those between
+the interval was narrow (:mod:`cembench.results.sequential_checks`). Where the algorithms of a
+round shared a process too (:mod:`cembench.running.pairing`), the ratios within it decide, unless those between
 separate processes show that one algorithm disturbed the other; then a verdict must hold for both,
 so it is wrong no more often. For many comparisons in one table see
-:mod:`cembench.results.many`; for two runs :mod:`cembench.results.runs_compared`.
+:mod:`cembench.results.multiple_testing`; for two runs :mod:`cembench.results.runs_compared`.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from statistics import median
 from typing import Literal
 
 from cembench.results.intervals import ERROR, Interval
-from cembench.results.looks import USUAL_PRECISION, share_of
 from cembench.results.records import Cell, Record, Round
+from cembench.results.sequential_checks import USUAL_PRECISION, share_of
 from cembench.results.signed_rank import centre_interval
-from cembench.results.student import paired_p
+from cembench.results.t_test import paired_p
 
 #: "undecided": the interval contains 1. "too few rounds": there is no interval. "not side by side":
 #: no round of one sitting measured both.
@@ -54,7 +54,7 @@ class Comparison:
     interval: Interval | None
     verdict: Verdict
     rounds: int
-    #: p-value of the difference (:mod:`cembench.results.student`), corrected for the looks taken;
+    #: p-value of the difference (:mod:`cembench.results.t_test`), corrected for the looks taken;
     #: corrections for many comparisons use it. 1 without an interval.
     p: float = 1.0
     #: Whether the ratios are those within shared processes.

@@ -19,7 +19,7 @@ import numpy as np
 from cembench.core.errors import ParameterError
 from cembench.results.columns import significant
 from cembench.results.intervals import LEVEL
-from cembench.results.many import geometric, sign_test
+from cembench.results.multiple_testing import geometric, sign_test
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -14,7 +14,7 @@ from cembench.results.comparison import (
     paired_ratios,
     references,
 )
-from cembench.results.many import corrected
+from cembench.results.multiple_testing import corrected
 from cembench.results.records import REFERENCE, Record
 
 _METRICS = frozenset(metric.name for metric in FIGURES)

@@ -248,7 +248,7 @@ class Round(BaseModel):
     #: compared with; empty without one.
     together: tuple[CallSeconds, ...] = ()
     #: Key from which the motion of the surface for each call is derived
-    #: (:mod:`cembench.running.motion`); empty in older records.
+    #: (:mod:`cembench.running.rigid_motion`); empty in older records.
     motions: str = ""
     #: Whether a call agreed to rounding with another process's call on the same moved surface;
     #: None if nothing was compared.

@@ -1,8 +1,8 @@
 """Compare the seconds of two runs cell by cell.
 
 Rounds of two runs are not paired, and the machine may have drifted between them. So every round
-also times a reference kernel that never changes (:mod:`cembench.running.kernel`). The seconds of a
-cell are divided by the kernel's in the same round, and compared by the rank-sum test at the 5 %
+also times a reference kernel that never changes (:mod:`cembench.running.reference_kernel`).
+The seconds of a cell are divided by the kernel's in the same round, and compared by the rank-sum test at the 5 %
 level. If a run has no kernel times, plain seconds are compared; the interval then ignores drift.
 """
 
@@ -16,9 +16,9 @@ from statistics import median
 from cembench.results import rank_sum
 from cembench.results.comparison import Comparison, circumstances, verdict_of
 from cembench.results.intervals import ERROR, Interval
-from cembench.results.looks import share_of
 from cembench.results.records import Record, Round
-from cembench.results.student import unpaired_p
+from cembench.results.sequential_checks import share_of
+from cembench.results.t_test import unpaired_p
 
 
 @dataclass(frozen=True)

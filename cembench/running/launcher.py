@@ -26,7 +26,7 @@ from cembench.linear_algebra.backends import default_backend
 from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
 from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
-from cembench.running.judge import Promise
+from cembench.running.map_promises import Promise
 from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.process import Limits, ProcessEnd, finds_all, run_limited, spawning

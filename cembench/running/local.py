@@ -31,20 +31,19 @@ from numpy.typing import NDArray
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.results.comparison import circumstances
-from cembench.results.looks import is_look, next_look
 from cembench.results.records import Ended, Outcome, Record, Round
+from cembench.results.sequential_checks import is_look, next_look
 from cembench.results.store import Store
-from cembench.running.comparable import is_cold
+from cembench.running.background_load import counters, neighbours
 from cembench.running.environment import describe_environment
 from cembench.running.estimate import USUAL_ROUNDS
-from cembench.running.judging import Checked
-from cembench.running.kernel import kernel_seconds
-from cembench.running.neighbours import counters, neighbours
+from cembench.running.map_checks import Checked
 from cembench.running.options import Options
 from cembench.running.pairing import PROCESSES, WORTH, Scatter
 from cembench.running.parallel_checks import check_in_parallel
 from cembench.running.plan import Task
 from cembench.running.recorder import Recorder, now, record_of, recording
+from cembench.running.reference_kernel import kernel_seconds
 from cembench.running.schedule import (
     BESIDE_CALLS,
     CellState,
@@ -56,6 +55,7 @@ from cembench.running.schedule import (
     sharing_groups,
 )
 from cembench.running.timing import CellTimer
+from cembench.running.timing_checks import is_cold
 from cembench.running.watcher import Step, Watcher
 
 

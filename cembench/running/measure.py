@@ -2,7 +2,7 @@
 
 Only the call is timed, from the arrays V and F in memory to uv: boundary loops, Laplacian,
 ordering, factorisation and iterations. The algorithm is not trusted: every map, checked or timed,
-is judged (:mod:`cembench.running.judging`), in another process if possible, and the metrics are
+is judged (:mod:`cembench.running.map_checks`), in another process if possible, and the metrics are
 computed there.
 """
 
@@ -39,16 +39,15 @@ from cembench.results.records import (
     Round,
     not_ok,
 )
-from cembench.running.comparable import Used
 from cembench.running.external.call import ProgramCalls
 from cembench.running.external.present import library_version, missing
-from cembench.running.judge import Promise
-from cembench.running.judging import judged_check
+from cembench.running.map_checks import judged_check
+from cembench.running.map_promises import Promise
 from cembench.running.memory import Memory, memory_of_call
-from cembench.running.motion import UNMOVED, moved
 from cembench.running.processor import Processor, after_call, before_call
 from cembench.running.quality import better_parameters
-from cembench.running.returned import (
+from cembench.running.rigid_motion import UNMOVED, moved
+from cembench.running.sanitized_result import (
     Returned,
     finite,
     hash_of,
@@ -56,6 +55,7 @@ from cembench.running.returned import (
     phases_fault,
     report_of,
 )
+from cembench.running.timing_checks import Used
 
 #: A process times further calls up to this total of seconds, or this number of calls.
 ENOUGH_SECONDS = 0.3

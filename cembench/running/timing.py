@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 
 from cembench.core.names import file_name
 from cembench.results.records import Fault, FaultKind, Outcome, Round, Status, not_ok
-from cembench.running.comparable import impossible, incomparable
 from cembench.running.estimate import expected_bytes
-from cembench.running.judging import (
+from cembench.running.launcher import Launcher, judges_server, mebibytes, remove, unreadable
+from cembench.running.map_checks import (
     SAME_MAP,
     Checked,
     JudgedCalls,
@@ -32,11 +32,11 @@ from cembench.running.judging import (
     kept_from_call_to_call,
     sample,
 )
-from cembench.running.launcher import Launcher, judges_server, mebibytes, remove, unreadable
 from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, SECOND_CALL, WARM_UP
-from cembench.running.motion import NUMBERS_KEPT, UNMOVED, in_first_order
 from cembench.running.options import Options
 from cembench.running.plan import Task
+from cembench.running.rigid_motion import NUMBERS_KEPT, UNMOVED, in_first_order
+from cembench.running.timing_checks import impossible, incomparable
 from cembench.running.worker import Part, TimedPart
 
 #: Number of new processes that are asked, at most, how far maps of a randomised solver scatter.

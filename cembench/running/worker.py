@@ -24,15 +24,15 @@ from cembench.core.notices import Notice
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import load_algorithm
 from cembench.results.records import Cell, Fault, Outcome, Round
-from cembench.running.comparable import Used
 from cembench.running.external.call import use_folder
-from cembench.running.judge import Promise
-from cembench.running.judging import Checked, JudgedCalls, judged_calls, judged_check
+from cembench.running.map_checks import Checked, JudgedCalls, judged_calls, judged_check
+from cembench.running.map_promises import Promise
 from cembench.running.measure import Timed, TimedCalls, call_cell, preparing_seconds, timed_together
-from cembench.running.motion import moved
 from cembench.running.process import die_with_parent, limit_memory
 from cembench.running.processor import keep_orphans
-from cembench.running.returned import outcome_of_error
+from cembench.running.rigid_motion import moved
+from cembench.running.sanitized_result import outcome_of_error
+from cembench.running.timing_checks import Used
 
 #: Modules loaded on demand elsewhere, because each takes a tenth of a second.
 _LOADED_LATE = ("igl", "scipy.linalg", "scipy.optimize", "scipy.sparse.linalg")

@@ -16,7 +16,7 @@ from cembench.conformal.metrics import (
 )
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
-from cembench.running.judge import CIRCLE_TOLERANCE, CIRCULAR
+from cembench.running.map_promises import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
 from cembench.validation.finding import ValidationFinding

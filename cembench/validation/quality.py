@@ -30,7 +30,7 @@ from cembench.results.comparison import (
 from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.external_words import solve_words
 from cembench.results.intervals import Interval, median_interval
-from cembench.results.many import corrected
+from cembench.results.multiple_testing import corrected
 from cembench.results.records import FaultKind, Record
 from cembench.validation.finding import ValidationFinding
 

@@ -15,7 +15,7 @@ from cembench.conformal.metrics import all_metrics, boundary_circles
 from cembench.core.errors import ParameterError
 from cembench.linear_algebra.cholmod import CholmodFactor
 from cembench.mesh.files import read_mesh
-from cembench.running.judge import faults
+from cembench.running.map_promises import faults
 from tests import gallery
 from tests.real_meshes import real_mesh
 

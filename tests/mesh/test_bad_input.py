@@ -49,7 +49,7 @@ FILES = {
 def test_each_bad_file_has_its_own_message(name, verb, cli, tmp_path):
     text, message = FILES[name]
     if (name, verb) == ("pieces.obj", "map"):
-        pytest.skip("map takes several surfaces in one file: tests/api/test_shells.py")
+        pytest.skip("map takes several surfaces in one file: tests/api/test_components.py")
     (tmp_path / name).write_text(text)
     where = [tmp_path / name] if verb == "map" else ["--mesh", tmp_path / name]
     more = ["-o", "out.obj", "--preview"] if verb == "map" else ["-o", "out"]

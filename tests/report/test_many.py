@@ -9,7 +9,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.findings import many_findings
-from cembench.report.content.many import HARDEST, hardest
+from cembench.report.content.many_surfaces import HARDEST, hardest
 from cembench.report.content.pairwise_wins import _wins, pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot

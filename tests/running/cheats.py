@@ -24,7 +24,7 @@ from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
-from cembench.running.motion import moved
+from cembench.running.rigid_motion import moved
 
 #: Where the ones that keep something on disk keep it.
 KEPT = Path(os.environ.get("CHEATS_FOLDER", tempfile.gettempdir()))

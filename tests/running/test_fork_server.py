@@ -10,7 +10,7 @@ import pytest
 from cembench.results.records import Outcome, Round
 from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
-from cembench.running.judging import Checked
+from cembench.running.map_checks import Checked
 from cembench.running.options import Options
 from cembench.running.timing import CellTimer
 from tests.running.test_local import MEMORY, tasks_of

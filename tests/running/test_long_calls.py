@@ -5,7 +5,7 @@ from cembench.core.parameterization import Parameterization
 from cembench.registry import algorithm, load_registry
 from cembench.results.records import Cell
 from cembench.running import measure
-from cembench.running.judging import Checked
+from cembench.running.map_checks import Checked
 from cembench.running.surfaces import generate_surface
 from tests.validation.in_this_process import time_cell
 

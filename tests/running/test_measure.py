@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cembench import HoledMesh, Parameterization, algorithm
-from cembench.running import judging
-from cembench.running.judge import faults
+from cembench.running import map_checks
+from cembench.running.map_promises import faults
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
 from tests import gallery
@@ -81,7 +81,7 @@ def test_a_hole_turned_inside_out_crosses_itself():
 def test_an_ok_map_does_not_hide_figures_that_are_infinite(monkeypatch):
     found = {"conformal_energy": 1.0, "dirichlet_energy": 2.0, "dilatation_max": float("inf")}
     found["angle_error_mean_deg"] = 0.0
-    monkeypatch.setattr(judging, "all_metrics", lambda *_: found)
+    monkeypatch.setattr(map_checks, "all_metrics", lambda *_: found)
     outcome, _ = mapped(FLAT)
     assert outcome.metrics["dilatation_max"] is None
     (note,) = outcome.notes

@@ -175,7 +175,7 @@ def test_one_process_makes_the_calls_of_twins(tmp_path):
     timer = CellTimer(tmp_path, Options())
     try:
         outcome, _ = timer.check(task)
-        checked = cembench.running.judging.Checked.of(outcome)
+        checked = cembench.running.map_checks.Checked.of(outcome)
         found = timer.together([task, task], [checked, checked])
     finally:
         timer.close()

@@ -5,8 +5,8 @@ from typing import ClassVar
 
 from cembench.registry import load_registry
 from cembench.results.records import Fault, Outcome, not_ok
-from cembench.running.judge import Promise
-from cembench.running.judging import judged_calls
+from cembench.running.map_checks import judged_calls
+from cembench.running.map_promises import Promise
 from cembench.running.measure import Timed, check_cell, timed_together
 from cembench.validation.solver import Solver
 

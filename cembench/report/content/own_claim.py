@@ -9,10 +9,10 @@ from cembench.report.content.averages import mean_rate
 from cembench.report.content.claims import under
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.rates import measured_rates
-from cembench.report.content.sure_speedups import paired_rounds
+from cembench.report.content.speedup_significance import paired_rounds
 from cembench.report.document import VERDICTS, Claim, Sentence
 from cembench.results.intervals import DEFAULT_ROUNDS
-from cembench.results.many import FEWEST_SURFACES, arithmetic, rate_interval
+from cembench.results.multiple_testing import FEWEST_SURFACES, arithmetic, rate_interval
 
 #: Verdicts whose claims are named in the count.
 _NAMED = ("does not hold here", "holds in part")
@@ -22,7 +22,7 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     """Return the paper's average rates of speedup beside those of this run, as a sentence.
 
     A measured rate has its 95 % interval over models and rounds in brackets where there are enough
-    of both (:func:`cembench.results.many.rate_interval`).
+    of both (:func:`cembench.results.multiple_testing.rate_interval`).
     """
     paper = evidence.paper
     names = ", ".join(algorithm.upper() for algorithm in paper.compared)

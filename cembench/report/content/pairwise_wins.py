@@ -9,7 +9,7 @@ from cembench.report.content.evidence import ANGLE, DISK, Evidence
 from cembench.report.content.printed_beside_measured import policy_suffix
 from cembench.report.document import Column, Table, Value, missing, words
 from cembench.results.intervals import ERROR
-from cembench.results.many import holm, sign_test
+from cembench.results.multiple_testing import holm, sign_test
 
 #: Figures that differ by less than this share count as equal.
 SAME = 1e-6

@@ -11,7 +11,7 @@ from cembench.report.content.evidence import AlgorithmSeries, Evidence, Measured
 from cembench.report.declared import figure_entry
 from cembench.report.document import Column, Table, Value, count, entry, missing, words
 from cembench.results.columns import FrameColumn
-from cembench.results.many import geometric
+from cembench.results.multiple_testing import geometric
 from cembench.results.papers import Paper
 
 

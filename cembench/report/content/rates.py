@@ -12,7 +12,7 @@ from cembench.report.content.printed_beside_measured import (
     policy_suffix,
 )
 from cembench.report.content.printed_tables import printed_table
-from cembench.report.content.sure_speedups import sure_speedups
+from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.document import Column, Table, Value, count, entry, missing, words
 from cembench.results.papers import Paper
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from cembench.core.version import installed_version
-from cembench.report.content import many, policies
+from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_sections
@@ -21,7 +21,7 @@ from cembench.report.content.machines import machines_section
 from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.rates import rates_tables
-from cembench.report.content.sure_speedups import sure_speedups
+from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table, own_tables
 from cembench.report.declared_plots import declared_plot
@@ -85,8 +85,8 @@ def build_report(
 ) -> Report:
     """Compute the contents of a run's report, and draw its figures into `folder`."""
     of_paper = is_of_the_paper(evidence)
-    over_many = many.is_many(evidence) and not of_paper
-    shown = many.hardest(evidence) if over_many else evidence.surfaces
+    over_many = many_surfaces.is_many(evidence) and not of_paper
+    shown = many_surfaces.hardest(evidence) if over_many else evidence.surfaces
     n = len(shown) + 1
     inspections: dict[str, Inspection] = {}
     pages = []
@@ -330,7 +330,7 @@ _OF_OWN_SURFACES: tuple[_Maker, ...] = (
 )
 _OVER_MANY: tuple[_Maker, ...] = (
     lambda run: machines_section(run.evidence),
-    lambda run: many.many_section(run.evidence, run.shown, run.seen, run.folder),
+    lambda run: many_surfaces.many_section(run.evidence, run.shown, run.seen, run.folder),
     _costs,
 )
 

@@ -19,7 +19,7 @@ from cembench.report.content.evidence import (
 )
 from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
 from cembench.results.intervals import Interval
-from cembench.results.many import average_interval, geometric
+from cembench.results.multiple_testing import average_interval, geometric
 from cembench.results.records import Record
 
 #: An algorithm takes part with maps of at least this share of the surfaces that most mapped.

@@ -32,7 +32,7 @@ from cembench.results.records import FaultKind, ProgramRun, lower_median
 from cembench.running.external.exchange import largest_output, read_output, write_input
 from cembench.running.external.faults import ProgramFault
 from cembench.running.external.present import missing
-from cembench.running.returned import Returned
+from cembench.running.sanitized_result import Returned
 
 #: Phase name for the wall clock of a program.
 PHASE = "process"

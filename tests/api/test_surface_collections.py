@@ -15,9 +15,9 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.holed_disk import holed_disk
 
-from cembench.api import providers
+from cembench.api import surface_collections
 from cembench.api.parameterize import parameterize
-from cembench.api.providers import (
+from cembench.api.surface_collections import (
     surfaces_of_archive,
     surfaces_of_folder,
     surfaces_of_thingi10k,
@@ -121,7 +121,7 @@ def test_an_archive_is_not_trusted(tmp_path, monkeypatch):
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("bomb.obj", b"0" * 3_000_000)
     (tmp_path / "bomb.zip").write_bytes(content.getvalue())
-    monkeypatch.setattr(providers, "LARGEST_MEMBER", 1_000_000)
+    monkeypatch.setattr(surface_collections, "LARGEST_MEMBER", 1_000_000)
     (bomb,) = surfaces_of_archive(tmp_path / "bomb.zip")
     assert "more than allowed" in bomb.error
 
@@ -141,7 +141,7 @@ def test_a_tar_archive_is_not_unpacked_without_bounds(tmp_path, monkeypatch, pac
             info = tarfile.TarInfo(name)
             info.size = 2**25
             archive.addfile(info, io.BytesIO(bytes(info.size)))
-    monkeypatch.setattr(providers, "LARGEST_MEMBER", 1_000_000)
+    monkeypatch.setattr(surface_collections, "LARGEST_MEMBER", 1_000_000)
     with pytest.raises(ParameterError, match="it unpacks to more than"):
         list(surfaces_of_archive(path))
 

@@ -5,10 +5,9 @@ import pytest
 
 from cembench.registry import load_registry
 from cembench.results.records import Fault, FaultKind, Round
-from cembench.running.comparable import Used, impossible, incomparable, is_cold
-from cembench.running.judge import Promise
-from cembench.running.judging import Checked, judged_calls, kept_from_call_to_call, sample
-from cembench.running.motion import (
+from cembench.running.map_checks import Checked, judged_calls, kept_from_call_to_call, sample
+from cembench.running.map_promises import Promise
+from cembench.running.rigid_motion import (
     NUMBERS_KEPT,
     STRETCH,
     UNMOVED,
@@ -17,8 +16,9 @@ from cembench.running.motion import (
     moved,
     numbering,
 )
-from cembench.running.returned import hash_of
+from cembench.running.sanitized_result import hash_of
 from cembench.running.surfaces import generate_surface
+from cembench.running.timing_checks import Used, impossible, incomparable, is_cold
 
 MORE, AHEAD = FaultKind.MORE_CORES, FaultKind.WORKS_AHEAD
 

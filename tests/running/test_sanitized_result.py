@@ -7,10 +7,10 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench import DiskMesh, Parameterization, algorithm
 from cembench.core.clock import phase
 from cembench.results.records import FaultKind
-from cembench.running.judging import Checked
+from cembench.running.map_checks import Checked
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.returned import Returned
+from cembench.running.sanitized_result import Returned
 from cembench.running.worker import Answer
 from tests.validation.in_this_process import time_cell
 

@@ -10,7 +10,7 @@ import time
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from cembench.commands.ending import CLOSED_PIPE, FAULT, SYSTEM
+from cembench.commands.exit_codes import CLOSED_PIPE, FAULT, SYSTEM
 from cembench.mesh.files import write_mesh
 from tests.file_modes import bound_by_modes
 from tests.results.test_verify import write_pair

@@ -3,7 +3,7 @@ import pytest
 
 from benchmarks import noise, precision
 from cembench.results.intervals import ERROR
-from cembench.results.looks import LOOKS, is_look, next_look, share, share_of
+from cembench.results.sequential_checks import LOOKS, is_look, next_look, share, share_of
 from cembench.results.signed_rank import cut
 from tests.results.test_comparison import record_of
 

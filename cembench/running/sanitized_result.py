@@ -34,7 +34,7 @@ from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
 from cembench.running.external.faults import ProgramFault
-from cembench.running.judge import broken_premises
+from cembench.running.map_promises import broken_premises
 
 #: Maximum length of a stored traceback, in characters.
 LONGEST_TRACEBACK = 20_000

@@ -12,7 +12,7 @@ from cembench.report.content.evidence import AlgorithmSeries, Evidence, Measured
 from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
-from cembench.results.many import (
+from cembench.results.multiple_testing import (
     FEWEST_SURFACES,
     average_interval,
     corrected,

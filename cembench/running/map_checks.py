@@ -2,8 +2,8 @@
 
 The map of the first call, on the original surface, is the recorded one: its promises are judged and
 its metrics computed. Each timed call gets the surface in a different motion
-(:mod:`cembench.running.motion`); its map must keep the promises too, and must be the map of that
-moved surface.
+(:mod:`cembench.running.rigid_motion`); its map must keep the promises too, and must be the map of
+that moved surface.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from cembench.conformal.metrics import (
 from cembench.core.errors import describe_error
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Boundary, Fault, FaultKind, Outcome, not_ok
-from cembench.running.judge import Promise, faults, remarks
-from cembench.running.motion import UNMOVED, in_first_order, moved
+from cembench.running.map_promises import Promise, faults, remarks
 from cembench.running.quality import quality_notes
-from cembench.running.returned import hash_of, outcome_of_error
+from cembench.running.rigid_motion import UNMOVED, in_first_order, moved
+from cembench.running.sanitized_result import hash_of, outcome_of_error
 
 Complex = NDArray[np.complex128]
 

@@ -1,9 +1,9 @@
 import pytest
 
 from cembench.results.records import Neighbours
-from cembench.running import kernel
-from cembench.running.kernel import kernel_seconds
-from cembench.running.neighbours import Counters, _sum, counters, neighbours
+from cembench.running import reference_kernel
+from cembench.running.background_load import Counters, _sum, counters, neighbours
+from cembench.running.reference_kernel import kernel_seconds
 
 
 def test_what_others_did_is_what_ours_did_not():
@@ -47,8 +47,8 @@ def test_the_kernel_takes_time():
 
 def test_the_kernel_is_repeated_for_rounds_of_many_processes(monkeypatch):
     seconds = iter([9.0, 1.0, 2.0] + 12 * [3.0, 9.0] + 100 * [3.0])
-    monkeypatch.setattr(kernel, "_timed", lambda _: next(seconds))
+    monkeypatch.setattr(reference_kernel, "_timed", lambda _: next(seconds))
     assert kernel_seconds() == 2.0
     assert kernel_seconds(8) == 6.0
     assert kernel_seconds(1000) == 3.0
-    assert len(list(seconds)) == 100 - kernel.AT_MOST
+    assert len(list(seconds)) == 100 - reference_kernel.AT_MOST

@@ -7,7 +7,7 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench import DiskMesh, HoledMesh, Parameterization, algorithm
 from cembench.conformal.planar import orientations
 from cembench.results.records import FaultKind
-from cembench.running.judge import faults, remarks
+from cembench.running.map_promises import faults, remarks
 from tests import gallery
 
 DISK = flat_disk(600)
