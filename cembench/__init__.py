@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from cembench.api.parameterize import Result, parameterize
     from cembench.api.parameterize_many import parameterize_many
     from cembench.api.repair import Repair, repair
-    from cembench.api.theory_verb import theory
+    from cembench.api.reproduce import reproduce
+    from cembench.api.theory import theory
     from cembench.api.validate import validate
     from cembench.core.errors import (
         AlgorithmFailed,
@@ -73,7 +74,8 @@ _PLACES = {
     "cembench.api.parameterize": ("Result", "parameterize"),
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
-    "cembench.api.theory_verb": ("theory",),
+    "cembench.api.reproduce": ("reproduce",),
+    "cembench.api.theory": ("theory",),
     "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -113,6 +115,7 @@ __all__ = [
     "parameterize_many",
     "read_mesh",
     "repair",
+    "reproduce",
     "surface",
     "surface_family",
     "theory",

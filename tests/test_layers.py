@@ -78,8 +78,8 @@ BUDGETS = {
     "report": 7_850,
     "validation": 2_250,
     "morphing": 1_750,
-    "api": 5_550,
-    "commands": 3_250,
+    "api": 5_600,
+    "commands": 3_150,
 }
 
 

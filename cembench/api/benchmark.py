@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from distributed import Client
 
-    from cembench.api.plan_benchmark import Plan
+    from cembench.api.run_plan import Plan
     from cembench.report.document import Report
     from cembench.results.profiles import Profile
     from cembench.results.records import Record
@@ -368,7 +368,7 @@ def benchmark(
     """
     import tempfile
 
-    from cembench.api.plan_benchmark import (
+    from cembench.api.run_plan import (
         Plan,
         check_cluster,
         check_reference,

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Algorithm, Surface, load_registry
+if TYPE_CHECKING:
+    from cembench.mesh.triangle_mesh import TriangleMesh
+    from cembench.registry import Algorithm, Surface
 
 
-def list_algorithms(plugins: Iterable[str] = ()) -> list[Algorithm]:
+def list_algorithms(plugins: Sequence[str] = ()) -> list[Algorithm]:
     """Return the registered algorithms, with their target, parameters and source.
 
     Parameters
     ----------
-    plugins : iterable of str
+    plugins : sequence of str
         Python files or ``module:name`` with more algorithms.
 
     Returns
@@ -29,15 +30,17 @@ def list_algorithms(plugins: Iterable[str] = ()) -> list[Algorithm]:
     True
 
     """
+    from cembench.registry import load_registry
+
     return list(load_registry(plugins).algorithms.values())
 
 
-def list_surfaces(plugins: Iterable[str] = ()) -> list[Surface]:
+def list_surfaces(plugins: Sequence[str] = ()) -> list[Surface]:
     """Return the registered surface families.
 
     Parameters
     ----------
-    plugins : iterable of str
+    plugins : sequence of str
         Python files or ``module:name`` with more families.
 
     Returns
@@ -52,6 +55,8 @@ def list_surfaces(plugins: Iterable[str] = ()) -> list[Surface]:
     True
 
     """
+    from cembench.registry import load_registry
+
     return list(load_registry(plugins).surfaces.values())
 
 
@@ -88,6 +93,8 @@ def surface(name: str, faces: int | None = None, **parameters: Any) -> TriangleM
     'flat-disk'
 
     """
+    from cembench.registry import load_registry
+
     family = load_registry().surface(name)
     given = parameters if faces is None else {"faces": faces, **parameters}
     mesh: TriangleMesh = family.function(**family.arguments(given))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cembench.api.parameterize import Result, parameterize
-from cembench.core.errors import AlgorithmFailed
-from cembench.mesh.triangle_mesh import HoledMesh
-from cembench.registry import load_registry
-from cembench.running.surfaces import SurfaceInput, load_surface
+from cembench.core.arguments import Range, checked
+
+if TYPE_CHECKING:
+    from cembench.api.parameterize import Result
+    from cembench.running.surfaces import SurfaceInput
 
 
-def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Result]:
+@checked
+def holes(
+    surface: SurfaceInput, *, outer: Annotated[int, Range(0, 2**63 - 1)] | None = None
+) -> dict[str, Result]:
     """Map a surface with holes to a disk with circular holes, with every suitable algorithm.
 
     Parameters
@@ -19,8 +22,7 @@ def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Resul
     surface : mesh, path, name or pair of arrays (V, F)
         A surface of genus 0 with two boundary loops or more.
     outer : int, optional
-        A vertex of the outer boundary, counted from 0; by default the widest loop is the outer
-        one.
+        A vertex of the outer boundary, counted from 0 (default: the widest boundary).
 
     Returns
     -------
@@ -42,6 +44,12 @@ def holes(surface: SurfaceInput, *, outer: int | None = None) -> dict[str, Resul
     ['direct-cem-holes', 'harmonic-filled', 'koebe-cem']
 
     """
+    from cembench.api.parameterize import parameterize
+    from cembench.core.errors import AlgorithmFailed
+    from cembench.mesh.triangle_mesh import HoledMesh
+    from cembench.registry import load_registry
+    from cembench.running.surfaces import load_surface
+
     mesh = load_surface(surface, (HoledMesh,))
     given: dict[str, Any] = {} if outer is None else {"outer": outer}
     found, causes = {}, []

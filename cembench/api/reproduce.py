@@ -1,118 +1,91 @@
-"""The surfaces that `reproduce` measures: the paper's models that are public, else stand-ins."""
+"""Reproduce the paper's tables, figures and claims on its smallest models."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
-from time import monotonic
+from typing import TYPE_CHECKING
 
-from cembench.core.errors import CembenchError, RecordError
-from cembench.core.extras import MissingExtra
-from cembench.mesh.datasets import Dataset, fetch_all, is_fetched
-from cembench.mesh.download import Progress
-from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Registry, Surface, load_registry
-from cembench.running.process_pool import process_pool
-from cembench.running.surfaces import generate_surface
+from cembench.api.settings import AnyPath, budget_seconds, bytes_of
+from cembench.core.arguments import checked
+from cembench.core.reporter import SILENT, Reporter
 
-#: Seconds for fetching the paper's models, in all.
-FETCH_SECONDS = 20.0
-#: Bytes that making a stand-in needs; the largest of the profile `quick` takes a third of it.
-STAND_IN_BYTES = 2**30
-#: The group of datasets that are models of the paper.
-GROUP = "paper"
+if TYPE_CHECKING:
+    from cembench.api.benchmark import Run
 
 
-def public_models(registry: Registry, rows: Sequence[str]) -> list[Dataset]:
-    """Return the public models among these of the paper."""
-    datasets = registry.datasets.values()
-    return [one for one in datasets if one.group == GROUP and one.paper_row in rows]
+@checked
+def reproduce(
+    *,
+    out: AnyPath = "results/reproduce",
+    budget: float | str = "180s",
+    offline: bool = False,
+    fresh: bool = False,
+    reporter: Reporter = SILENT,
+) -> Run:
+    """Measure the paper's algorithms on its smallest models, for its report.
 
+    Models that are public are fetched (20 seconds at most), and the others have stand-ins. It takes
+    about five minutes. What the folder already holds is not measured again.
 
-def fetch_models(
-    wanted: Sequence[Dataset],
-    progress: Callable[[Dataset], Progress | None] = lambda dataset: None,
-    seconds: float = FETCH_SECONDS,
-) -> str:
-    """Fetch models within a time limit; return a line on what happened.
+    Parameters
+    ----------
+    out : path
+        Folder for the results.
+    budget : float or str
+        Time for measuring, e.g. 10m; in Python also seconds. Small surfaces are measured until
+        their times are precise, and what does not fit has one round.
+    offline : bool
+        Fetch nothing; use models fetched before.
+    fresh : bool
+        Measure again what is already recorded.
+    reporter : Reporter
+        Receives what is being done.
 
-    What is complete at the limit is kept.
+    Returns
+    -------
+    Run
+        The records; :meth:`Run.report` writes the tables, figures and claims.
+
+    Raises
+    ------
+    ParameterError
+        `budget` is not a time.
+    RecordError
+        The folder holds something else than such a run.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> cembench.reproduce(budget="10m").report()  # doctest: +SKIP
+
     """
-    missing = [dataset for dataset in wanted if not is_fetched(dataset)]
-    if not missing:
-        return f"{len(wanted)} of the paper's models are here, fetched before"
-    until = monotonic() + seconds
-    why = _fetch(missing, progress, seconds)
-    if monotonic() >= until:
-        why = f"not complete within {seconds:g} s"
-    left = sum(not is_fetched(dataset) for dataset in missing)
-    if left == len(wanted):
-        return f"the paper's models could not be reached ({why}): stand-ins are measured"
-    return (
-        f"fetched {len(missing) - left} of the paper's models"
-        + f" ({len(wanted) - len(missing)} fetched before)" * (len(missing) < len(wanted))
-        + f"; {left} could not be reached ({why}): stand-ins are measured" * bool(left)
+    from pathlib import Path
+
+    from cembench.api.benchmark import Run
+    from cembench.api.paper_surfaces import surfaces_at_hand
+    from cembench.registry import load_registry
+    from cembench.results import run_folder
+    from cembench.results.profiles import Profile, algorithms_of
+    from cembench.results.sequential_checks import USUAL_PRECISION
+    from cembench.results.store import Store
+    from cembench.running.environment import usable_cores
+    from cembench.running.local import run_tasks
+    from cembench.running.options import Options
+    from cembench.running.plan import MeasurementSettings, plan_cells
+
+    folder = Path(out)
+    run_folder.check(folder)
+    options = Options(
+        memory_bytes=bytes_of(None),
+        fresh=fresh,
+        budget=budget_seconds(budget),
+        whole_surfaces=True,
+        jobs=usable_cores(),
     )
-
-
-def _fetch(
-    missing: Sequence[Dataset],
-    progress: Callable[[Dataset], Progress | None],
-    seconds: float,
-) -> str:
-    """Fetch all at once, so that the limit is that of all; return why the first failed, if any."""
-    try:
-        found = list(fetch_all(missing, jobs=len(missing), seconds=seconds, progress=progress))
-    except CembenchError as error:
-        return _briefly(error)
-    return next((_briefly(one.error) for one in found if one.error is not None), "")
-
-
-def _briefly(error: CembenchError) -> str:
-    """Return why a dataset could not be fetched, in a few words."""
-    if isinstance(error, MissingExtra):
-        return "the library requests is not installed"
-    if isinstance(error, RecordError):
-        return "the cache cannot be written to"
-    if error.__cause__ is None:
-        return "the server has another file"
-    beneath = error.__cause__.__cause__
-    return str(error.__cause__) if beneath is None else type(beneath).__name__
-
-
-def make_stand_ins(
-    registry: Registry, names: Sequence[str], jobs: int, made: Callable[[str, int, int], None]
-) -> list[TriangleMesh]:
-    """Return these surfaces; those that are not in the cache are made in `jobs` processes.
-
-    `made` receives the name of each that was made, how many
-    were, and how many were not in the cache.
-    """
-    new = [name for name in names if not _is_cached(registry.surface(name))]
-    found: dict[str, TriangleMesh] = {}
-    if min(jobs, len(new)) > 1:
-        # A process that breaks its memory limit ends them all: one at a time needs less.
-        with (
-            suppress(BrokenProcessPool, MemoryError),
-            process_pool(min(jobs, len(new)), STAND_IN_BYTES) as pool,
-        ):
-            waiting = {pool.submit(_make, name): name for name in new}
-            for future in as_completed(waiting):
-                found[waiting[future]] = future.result()
-                made(waiting[future], len(found), len(new))
-    for name in (*new, *names):
-        if name not in found:
-            found[name] = generate_surface(registry, name)
-            if name in new:
-                made(name, len(found), len(new))
-    return [found[name] for name in names]
-
-
-def _make(name: str) -> TriangleMesh:
-    return generate_surface(load_registry(), name)
-
-
-def _is_cached(surface: Surface) -> bool:
-    return surface.kept is not None and surface.kept(**surface.arguments({})).is_file()
+    registry = load_registry()
+    chosen = [registry.algorithm(name) for name in algorithms_of(Profile.quick, registry)]
+    surfaces, roles = surfaces_at_hand(registry, chosen, reporter, offline=offline)
+    settings = MeasurementSettings.until_precise(USUAL_PRECISION)
+    tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles)
+    with reporter.watching(len(tasks)) as progress:
+        records = run_tasks(tasks, Store(folder), options, progress)
+    return Run(folder, tuple(records))

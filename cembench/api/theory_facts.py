@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from cembench.api.theory import (
+from cembench.api.boundary_operator import (
     TOLERANCE,
     BoundaryOperator,
     Check,

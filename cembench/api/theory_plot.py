@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from cembench.api.theory import Trajectory
+from cembench.api.boundary_operator import Trajectory
 from cembench.core.atomic import write
 
 #: Colours, which also differ in lightness: for (23) and (30), and for other algorithms.

@@ -96,7 +96,7 @@ def validate(
     ('harmonic-circle', True)
 
     """
-    from cembench.api.plan_benchmark import read_surfaces
+    from cembench.api.run_plan import read_surfaces
     from cembench.core import extras, folders
     from cembench.results.profiles import Profile, surfaces_of
     from cembench.running.options import Options

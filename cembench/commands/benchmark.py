@@ -16,7 +16,7 @@ from cembench.commands.from_api import Call, from_api
 
 if TYPE_CHECKING:
     from cembench.api.benchmark import Run
-    from cembench.api.plan_benchmark import Plan
+    from cembench.api.run_plan import Plan
 
 
 @from_api(
@@ -98,7 +98,7 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
 
 def _print_plan(plan: Plan, *, as_json: bool) -> None:
     """Print which cells would be measured, and their estimated cost."""
-    from cembench.api.plan_benchmark import plan_summary
+    from cembench.api.run_plan import plan_summary
     from cembench.commands.progress import duration
     from cembench.report.run_tables import plan_table
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.text import Text
 
+from cembench.api.catalogue import list_algorithms
 from cembench.commands import benchmark as benchmark_verbs
 from cembench.commands import cut as cut_verbs
 from cembench.commands import fetch as fetch_verbs
@@ -31,7 +32,7 @@ from cembench.commands import theory as theory_verbs
 from cembench.commands import validate as validate_verbs
 from cembench.commands.console import Json, err, out, print_json, registry_with
 from cembench.commands.exit_codes import Verbs, ending
-from cembench.commands.options import Plugins
+from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -82,7 +83,9 @@ class Kind(StrEnum):
     epilog="Examples:  cembench list  ·  cembench list algorithms --verbose  ·  "
     "cembench list surfaces --measure  ·  cembench list --plugin mine.py",
 )
+@from_api(list_algorithms, only=("plugins",))
 def list_(
+    call: Call,
     kind: Annotated[Kind | None, typer.Argument(help="List only these.")] = None,
     *,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Show all details.")] = False,
@@ -90,7 +93,6 @@ def list_(
         bool,
         typer.Option("--measure", help="Measure the stand-ins not yet measured (takes minutes)."),
     ] = False,
-    plugin: Plugins = [],  # noqa: B006 - typer copies defaults
     as_json: Json = False,
 ) -> None:
     """List the algorithms and surfaces.
@@ -102,7 +104,7 @@ def list_(
     """
     from cembench.report.listings import algorithms_table, surfaces_table
 
-    registry = registry_with(plugin)
+    registry = registry_with(call.keywords["plugins"])
     if measure and kind is not Kind.surfaces:
         raise ParameterError("--measure is only for surfaces: cembench list surfaces --measure.")
     facts = _facts(registry, measure=measure) if kind is Kind.surfaces else {}
@@ -110,7 +112,7 @@ def list_(
         print_json(_registry_as_json(registry, kind, facts))
         return
     if kind in (None, Kind.algorithms):
-        out.print(algorithms_table(list(registry.algorithms.values()), verbose=verbose))
+        out.print(algorithms_table(call(), verbose=verbose))
         if registry.peers:
             words = f"\nSolvers by others (see `cembench peers`): {', '.join(registry.peers)}"
             out.print(words, style="dim")

@@ -125,18 +125,23 @@ class Shown(Reporter):
         return shlex.join(["cembench", *sys.argv[1:]])
 
     @contextmanager
-    def busy(self, text: str) -> Iterator[Callable[[str], object]]:
+    def busy(self, text: str, *, logged: bool = False) -> Iterator[Callable[[str], object]]:
         """Show a spinner."""
         if out.quiet:
             yield lambda text: None
             return
         with err.status(text, spinner="line") as status:
-            yield status.update
+            yield self.say if logged and not err.is_terminal else status.update
 
     def step(self, text: str) -> None:
         """Print a line."""
         if not out.quiet:
             err.print(f"{text} ...", style="dim")
+
+    def say(self, text: str) -> None:
+        """Print a line."""
+        if not out.quiet:
+            err.print(text, soft_wrap=True)
 
     def note(self, text: str) -> None:
         """Print a remark."""

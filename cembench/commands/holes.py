@@ -7,7 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
-from cembench.commands.console import Json, complain, err, out, print_json
+from cembench.api.holes import holes as map_all
+from cembench.commands.console import SHOWN, Json, complain, out, print_json
+from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
 
@@ -15,7 +17,9 @@ from cembench.commands.run import DEFAULT_RUN
 STAND_IN = "ho-face-with-holes"
 
 
+@from_api(map_all, only=("outer",))
 def holes(
+    call: Call,
     meshes: Annotated[
         list[str],
         typer.Argument(
@@ -23,14 +27,6 @@ def holes(
         ),
     ] = [STAND_IN],  # noqa: B006 - typer copies defaults
     *,
-    outer: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            max=2**63 - 1,
-            help="A vertex of the outer boundary (default: the widest boundary).",
-        ),
-    ] = None,
     sweeps: Annotated[
         int, typer.Option(min=1, max=1000, help="Maximum number of sweeps to try.")
     ] = 8,
@@ -54,6 +50,7 @@ def holes(
     from cembench.running.surfaces import load_surface
 
     run_folder.check(run)
+    outer = call.keywords["outer"]
     registry = load_registry()
     surfaces = [load_surface(name, (HoledMesh,), faces=faces, registry=registry) for name in meshes]
     for mesh in surfaces:
@@ -66,11 +63,9 @@ def holes(
         if value is not None
     )
     for name, mesh in zip(meshes, surfaces, strict=True):
-        with err.status(f"Koebe's method on {mesh.name}", spinner="line") as status:
+        with SHOWN.busy(f"Koebe's method on {mesh.name}") as tell:
             command = f"cembench holes {Path(name).name}{options}"
-            rows += examine_holes(
-                mesh, algorithms, outer, sweeps, run, command, complain, status.update
-            )
+            rows += examine_holes(mesh, algorithms, outer, sweeps, run, command, complain, tell)
     files = " ".join(Path(name).name for name in meshes)
     exhibit = write_holes_table(rows, run, f"cembench holes {files}{options}")
     if as_json:

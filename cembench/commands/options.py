@@ -8,10 +8,6 @@ import typer
 
 from cembench.api.settings import MOST_FACES
 
-Plugins = Annotated[
-    list[str],
-    typer.Option("--plugin", help="FILE.py or module:name with more algorithms. Repeatable."),
-]
 #: Each surface has its own, narrower bounds.
 Faces = Annotated[
     int | None,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cembench.api.theory_verb import theory as examine
-from cembench.commands.console import Json, err, out, print_json
+from cembench.api.theory import theory as examine
+from cembench.commands.console import SHOWN, Json, out, print_json
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
@@ -49,7 +49,7 @@ def theory(
     size = "" if faces is None else f" --faces {faces}"
     for name, mesh in zip(meshes, surfaces, strict=True):
         command = f"cembench theory {Path(name).name} --iterations {iterations}{size}"
-        with err.status(f"Section 4 on {mesh.name}", spinner="line"):
+        with SHOWN.busy(f"Section 4 on {mesh.name}"):
             found.append(examine_theory(mesh, rival, iterations, run, command))
     if as_json:
         print_json([exhibit.facts for exhibit in found])

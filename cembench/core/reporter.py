@@ -18,12 +18,20 @@ class Reporter:
         """The command that makes this call; empty in Python."""
         return ""
 
-    def busy(self, text: str) -> AbstractContextManager[Callable[[str], object]]:
-        """Show a text during a block, which can replace it by calling what it gets."""
+    def busy(
+        self, text: str, *, logged: bool = False
+    ) -> AbstractContextManager[Callable[[str], object]]:
+        """Show a text during a block, which can replace it by calling what it gets.
+
+        If `logged`, the later texts are shown as lines where a text cannot be replaced.
+        """
         return nullcontext(lambda text: None)
 
     def step(self, text: str) -> None:
         """Show what begins."""
+
+    def say(self, text: str) -> None:
+        """Show what was found or done."""
 
     def note(self, text: str) -> None:
         """Show a remark."""

@@ -6,8 +6,9 @@ slower one of a round by the same amount with the same probability. The logarith
 then symmetric about 0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact
 under any noise: "faster" is wrong in at most 5 % of all comparisons, even if rounds continued until
 the interval was narrow (:mod:`cembench.results.sequential_checks`). Where the algorithms of a
-round shared a process too (:mod:`cembench.running.pairing`), the ratios within it decide, unless those between
-separate processes show that one algorithm disturbed the other; then a verdict must hold for both,
+round shared a process too (:mod:`cembench.running.pairing`), the ratios within it decide, unless
+those between separate processes show that one algorithm disturbed the other; then a verdict must
+hold for both,
 so it is wrong no more often. For many comparisons in one table see
 :mod:`cembench.results.multiple_testing`; for two runs :mod:`cembench.results.runs_compared`.
 """

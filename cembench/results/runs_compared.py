@@ -2,8 +2,9 @@
 
 Rounds of two runs are not paired, and the machine may have drifted between them. So every round
 also times a reference kernel that never changes (:mod:`cembench.running.reference_kernel`).
-The seconds of a cell are divided by the kernel's in the same round, and compared by the rank-sum test at the 5 %
-level. If a run has no kernel times, plain seconds are compared; the interval then ignores drift.
+The seconds of a cell are divided by the kernel's in the same round, and compared by the rank-sum
+test at the 5 % level. If a run has no kernel times, plain seconds are compared; the interval then
+ignores drift.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ import typer
 import cembench
 from cembench.commands.cli import app
 from cembench.commands.from_api import _value
+from cembench.conformal.metrics import METRICS
 from cembench.core.arguments import arguments_of
 
 VERBS = {
@@ -21,7 +22,7 @@ GROUP = typer.main.get_command(app)
 
 
 def test_these_verbs_are_made_from_the_api():
-    assert {"map", "run", "validate", "repair", "cut", "theory", "morph"} <= VERBS.keys()
+    assert set(SAME) <= VERBS.keys()
 
 
 @pytest.mark.parametrize("verb", VERBS)
@@ -69,6 +70,20 @@ SAME = {
     "run": lambda cli, cap: (
         dict(cembench.benchmark([cap], ["cem"], rounds=1).asked[0].outcome.metrics),
         said(cli, "run", "--mesh", cap, "-a", "cem", "--rounds", 1)[0],
+    ),
+    "holes": lambda cli, cap: (
+        {name: dict(found.metrics) for name, found in cembench.holes("catenoid-ring").items()},
+        {
+            row["algorithm"]: {m.name: row[m.name] for m in METRICS if m.name in row}
+            for row in said(cli, "holes", "catenoid-ring", "--sweeps", 1)
+        },
+    ),
+    "list": lambda cli, cap: (
+        {
+            "algorithms": [one.name for one in cembench.list_algorithms()],
+            "surfaces": [one.name for one in cembench.list_surfaces()],
+        },
+        {kind: [one["name"] for one in all_] for kind, all_ in said(cli, "list").items()},
     ),
     "theory": lambda cli, cap: (
         dict(cembench.theory(cap, iterations=30).facts),

@@ -200,7 +200,7 @@ def test_ctrl_c_says_that_the_same_command_resumes(cli, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("cembench.api.plan_benchmark.run_tasks", interrupted)
+    monkeypatch.setattr("cembench.api.run_plan.run_tasks", interrupted)
     code, _, err = cli("run", "--surfaces", "flat-disk", "--faces", "60", "-a", "cem")
     assert code == 130
     assert "Stopped; the same command resumes." in err

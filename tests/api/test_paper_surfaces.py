@@ -7,8 +7,8 @@ from contextlib import contextmanager
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from cembench.api import reproduce
-from cembench.api.reproduce import fetch_models, make_stand_ins, public_models
+from cembench.api import paper_surfaces
+from cembench.api.paper_surfaces import fetch_models, make_stand_ins, public_models
 from cembench.mesh.datasets import Dataset, is_fetched
 from cembench.registry import load_registry
 from tests.models_server import ModelsServer, content_of
@@ -101,7 +101,9 @@ def test_stand_ins_made_side_by_side_have_the_same_bytes(tmp_path, monkeypatch):
     assert found[1] == found[2]
     assert {name for name, _, _ in told} == set(SMALL)
     assert [counts for _, *counts in told] == [[1, 2], [2, 2]] * 2
-    monkeypatch.setattr(reproduce, "process_pool", None)  # what is in the cache is not made again
+    monkeypatch.setattr(
+        paper_surfaces, "process_pool", None
+    )  # what is in the cache is not made again
     again = make_stand_ins(registry, SMALL, 2, lambda *words: told.append(words))
     assert [mesh.hash for mesh in again] == [mesh.hash for mesh in made]
     assert len(told) == 4
@@ -114,9 +116,9 @@ def test_where_a_process_is_killed_the_rest_is_made_one_after_the_other(tmp_path
         yield
 
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
-    monkeypatch.setattr(reproduce, "process_pool", broken)
+    monkeypatch.setattr(paper_surfaces, "process_pool", broken)
     made = lambda registry, name: flat_disk(60).renamed(name)  # noqa: E731
-    monkeypatch.setattr(reproduce, "generate_surface", made)
+    monkeypatch.setattr(paper_surfaces, "generate_surface", made)
     told = []
     made = make_stand_ins(load_registry(), SMALL, 2, lambda *words: told.append(words))
     assert [mesh.name for mesh in made] == list(SMALL)

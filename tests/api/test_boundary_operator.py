@@ -8,7 +8,7 @@ from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh, Parameterization, algorithm
 from cembench.api import theory_facts
-from cembench.api.theory import (
+from cembench.api.boundary_operator import (
     TOLERANCE,
     BoundaryOperator,
     predicted_rate,
