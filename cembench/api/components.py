@@ -130,10 +130,13 @@ def read_shells(
         try:
             parts.append(prepared(shell, kinds, path, cut=cut))
         except MeshError as error:
-            raise MeshError(
+            where = (
                 f"surface {k + 1} of the {len(pieces)} in this file, with vertex {own[0]} and "
-                f"{len(held)} triangles (the following numbers count within this surface): {error}"
-            ) from None
+                f"{len(held)} triangles (the following numbers count within this surface)"
+            )
+            if isinstance(error, UnusableMeshError):
+                raise UnusableMeshError(error.problems, error.path, where) from None
+            raise MeshError(f"{where}: {error}") from None
         vertices.append(own)
         faces.append(held)
     return Shells(path, soup.V, F, tuple(parts), tuple(vertices), tuple(faces))

@@ -72,6 +72,8 @@ def undersampled_share(areas: Real, images: Real, extent: float) -> float:
         From 0 to 1, for a picture of :data:`SIDE` x :data:`SIDE` pixels.
 
     """
+    if not extent:  # the map has collapsed to a point
+        return 1.0
     whole = areas.sum()
     texels = np.abs(images) * (SIDE / extent) ** 2
     return float(areas[texels * PIECE * whole < areas].sum() / whole)

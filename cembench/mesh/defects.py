@@ -7,7 +7,7 @@ mesh, so that a user can repair them in one go.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -94,34 +94,69 @@ class Problem:
 
 
 class UnusableMeshError(MeshError):
-    """A surface with defects: `problems` lists them all, and the message names the remedies."""
+    """A surface with defects: `problems` lists them all, and the message names the remedies.
 
-    def __init__(self, problems: Sequence[Problem], path: Path | None = None) -> None:
+    `path` is the surface's file, `where` a surface in it.
+    """
+
+    def __init__(
+        self, problems: Sequence[Problem], path: Path | None = None, where: str = ""
+    ) -> None:
         self.problems = tuple(problems)
-        self.path = path
-        where = "" if path is None else f"{path}: "
-        if len(problems) == 1:
-            said = f"{where}{problems[0].text}."
-        else:
-            lines = "".join(f"\n  {k}. {p.text}." for k, p in enumerate(problems, start=1))
-            said = f"{where}{len(problems)} problems:{lines}\n"
-        super().__init__(said + ("" if said.endswith("\n") else " ") + _remedies(problems, path))
+        self.path, self.where = path, where
+        super().__init__(self._said(_remedies_in_python(problems, path)))
+
+    def _said(self, remedies: str) -> str:
+        """Return the problems, and what to do."""
+        where = "".join(f"{place}: " for place in (self.path, self.where) if place)
+        if len(self.problems) == 1:
+            return f"{where}{self.problems[0].text}. {remedies}"
+        lines = "".join(f"\n  {k}. {p.text}." for k, p in enumerate(self.problems, start=1))
+        return f"{where}{len(self.problems)} problems:{lines}\n{remedies}"
+
+    def reword(self, options: Mapping[str, str]) -> None:
+        """Advise commands instead of calls."""
+        self.args = (self._said(_remedies_in_shell(self.problems, self.path)),)
 
     def __reduce__(self) -> tuple[type[UnusableMeshError], tuple[Any, ...]]:
-        return UnusableMeshError, (self.problems, self.path)
+        return UnusableMeshError, (self.problems, self.path, self.where)
 
 
-def _remedies(problems: Sequence[Problem], path: Path | None) -> str:
+#: What to do about a scale at which squares of lengths overflow or vanish.
+_RESCALE = "Angles do not depend on the scale: divide all coordinates by the same number."
+
+
+def _remedies_in_python(problems: Sequence[Problem], path: Path | None) -> str:
+    """Return the calls that repair a surface, in the order of their use."""
+    needed = {p.remedy for p in problems}
+    given = "surface" if path is None else repr(str(path))
+    filled = max(p.edges for p in problems)
+    fill = f", fill_holes={filled}" if Remedy.fill in needed else ""
+    others = "Use an algorithm for {} (see `cembench.list_algorithms()`)."
+    advice = [_RESCALE] if Remedy.rescale in needed else []
+    if Remedy.repair in needed or fill:
+        does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
+        advice.append(f"`cembench.repair({given}{fill})` {does}; its `mesh` is the new surface.")
+        given = "mesh"
+    if fill:
+        advice.append(others.format("surfaces with holes where they should stay"))
+    if Remedy.cut in needed:
+        advice.append(
+            f"`cembench.cut({given})` makes it a disk; `map_files(cut=True)` writes the UVs for "
+            "the uncut surface."
+        )
+    if Remedy.other_algorithm in needed:
+        advice.append(others.format("disks"))
+    return " ".join(advice)
+
+
+def _remedies_in_shell(problems: Sequence[Problem], path: Path | None) -> str:
     """Return the commands that repair a surface, in the order of their use."""
     needed = {p.remedy for p in problems}
     given = "IN" if path is None else shlex.quote(str(path))
     mended = "OUT" if path is None else f"{shlex.quote(path.stem + '_repaired')}.obj"
     fill = f" --fill-holes {max(p.edges for p in problems)}" if Remedy.fill in needed else ""
-    advice = []
-    if Remedy.rescale in needed:
-        advice.append(
-            "Angles do not depend on the scale: divide all coordinates by the same number."
-        )
+    advice = [_RESCALE] if Remedy.rescale in needed else []
     if Remedy.repair in needed:
         does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
         advice.append(
@@ -149,7 +184,7 @@ def located(error: MeshError, path: Path | None) -> MeshError:
     if path is None:
         return error
     if isinstance(error, UnusableMeshError):
-        return UnusableMeshError(error.problems, path)
+        return UnusableMeshError(error.problems, path, error.where)
     return MeshError(f"{path}: {error}")
 
 

@@ -142,7 +142,7 @@ def uv_of_faces(path: Path, F: Indices) -> Points:
     file = read_soup(path, uv=True)
     assert file.uv is not None
     if len(file.triangles) != len(F):
-        raise MeshError(f"{path}: its faces are not those of the surface; map it without --repair.")
+        raise _other_faces(path)
     corners = file.uv_triangles
     missing = (corners < 0) | (corners >= len(file.uv))
     if missing.any():
@@ -157,7 +157,7 @@ def uv_of_faces(path: Path, F: Indices) -> Points:
         )
     matches = F[:, :, None] == file.triangles[:, None, :]  # checks may have reversed a triangle
     if not matches.any(axis=2).all():
-        raise MeshError(f"{path}: its faces are not those of the surface; map it without --repair.")
+        raise _other_faces(path)
     return columns(file.uv)[np.take_along_axis(corners, matches.argmax(axis=2), axis=1)]
 
 
@@ -222,3 +222,9 @@ _READERS: dict[str, Callable[..., Soup]] = {
     ".npz": npz.read,
     ".txt": _read_text,
 }
+
+
+def _other_faces(path: Path) -> MeshError:
+    return MeshError.about(
+        "{path}: its faces are not those of the surface; map it without {repair}.", path=path
+    )

@@ -93,7 +93,7 @@ def read_landmarks(
         )
     if not names:
         raise ParameterError(
-            f"landmarks {path}: the file has no rows; add at least one, or leave out --landmarks."
+            f"landmarks {path}: the file has no rows; add at least one, or name no file."
         )
     found = Landmarks(tuple(names), np.array(rows, dtype=np.int64))
     check_landmarks(found, meshes)

@@ -127,7 +127,7 @@ def register(
         f"landmark is still {error:.2g} (of the disk's radius 1) from its target, and a further "
         "step would fold triangles. Use fewer landmarks, check for a misplaced one, put the "
         "surface first on which they are more spread out in the disk (a face before a whole "
-        "head), or take a smaller --lambda so that they need not coincide."
+        "head), or take a smaller lambda so that they need not coincide."
     )
 
 

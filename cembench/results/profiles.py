@@ -57,14 +57,14 @@ def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
     if missing:
         raise RegistryError(
             f"profile {profile.value!r}: no surface stands in for {', '.join(missing)}; "
-            "name --surfaces or --mesh instead, or declare one with "
+            "name surfaces or mesh files instead, or declare one with "
             '@surface_family(..., paper_row="...").'
         )
     for model in wanted:
         if len(standing[model]) > 1:
             raise RegistryError(
                 f"two surfaces stand in for {model}: {', '.join(standing[model])}; only one can. "
-                "Leave out a --plugin, or name --surfaces."
+                "Leave out a plug-in, or name the surfaces."
             )
     return [standing[model][0] for model in wanted]
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
+from cembench.core.wording import Setting
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.files import (
     READERS,
@@ -187,7 +188,11 @@ def mesh_files(folder: Path) -> list[Path]:
         why = f"holds no file of a mesh ({', '.join(k for k in READERS if k not in _OF_ANYTHING)})"
         if found:
             return found
-    raise MeshError(f"--mesh-dir {folder} {why}; name another, or single files with --mesh.")
+    raise MeshError.about(
+        "{given} {why}; name another, or single files.",
+        given=Setting("mesh_dir", repr(str(folder))),
+        why=why,
+    )
 
 
 def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole]:

@@ -303,6 +303,6 @@ def _too_large(faces: int, expected: float, limit: int) -> Fault:
     """Return the fault that a call was not started, since its memory would not suffice."""
     detail = (
         f"not started: {faces:,} triangles need about {mebibytes(expected)} by estimate, the limit "
-        f"is {mebibytes(limit)}; --memory sets another one"
+        f"is {mebibytes(limit)}; a run can be given another one"
     )
     return Fault(kind=FaultKind.OUT_OF_MEMORY, detail=detail)

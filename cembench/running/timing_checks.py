@@ -65,17 +65,16 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     if spent > threads * (1 + MORE) * used.wall + grain:
         told = (
             f"the timed calls used {spent:.3g} s of CPU time in {used.wall:.3g} s: "
-            f"{spent / used.wall:.1f} cores, but --threads {threads} allows {threads}. Raise "
-            "--threads, or make the algorithm start no threads"
+            f"{spent / used.wall:.1f} cores, but {threads} may be used. Allow more threads, or "
+            "make the algorithm start none"
         )
         found.append(Fault(kind=FaultKind.MORE_CORES, detail=told))
     crowded = [count for count in running if count > threads]
     if not found and len(crowded) >= MOST_CROWDED and len(crowded) > CROWDED * len(running):
         told = (
             f"{max(crowded)} threads or processes were running at the same time, in "
-            f"{len(crowded)} of {len(running)} samples, but --threads {threads} allows "
-            f"{threads}. Raise --threads, or "
-            "make the algorithm start no threads"
+            f"{len(crowded)} of {len(running)} samples, but {threads} may be used. Allow more "
+            "threads, or make the algorithm start none"
         )
         found.append(Fault(kind=FaultKind.MORE_CORES, detail=told))
     # With several threads, a library's idle thread pool may spin.

@@ -58,6 +58,13 @@ def test_more_than_a_hundredth_collapsed_has_no_bound():
     assert "no bound" in texture_words({"texel_density_ratio": None, "undersampled_share": 0.02})
 
 
+def test_a_map_that_collapsed_to_a_point_has_no_texel():
+    disk = cembench.surface("flat-disk", 200)
+    found = all_metrics(disk, np.full(disk.n, 0.3 + 0.1j))
+    assert found["texel_density_ratio"] == np.inf
+    assert found["undersampled_share"] == 1
+
+
 @pytest.mark.parametrize("metrics", [{}, {"conformal_energy": 1.0}])
 def test_records_without_the_figures_say_nothing(metrics):
     assert texture_words(metrics) == ""

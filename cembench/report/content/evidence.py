@@ -124,7 +124,7 @@ class Evidence:
         if paper is not None and not found.models:
             raise RecordError(
                 f"no surface of {run} is, or stands in for, a model of {paper.title!r}; its models "
-                f"are {', '.join(paper.models)}. Leave --paper out, or name another."
+                f"are {', '.join(paper.models)}. Ask for another paper, or for none."
             )
         return found
 

@@ -269,9 +269,10 @@ class _ClusterRun:
             self.workers = connected
             self.watcher.machines([self._machine_of(worker) for worker in connected])
         if connected and not self._usable():
-            raise ClusterError(
-                f"no worker has the software of this machine ({self.differing}). Install the same "
-                "on the workers, or leave out --same-environment."
+            raise ClusterError.about(
+                "no worker has the software of this machine ({differing}). Install the same on the "
+                "workers, or leave out {same_environment}.",
+                differing=self.differing,
             )
         if connected:
             self.alone_since = self.looked
