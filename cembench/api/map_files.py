@@ -25,6 +25,13 @@ if TYPE_CHECKING:
 
 #: The recommended algorithms, in order of preference; the first that takes the surface is used.
 DEFAULT_ALGORITHMS = ("direct-cem", "direct-cem-holes")
+#: Names that stand for one algorithm on disks and another on surfaces with holes.
+_SEVERAL = {"best": ("best", "best-holes")}
+
+
+def algorithms_named(name: str | None) -> tuple[str, ...]:
+    """Return the algorithms that a name stands for; the first that takes a surface maps it."""
+    return DEFAULT_ALGORITHMS if name is None else _SEVERAL.get(name, (name,))
 
 
 @checked
@@ -43,6 +50,7 @@ def map_files(
     side: Annotated[int, Range(4, 8192)] = 129,
     html: AnyPath | None = None,
     preview: bool = False,
+    certificate: bool = False,
     keep_invalid: bool = False,
     overwrite: bool = False,
     repair: bool = False,
@@ -69,7 +77,7 @@ def map_files(
         Mesh files (OBJ, OFF, PLY, STL, MAT), or names of public surfaces, which are fetched.
     algorithm : str, optional
         Name of an algorithm, see :func:`cembench.list_algorithms`; default: direct-cem, or
-        direct-cem-holes for surfaces with holes.
+        direct-cem-holes for surfaces with holes. best tries several and keeps the best map.
     parameters : mapping, optional
         Parameters of the algorithm.
     output : path, optional
@@ -93,6 +101,9 @@ def map_files(
         Write a page with a 3-D view of surface and map; works offline.
     preview : bool
         Draw a PNG beside the output; folded triangles are red.
+    certificate : bool
+        Enclose the conformal modulus of each disk between four boundary points, which a conformal
+        map keeps, and compare the map's. Takes two solves.
     keep_invalid : bool
         Write invalid maps too.
     overwrite : bool
@@ -162,9 +173,7 @@ def map_files(
     options = Options(timeout=timeout, memory_bytes=bytes_of(memory_bytes))
     settings = MeasurementSettings(solves, installed_backend(backend), threads, repeats=1)
     registry = registry_with(plugins, reporter)
-    candidates = [
-        registry.algorithm(name) for name in ([algorithm] if algorithm else DEFAULT_ALGORITHMS)
-    ]
+    candidates = [registry.algorithm(name) for name in algorithms_named(algorithm)]
     if cut:
         check_takes_disks(candidates)
     given, target = [Path(mesh) for mesh in meshes], path_of(output)
@@ -208,5 +217,6 @@ def map_files(
     return Maps(
         *(files, options, file_options, extras, together, reporter),
         keep_invalid=keep_invalid,
+        certificate=certificate,
         apart=timeout != Options.timeout or memory_bytes is not None,
     )

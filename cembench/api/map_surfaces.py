@@ -25,9 +25,11 @@ from cembench.api.write_maps import (
     write_map,
     write_shells,
 )
+from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
 from cembench.mesh import datasets
+from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.here import map_here, may_run_here
@@ -82,6 +84,8 @@ class Mapped:
     written: Mapping[str, str]
     #: Notices about the written files.
     told: Told = ()
+    #: What the bounds of the surface's modulus say of the map, if that was asked for.
+    certificate: str = ""
 
     @property
     def ok(self) -> bool:
@@ -171,6 +175,7 @@ class Maps:
     output: Path | None = None
     reporter: Reporter = SILENT
     keep_invalid: bool = False
+    certificate: bool = False
     #: Whether each surface is mapped in a process of its own, which keeps the limits.
     apart: bool = True
     done: list[Mapped] = field(default_factory=list)
@@ -229,7 +234,8 @@ class Maps:
                 record, uv = map_once(job.task, self.options)
             else:
                 record, uv = map_here(job.task)
-        mapped = Mapped(job.surface, record, uv, {})
+        proof = _certificate(mesh, uv, record) if self.certificate and uv is not None else ""
+        mapped = Mapped(job.surface, record, uv, {}, certificate=proof)
         if uv is None or not self.writes(mapped):
             return mapped
         is_atlas = algorithm.target == "atlas"
@@ -253,3 +259,16 @@ class Maps:
                 with self.reporter.busy("drawing"):
                     draw_map(mesh, uv, file.picture, record)
         return replace(mapped, written=written, told=tuple(told))
+
+
+def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
+    """Return what the bounds of the surface's modulus say of a map."""
+    from cembench.conformal.certificate import certify
+
+    if record.target != "disk" or not isinstance(mesh, DiskMesh):
+        return "only for maps of disks to the disk"
+    try:
+        found = certify(mesh)
+    except AlgorithmFailed as error:
+        return f"none: {error}"
+    return found.words(uv[found.corners])

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.api.map_files import DEFAULT_ALGORITHMS
+from cembench.api.map_files import algorithms_named
 from cembench.api.notebook import html_table, is_notebook, show_page
 from cembench.api.settings import Placement
 from cembench.conformal.texel_density import ISLANDS, needs_islands
@@ -34,6 +34,8 @@ from cembench.running.surfaces import SurfaceInput, load_surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cembench.conformal.certificate import Certificate
 
 #: How thoroughly a map is checked.
 Check = Literal["full", "fast"]
@@ -167,6 +169,43 @@ class Result:
         for notice in save_map(path, self.mesh, self.z, file_options):
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
+
+    def certificate(self) -> Certificate:
+        """Enclose the conformal modulus of the surface, which the map should have.
+
+        Four boundary points make a disk a quadrilateral. Two harmonic functions enclose its
+        modulus from both sides without a known map, and every conformal map keeps it. A map whose
+        modulus is outside is not conformal; one within may still be wrong elsewhere.
+
+        Returns
+        -------
+        Certificate
+            The bounds; ``words(result.z[certificate.corners])`` compares the map with them.
+
+        Raises
+        ------
+        ParameterError
+            The map is not one of a disk to the disk.
+        AlgorithmFailed
+            The boundary has fewer than four vertices.
+
+        Examples
+        --------
+        >>> import cembench
+        >>> result = cembench.parameterize(cembench.surface("hemi-ellipsoid", 2000))
+        >>> proof = result.certificate()
+        >>> proof.encloses(result.z[proof.corners])
+        True
+
+        """
+        from cembench.conformal.certificate import certify
+
+        if self.algorithm.target != "disk" or not isinstance(self.mesh, DiskMesh):
+            raise ParameterError(
+                f"{self.algorithm.name} on {self.mesh.name} is no map of a disk to the disk, whose "
+                "modulus is known. Take an algorithm for disks."
+            )
+        return certify(self.mesh)
 
     def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
         """Return the surface sampled on a regular grid of the map.
@@ -399,7 +438,8 @@ def parameterize(
         raise ParameterError(f"two algorithms are named, {' and '.join(named)}; name one.")
     given: Any = (surface, *arrays) if arrays else surface
     registry = load_registry(plugins)
-    candidates = [registry.algorithm(name) for name in named or DEFAULT_ALGORITHMS]
+    names = algorithms_named(named[0] if named else None)
+    candidates = [registry.algorithm(name) for name in names]
     mesh = load_surface(given, [a.mesh_type for a in candidates], registry=registry)
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]

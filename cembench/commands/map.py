@@ -68,7 +68,7 @@ def _print_end(maps: Maps, *, as_json: bool) -> None:
 
     more = {"output": str(maps.output)} if maps.output and not maps.missing else {}
     if as_json:
-        rows = [row(m.record) | _repair_of(m) | more | dict(m.written) for m in maps.done]
+        rows = [row(m.record) | _more_of(m) | more | dict(m.written) for m in maps.done]
         print_json(rows if len(rows) > 1 else rows[0])
     elif more:
         print_pair("output", maps.output)
@@ -88,9 +88,10 @@ def _failure(mapped: Mapped, *, named: bool) -> str:
     return f"{which}{outcome.status}: {outcome.cause}{kept}"
 
 
-def _repair_of(mapped: Mapped) -> dict[str, Any]:
+def _more_of(mapped: Mapped) -> dict[str, Any]:
     repaired = mapped.surface.repaired
-    return {"repair": repaired.counts} if repaired else {}
+    proof = {"certificate": mapped.certificate} if mapped.certificate else {}
+    return proof | ({"repair": repaired.counts} if repaired else {})
 
 
 def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
@@ -98,6 +99,8 @@ def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
     from cembench.report.record_table import figures_table
 
     out.print(figures_table(mapped.record, full=verbose))
+    if mapped.certificate:
+        print_pair("modulus", mapped.certificate)
     for what, where in mapped.written.items():
         print_pair(what, where)
     if mapped.uv is not None and not mapped.written:

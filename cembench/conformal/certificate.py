@@ -70,6 +70,15 @@ class Certificate:
         """
         return disk_modulus(z) / self.modulus - 1
 
+    def words(self, z: Complex) -> str:
+        """Return what the bounds say of a map to the disk, z (4,) as in :meth:`off`."""
+        bounds = f"between {self.lower:.5g} and {self.upper:.5g}"
+        own = disk_modulus(z)
+        if not np.isfinite(own):
+            return f"the surface's modulus is {bounds}; the map's corners are not in order"
+        place = "within" if self.encloses(z) else f"{abs(self.off(z)):.2%} off, outside"
+        return f"the surface's modulus is {bounds}; the map's is {own:.5g}, {place}"
+
     def encloses(self, z: Complex) -> bool:
         """Whether the modulus of the corners' images z (4,) lies between the two bounds."""
         return self.lower <= disk_modulus(z) <= self.upper

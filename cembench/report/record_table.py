@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
 from cembench.report.document import Column, Table
@@ -28,6 +28,7 @@ def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
     seconds = outcome.median_seconds
     took = "" if seconds is None else f", {seconds_words(record) or f'{seconds:.3f} s'}"
     yield "algorithm", f"{record.title} ({record.target}){took}"
+    yield from _chosen(record)
     if outcome.metrics.get("angle_error_mean_deg") is not None:
         angles, folds = (outcome.metrics[n] for n in ("angle_error_mean_deg", "flipped_triangles"))
         shown = f"{angles:.2f} degrees mean angle error, {folds} folds"
@@ -37,6 +38,14 @@ def _few_figures(record: Record) -> Iterator[tuple[str, str]]:
     if outcome.folded_before_repair:
         yield "folded before repair", str(outcome.folded_before_repair)
     yield from _notes(record)
+
+
+def _chosen(record: Record) -> Iterator[tuple[str, str]]:
+    """Yield which of several algorithms made the map, and the angle errors of all of them."""
+    chosen, tried = (record.outcome.extras.get(key) for key in ("chosen", "tried"))
+    if isinstance(chosen, str) and isinstance(tried, Mapping):
+        errors = (f"{n} {e:.2f}" if isinstance(e, float) else f"{n} none" for n, e in tried.items())
+        yield "chosen", f"{chosen}, by the angle errors in degrees: {', '.join(errors)}"
 
 
 def _notes(record: Record) -> Iterator[tuple[str, str]]:
@@ -58,6 +67,7 @@ def _figures(record: Record) -> Iterator[tuple[str, str]]:
     given = ", ".join(f"{name}={value}" for name, value in record.cell.parameters.items())
     with_given = f" with {given}" if given else ""
     yield "algorithm", f"{record.title} ({record.target}){with_given}"
+    yield from _chosen(record)
     if record.external is not None:
         yield f"external {record.external.kind}", record.external.name
     for metric in FIGURES:

@@ -234,3 +234,24 @@ def test_the_package_is_a_command():
             [sys.executable, *arguments], capture_output=True, text=True, check=True
         )
         assert "cembench" in done.stdout
+
+
+def test_a_map_is_compared_with_the_bounds_of_the_modulus():
+    good = cembench.parameterize(cembench.surface("hemi-ellipsoid", 2000))
+    proof = good.certificate()
+    assert proof.words(good.z[proof.corners]).endswith("within")
+    assert proof.words(np.exp([0, 2j, 3j, 4j])).endswith("outside")
+    assert "not in order" in proof.words(good.z[proof.corners[::-1]])
+    free = cembench.parameterize(good.mesh, "lscm")
+    with pytest.raises(cembench.ParameterError, match="no map of a disk to the disk"):
+        free.certificate()
+
+
+def test_map_tells_the_certificate(tmp_path):
+    cembench.write_mesh(tmp_path / "a.obj", cembench.surface("hemi-ellipsoid", 2000))
+    (mapped,) = cembench.map_files([tmp_path / "a.obj"], certificate=True)
+    assert mapped.certificate.endswith("within")
+    (mapped,) = cembench.map_files([tmp_path / "a.obj"], "lscm", certificate=True)
+    assert mapped.certificate == "only for maps of disks to the disk"
+    (mapped,) = cembench.map_files([tmp_path / "a.obj"])
+    assert mapped.certificate == ""

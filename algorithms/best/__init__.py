@@ -1,0 +1,1 @@
+"""The best map of several algorithms."""

@@ -1,0 +1,75 @@
+"""How near each map to the disk comes to the best angles, on every disk of some folders."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import chain
+from math import exp, log
+from pathlib import Path
+from statistics import mean, median
+from typing import Any
+
+import cembench
+from benchmarks.measuring import progress
+from benchmarks.pages import Section, Table
+
+#: Algorithms that are compared; `best` is judged by the best of the others.
+NAMES = ("best", "direct-cem", "cetm-flips", "cetm", "bff", "fdm", "cem", "qiem", "ldm")
+#: Angle errors below this, in degrees, are of flat surfaces: ratios of them mean nothing.
+FLAT = 0.01
+LAYOUT = """
+| algorithm | valid maps | within 1 % of the best | mean ratio to the best | largest | seconds \
+over direct-cem's |
+|---|---:|---:|---:|---:|---:|
+| `{name}` | {valid} of {disks} | {near} | {ratio:.3f} | {worst:.2f} | {seconds:.1f} |"""
+
+
+def best_maps(folders: Sequence[str], *, largest: int = 20_000) -> Section:
+    """Compare the mean angle errors of maps to the disk on every disk of some folders.
+
+    Disks of more than `largest` vertices and flat ones are left out. The mean of the ratios is
+    geometric, of valid maps; seconds are medians of ratios of single calls.
+    """
+    found = []
+    for path in progress(sorted(chain(*(map(str, Path(f).iterdir()) for f in folders)))):
+        if (mesh := _disk(path, largest)) is not None:
+            found.append({name: _map(mesh, name) for name in NAMES})
+    others = [{n: e for n, (e, _) in row.items() if n != "best" and e is not None} for row in found]
+    bests = [min(row.values(), default=0.0) for row in others]
+    held = [(row, best) for row, best in zip(found, bests, strict=True) if best > FLAT]
+    rows = [_row(name, held) for name in NAMES]
+    return Section([Table(rows, LAYOUT), f"{len(held)} disks."], "docs/maps.md")
+
+
+def _disk(path: str, largest: int) -> cembench.DiskMesh | None:
+    try:
+        mesh = cembench.load_surface(path, (cembench.DiskMesh,))
+    except cembench.MeshError:
+        return None
+    return mesh if mesh.n <= largest else None
+
+
+def _map(mesh: cembench.DiskMesh, name: str) -> tuple[float | None, float | None]:
+    try:
+        result = cembench.parameterize(mesh, name, check="fast")
+    except cembench.AlgorithmFailed:
+        return None, None
+    return float(result.metrics["angle_error_mean_deg"] or 0.0), result.seconds
+
+
+def _row(name: str, held: Sequence[tuple[dict[str, Any], float]]) -> dict[str, Any]:
+    ratios = [row[name][0] / best for row, best in held if row[name][0] is not None]
+    times = [
+        row[name][1] / row["direct-cem"][1]
+        for row, _ in held
+        if row[name][1] and row["direct-cem"][1]
+    ]
+    return {
+        "name": name,
+        "disks": len(held),
+        "valid": len(ratios),
+        "near": sum(ratio <= 1.01 for ratio in ratios),
+        "ratio": exp(mean(map(log, ratios))),
+        "worst": max(ratios),
+        "seconds": median(times),
+    }

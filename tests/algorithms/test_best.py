@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+from cembench.algorithms.best.choice import Candidate, best_of
+from cembench.algorithms.best.disk import CANDIDATES, best
+from cembench.algorithms.best.holes import CANDIDATES as OF_HOLES
+from cembench.algorithms.best.holes import best_holes
+from cembench.surfaces.catalogue import nefertiti
+from cembench.surfaces.holed_disk import holed_disk
+from cembench.surfaces.sheets import swiss_roll
+
+import cembench
+from cembench import AlgorithmFailed, Parameterization
+from cembench.conformal.metrics import angle_errors, flipped_triangles
+from tests.hard_surfaces import hard_surface
+
+
+def error_of(mesh, uv):
+    return float(angle_errors(mesh, uv).mean())
+
+
+@pytest.mark.parametrize(
+    "mesh", [hard_surface(1), hard_surface(4), swiss_roll(2000), nefertiti()], ids=lambda m: m.name
+)
+def test_it_is_as_good_as_the_best_candidate(mesh):
+    found = best(mesh)
+    assert found.extras["chosen"] in CANDIDATES
+    assert list(found.extras["tried"]) == list(CANDIDATES)
+    errors = [error for error in found.extras["tried"].values() if isinstance(error, float)]
+    assert error_of(mesh, found.uv) == min(errors)
+    again = CANDIDATES[found.extras["chosen"]].call(mesh)
+    np.testing.assert_array_equal(found.uv, again.uv)
+    assert not flipped_triangles(mesh, found.uv)
+
+
+def test_with_holes_it_is_as_good_as_the_best_candidate():
+    mesh = holed_disk(1500)
+    found = best_holes(mesh)
+    assert set(found.extras["tried"]) == set(OF_HOLES)
+    errors = [error for error in found.extras["tried"].values() if isinstance(error, float)]
+    assert error_of(mesh, found.uv) == min(errors)
+    turned = best_holes(mesh, outer=int(mesh.loops[1][0]))
+    assert abs(turned.uv[mesh.loops[1]]) == pytest.approx(1)
+
+
+def of(value, fails=""):
+    def call(mesh):
+        if fails:
+            raise AlgorithmFailed(fails)
+        return Parameterization(value(mesh))
+
+    return call
+
+
+FLAT = of(lambda mesh: mesh.V[:, 0] + 1j * mesh.V[:, 1])
+STRETCHED = of(lambda mesh: mesh.V[:, 0] + 2j * mesh.V[:, 1])
+FOLDED = of(lambda mesh: mesh.V[:, 0] - 1j * mesh.V[:, 1])
+FAILS = of(None, "it gave up")
+
+
+def test_failures_and_folds_are_passed_over():
+    mesh = cembench.surface("flat-disk", 200)
+    ways = {"fails": FAILS, "folded": FOLDED, "stretched": STRETCHED, "flat": FLAT}
+    found = best_of(mesh, {name: Candidate(way) for name, way in ways.items()}, 60)
+    assert found.extras["chosen"] == "flat"
+    tried = found.extras["tried"]
+    assert tried["fails"] == "it gave up"
+    assert tried["folded"] == f"{mesh.m:,} folds"
+    assert tried["flat"] < 1e-9 < tried["stretched"]
+
+
+def test_what_may_take_too_long_is_not_begun():
+    mesh = cembench.surface("flat-disk", 200)
+    ways = {"stretched": Candidate(STRETCHED), "flat": Candidate(FLAT, cost=1e12)}
+    found = best_of(mesh, ways, 1.0)
+    assert found.extras["chosen"] == "stretched"
+    assert "not tried" in found.extras["tried"]["flat"]
+
+
+def test_without_a_valid_map_every_cause_is_named():
+    mesh = cembench.surface("flat-disk", 200)
+    with pytest.raises(AlgorithmFailed) as failed:
+        best_of(mesh, {"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}, 60)
+    assert "fails: it gave up; folded: " in str(failed.value)
+
+
+def test_the_name_stands_for_disks_and_for_surfaces_with_holes():
+    for name, surface in (("best", "cone"), ("best-holes", "holed-disk")):
+        result = cembench.parameterize(cembench.surface(surface, 600), "best")
+        assert result.algorithm.name == name
+        assert result.extras["chosen"] in {**CANDIDATES, **OF_HOLES}
