@@ -10,7 +10,7 @@ import pytest
 from tests.source_copy import copy_source
 
 #: What the default installation may weigh, in bytes on disk, and how many packages it may be.
-BYTES, PACKAGES = 500e6, 35
+BYTES, PACKAGES = 500e6, 37
 #: The two lines of README, on everything they take.
 NOTEBOOK = """
 import cembench
@@ -23,6 +23,7 @@ for mesh, algorithm in ((disk, "direct-cem"), (ring, "direct-cem-holes")):
         assert result.ok and result.algorithm.name == algorithm
         assert "data:image/png;base64," in result._repr_html_()
         assert result.plot().get_size_inches()[0] > 5
+        assert result.show(f"{mesh.name}.html").stat().st_size > 10_000
         result.save(f"{mesh.name}.obj", overwrite=True)
 run = cembench.benchmark([disk], ["lscm"], rounds=1)
 assert "lscm" in run._repr_html_()

@@ -14,7 +14,6 @@ from cembench.api.settings import Placement
 from cembench.api.write_maps import FileOptions, check_file_options, save_map
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
 from cembench.mesh.files import check_writable_format
@@ -101,8 +100,6 @@ def check_extras(
         raise ParameterError.about(
             "{geometry_image}, {remesh} and {html} take one surface; map them one by one."
         )
-    if extras.page is not None:
-        require(Extra.REPORT, "a page with a view of the map", "jinja2", "markupsafe")
     if extras.page is not None and extras.page.suffix.lower() not in (".html", ".htm"):
         raise ParameterError.about(
             "{page}: {html} writes a web page; use the suffix .html.", page=extras.page

@@ -21,7 +21,6 @@ from cembench.api.settings import Placement
 from cembench.conformal.texel_density import ISLANDS, needs_islands
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.names import file_name, unknown
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
@@ -299,8 +298,6 @@ class Result:
 
         Raises
         ------
-        MissingExtra
-            A package for pages is not installed.
         RenderError
             The page cannot be written.
 
@@ -308,7 +305,6 @@ class Result:
         import tempfile
         import webbrowser
 
-        require(Extra.REPORT, "a page with a view of the map", "jinja2", "markupsafe")
         from cembench.api.view import map_page
         from cembench.report.render.view_page import write_view_page
 

@@ -39,7 +39,7 @@ MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.METIS: ("pymetis",),
     Extra.PARDISO: ("pypardiso",),
     Extra.PARQUET: ("pyarrow",),
-    Extra.REPORT: ("jinja2", "markupsafe", "pandas", "plotly"),
+    Extra.REPORT: ("pandas", "plotly"),
     Extra.STANDINS: ("skimage", "pymeshlab"),
     Extra.TABLES: ("pandas",),
     Extra.VIDEO: ("imageio_ffmpeg",),

@@ -55,13 +55,13 @@ def block(monkeypatch, *modules):
 
 
 def test_a_missing_module_is_named_with_its_extra(monkeypatch):
-    block(monkeypatch, "jinja2")
-    assert missing(Extra.REPORT) == ["jinja2"]
-    require(Extra.REPORT, "a plot", "plotly")
+    block(monkeypatch, "plotly")
+    assert missing(Extra.REPORT) == ["plotly"]
+    require(Extra.REPORT, "a table", "pandas")
     with pytest.raises(MissingExtra) as found:
         require(Extra.REPORT, "a report")
     assert found.value.extra is Extra.REPORT
-    assert str(found.value).startswith("a report needs jinja2")
+    assert str(found.value).startswith("a report needs plotly")
     assert command(Extra.REPORT) in str(found.value)
 
 
@@ -102,7 +102,7 @@ def a_film(folder):
     [
         (fetching, "requests", Extra.FETCH),
         (a_report, "plotly", Extra.REPORT),
-        (a_validation, "jinja2", Extra.REPORT),
+        (a_validation, "plotly", Extra.REPORT),
         (parquet, "pyarrow", Extra.PARQUET),
         (a_table, "pandas", Extra.TABLES),
         (a_stand_in, "skimage", Extra.STANDINS),
@@ -121,7 +121,7 @@ def test_each_use_names_its_extra_and_leaves_nothing(use, module, extra, tmp_pat
 def test_the_command_line_says_it_before_it_measures(capsys, monkeypatch, tmp_path):
     from cembench.commands.cli import main
 
-    block(monkeypatch, "jinja2")
+    block(monkeypatch, "plotly")
     monkeypatch.setattr(sys, "argv", ["cembench", "reproduce", "-o", str(tmp_path / "run")])
     with pytest.raises(SystemExit) as ended:
         main()

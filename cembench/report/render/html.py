@@ -26,9 +26,7 @@ from typing import Any
 from urllib.parse import quote
 
 import jinja2
-import plotly
 from markupsafe import Markup, escape
-from plotly.io.json import to_json_plotly
 
 from cembench.core.atomic import write_text
 from cembench.report.document import (
@@ -343,6 +341,8 @@ def _pixel_file(figure: Figure) -> PurePosixPath | None:
 
 def _plot(plot: Mapping[str, Any]) -> dict[str, Any]:
     """Return a Plotly figure as JSON values, without its template."""
+    from plotly.io.json import to_json_plotly  # needs the extra
+
     plain = json.loads(to_json_plotly(dict(plot)))
     plain.get("layout", {}).pop("template", None)
     return {"data": plain.get("data", []), "layout": plain.get("layout", {})}
@@ -456,6 +456,8 @@ def template_text(name: str) -> str:
 @cache
 def _plotly() -> tuple[bytes, Markup]:
     """Return Plotly's script, plain and as compressed text."""
+    import plotly  # needs the extra
+
     source = (Path(plotly.__file__).parent / "package_data" / "plotly.min.js").read_bytes()
     return source, _packed(source)
 

@@ -8,7 +8,6 @@ from pathlib import Path
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import RenderError
-from cembench.core.extras import Extra, require
 
 
 def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[str, str]]) -> str:
@@ -25,13 +24,7 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
     facts : sequence of pairs of str
         Names and texts shown below.
 
-    Raises
-    ------
-    MissingExtra
-        The libraries for pages are not installed.
-
     """
-    check_pages_can_be_made()
     from markupsafe import Markup
 
     from cembench.report.render.html import as_text, environment, policy, template_text
@@ -51,11 +44,6 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
         )
     )
     return page
-
-
-def check_pages_can_be_made() -> None:
-    """Raise :class:`MissingExtra` if the libraries for pages are not installed."""
-    require(Extra.REPORT, "a surface to turn in a page", "jinja2", "markupsafe")
 
 
 def write_view_page(path: Path, page: str) -> None:
