@@ -35,7 +35,7 @@ class Candidate:
 def best_of(
     mesh: M, candidates: Mapping[str, Candidate], seconds: float, **given: Any
 ) -> Parameterization:
-    """Return the valid map with the smallest mean angle error.
+    """Return the map with the fewest folds and, of these, the smallest mean angle error.
 
     Candidates are tried in their order. One is left out if it would probably end later than
     `seconds` after the start; the first never is. `given` are parameters of all of them.
@@ -50,12 +50,12 @@ def best_of(
     Raises
     ------
     AlgorithmFailed
-        No candidate has a map without folds.
+        No candidate has a map.
 
     """
     start, first = perf_counter(), 0.0
     tried: dict[str, float | str] = {}
-    best: tuple[float, str, Parameterization] | None = None
+    best: tuple[int, float, str, Parameterization] | None = None
     for name, one in candidates.items():
         spent = perf_counter() - start
         if tried and spent + one.cost * first > seconds:
@@ -66,15 +66,14 @@ def best_of(
         except AlgorithmFailed as error:
             tried[name] = str(error)
         else:
-            if folds := flipped_triangles(mesh, found.uv):
-                tried[name] = f"{folds:,} folds"
-            else:
-                error_deg = tried[name] = float(angle_errors(mesh, found.uv).mean())
-                if best is None or error_deg < best[0]:
-                    best = error_deg, name, found
+            folds = flipped_triangles(mesh, found.uv)
+            off = float(angle_errors(mesh, found.uv).mean())
+            tried[name] = f"{folds:,} folds" if folds else off
+            if best is None or (folds, off) < best[:2]:
+                best = folds, off, name, found
         first = first or perf_counter() - start
     if best is None:
         causes = "; ".join(f"{name}: {why}" for name, why in tried.items())
-        raise AlgorithmFailed(f"no algorithm has a valid map ({causes})")
-    _, name, found = best
+        raise AlgorithmFailed(f"no algorithm has a map ({causes})")
+    *_, name, found = best
     return replace(found, extras=found.extras | {"chosen": name, "tried": tried})

@@ -33,7 +33,10 @@ CANDIDATES = {
     usual=False,
 )
 def best(
-    mesh: DiskMesh, *, seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 60.0
+    mesh: DiskMesh,
+    *,
+    seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 60.0,
+    repair: bool = True,
 ) -> Parameterization:
     """Map to the disk by direct-cem, cetm and cetm-flips, and keep the smallest mean angle error.
 
@@ -44,4 +47,4 @@ def best(
     probably end later than `seconds` after the start is left out. `chosen` names the algorithm,
     `tried` has the mean angle error of each, in degrees.
     """
-    return best_of(mesh, CANDIDATES, seconds)
+    return best_of(mesh, CANDIDATES, seconds, repair=repair)

@@ -35,10 +35,11 @@ def best_holes(
     *,
     outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None,
     seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 60.0,
+    repair: bool = True,
 ) -> Parameterization:
     """Map to a disk with circular holes by three algorithms, and keep the best valid map.
 
     These are direct-cem-holes, harmonic-filled and koebe-cem, of which each has valid maps where
     others fold. `outer`, `seconds`, `chosen` and `tried` are as in direct-cem-holes and best.
     """
-    return best_of(mesh, CANDIDATES, seconds, outer=outer)
+    return best_of(mesh, CANDIDATES, seconds, outer=outer, repair=repair)

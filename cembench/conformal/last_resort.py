@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import MOST_COST, figures
 from cembench.conformal.folds import LEAST_ARC as DISTINCT
-from cembench.conformal.folds import in_order, interior_without_folds
+from cembench.conformal.folds import in_order, interior_without_folds, without_folds
 from cembench.conformal.harmonic import arc_length_circle
+from cembench.conformal.laplacian import laplacian
 from cembench.conformal.mean_value import convex_extension, mean_value_weights
 from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.planar import folded_triangles
@@ -121,8 +122,11 @@ def valid_map(
         choice = _Choice(mesh, own)
         if own is not None and folded:
             extras["before_repair"] = before = figures(mesh, own, folded)
+            cheap = (1 + CHEAP) * before["angle_error_mean_deg"]
             extras["fold_repairs"] = _offer_patches(choice, own, folded)
-            if not choice.reaches((1 + CHEAP) * before["angle_error_mean_deg"]):
+            if not choice.reaches(cheap):
+                extras["fold_repairs"] += _offer_harmonic_map(choice, own, folded)
+            if not choice.reaches(cheap):
                 _offer_convex_maps(choice, own)
         if own is None or crowded or (folded and not choice.reaches(BAD)):
             _offer_mean_value_maps(choice, own)
@@ -202,6 +206,18 @@ def _offer_patches(choice: _Choice, own: Complex, folded: int) -> int:
     z, rounds = interior_without_folds(mesh, z)
     choice.offer(z)
     return rounds
+
+
+def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:
+    """Offer the map that repair alone makes: harmonic again, then patches; return the rounds."""
+    mesh = choice.mesh
+    if folded > MOST_FOLDED * mesh.m:
+        return 0
+    with contextlib.suppress(AlgorithmFailed):
+        z, rounds = without_folds(mesh, laplacian(mesh, delaunay=True), own)
+        choice.offer(z)
+        return rounds
+    return 0
 
 
 def _offer_convex_maps(choice: _Choice, own: Complex) -> None:

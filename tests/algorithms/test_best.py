@@ -76,11 +76,13 @@ def test_what_may_take_too_long_is_not_begun():
     assert "not tried" in found.extras["tried"]["flat"]
 
 
-def test_without_a_valid_map_every_cause_is_named():
+def test_without_a_map_every_cause_is_named_and_a_folded_one_is_left_to_the_judge():
     mesh = cembench.surface("flat-disk", 200)
     with pytest.raises(AlgorithmFailed) as failed:
-        best_of(mesh, {"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}, 60)
-    assert "fails: it gave up; folded: " in str(failed.value)
+        best_of(mesh, {"fails": Candidate(FAILS), "too": Candidate(FAILS)}, 60)
+    assert "fails: it gave up; too: it gave up" in str(failed.value)
+    found = best_of(mesh, {"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}, 60)
+    assert found.extras["chosen"] == "folded"
 
 
 def test_the_name_stands_for_disks_and_for_surfaces_with_holes():

@@ -94,7 +94,8 @@ def test_iterations_that_diverge_on_a_coarse_mesh_are_dropped():
     assert found.iterations + found.extras["iterations_dropped"] == 5
     energy = all_metrics(mesh, found.uv)["conformal_energy"]
     assert found.energy_history[-1] == pytest.approx(energy)
-    assert found.energy_history[-1] == min(found.energy_history)
+    # The least mean |mu| is kept, whose energy is near the least one.
+    assert found.energy_history[-1] < 1.05 * min(found.energy_history)
 
 
 def test_the_public_program_gives_the_printed_digits_of_nefertiti():

@@ -80,7 +80,7 @@ def crumpled_holes():
     return HoledMesh.from_arrays(mesh.V + noise, mesh.F)
 
 
-@pytest.mark.parametrize("name", sorted(load_registry().algorithms))
+@pytest.mark.parametrize("name", sorted(set(load_registry().algorithms) - {"best", "best-holes"}))
 def test_without_repair_the_map_is_as_the_method_made_it(name):
     spec = load_registry().algorithm(name)
     mesh = crumpled_holes() if spec.mesh_type is HoledMesh else gallery.crumpled_disk()

@@ -62,7 +62,7 @@ def test_its_pictures_are_there_and_no_other_paper_s(report):
 
 def test_a_run_without_any_of_its_models_is_said(small_run):
     paper = PAPER.model_copy(update={"tables": {1: {"Teapot": {"faces": 900}}}, "title": "Pots"})
-    with pytest.raises(RecordError, match=r"model of 'Pots'; its models are Teapot\. Leave"):
+    with pytest.raises(RecordError, match=r"model of 'Pots'; its models are Teapot\. Ask"):
         Evidence.of(small_run, paper)
 
 
