@@ -27,6 +27,6 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True) -> Para
     does not help, as with a boundary that crosses itself, folds remain.
     """
     pins = two_distant_vertices(mesh)
-    uv = pinned_map(laplacian(mesh, delaunay=delaunay), mesh.boundary, pins)
+    uv = pinned_map(laplacian(mesh, delaunay=delaunay), mesh.loops, pins)
     uv, folds = with_area_pi(mesh, uv, repair=repair)
     return Parameterization(uv, extras={"pins": pins.tolist(), **folds})

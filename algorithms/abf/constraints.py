@@ -195,6 +195,6 @@ def placed(
         # A triangle's angles must sum to pi, even if a step was cut.
         weights = 0.5 / np.tan(angles * (np.pi / angles.sum(axis=1, keepdims=True)))
         L = laplacian_of_weights(mesh.F, weights, mesh.n)
-    uv = pinned_map(L, mesh.boundary, two_distant_vertices(mesh))
+    uv = pinned_map(L, mesh.loops, two_distant_vertices(mesh))
     uv, folds = with_area_pi(mesh, uv, repair=repair)
     return Parameterization(uv, iterations, extras={**told, **folds})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,16 +14,19 @@ from cembench.conformal.planar import polygon_area
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import Cholesky
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 
 Complex = NDArray[np.complex128]
+Indices = NDArray[np.int64]
 
 
-def conformal_energy_form(
-    L: scipy.sparse.csc_array, b: NDArray[np.int64]
-) -> scipy.sparse.csc_array:
-    """Return Q with E_C = x^T Q x / 2, x = (u, v): diag(L, L) minus the area's Hessian (Eq. 8)."""
-    after = np.roll(b, -1)
+def conformal_energy_form(L: scipy.sparse.csc_array, *loops: Indices) -> scipy.sparse.csc_array:
+    """Return Q with E_C = x^T Q x / 2, x = (u, v): diag(L, L) minus the area's Hessian (Eq. 8).
+
+    L (n, n) is the Laplacian; `loops` are all boundaries, with the surface on their left.
+    """
+    b = np.concatenate(loops)
+    after = np.concatenate([np.roll(loop, -1) for loop in loops])
     half = np.full(len(b), 0.5)
     D = scipy.sparse.coo_array(
         (np.r_[half, -half], (np.r_[b, after], np.r_[after, b])), shape=L.shape
@@ -30,22 +34,23 @@ def conformal_energy_form(
     return scipy.sparse.block_array([[L, -D], [D, L]], format="csc")
 
 
-def two_distant_vertices(mesh: DiskMesh) -> NDArray[np.int64]:
+def two_distant_vertices(mesh: DiskMesh | HoledMesh) -> Indices:
     """Return two boundary vertices (2,): the farthest from the mean vertex and from the first."""
-    loop = mesh.V[mesh.boundary]
-    first = int(np.argmax(np.linalg.norm(loop - mesh.V.mean(axis=0), axis=1)))
-    second = int(np.argmax(np.linalg.norm(loop - loop[first], axis=1)))
-    return mesh.boundary[[first, second]]
+    boundary = np.concatenate(mesh.loops)
+    at = mesh.V[boundary]
+    first = int(np.argmax(np.linalg.norm(at - mesh.V.mean(axis=0), axis=1)))
+    second = int(np.argmax(np.linalg.norm(at - at[first], axis=1)))
+    return boundary[[first, second]]
 
 
-def pinned_map(L: scipy.sparse.csc_array, b: NDArray[np.int64], pins: NDArray[np.int64]) -> Complex:
+def pinned_map(L: scipy.sparse.csc_array, loops: Sequence[Indices], pins: Indices) -> Complex:
     """Return the map (n,) of least E_C with two vertices `pins` (2,) at -1 and 1.
 
-    L (n, n) is the Laplacian, b the boundary loop.
+    L (n, n) is the Laplacian; `loops` are all boundaries.
     """
     n = L.shape[0]
     with phase("assembly"):
-        Q = scipy.sparse.csr_array(conformal_energy_form(L, b))
+        Q = scipy.sparse.csr_array(conformal_energy_form(L, *loops))
         fixed = np.concatenate([pins, pins + n])
         free = np.delete(np.arange(2 * n), fixed)
         x = np.zeros(2 * n)

@@ -3,7 +3,8 @@
 How small angle errors can be depends on the mesh: on its edges, and on how much the conformal
 factor must vary. So a map is compared with another map of the same mesh to the same kind of domain,
 computed without iterations: the harmonic map with the boundary placed by harmonic measure. In the
-continuum it is the conformal map itself.
+continuum it is the conformal map itself. Where a disk is no place for the surface that map is as
+bad; so large angle errors are also compared with those of a free boundary.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_energy import EnergyModel, in_gauge
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.filled_start import arcs_of_measure, widest_start
+from cembench.conformal.free_boundary import pinned_map, two_distant_vertices
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import by_rows, laplacian
@@ -37,6 +39,9 @@ CLOSE = 0.1
 #: So is a map above this share of the mean angle error of collapsed triangles, or above so many
 #: degrees; the yardstick may be as bad there.
 COLLAPSED, POOR = 0.25, 10.0
+#: Above so many degrees a map is also compared with a free boundary, and is far from conformal
+#: above this multiple of its mean angle error; not on larger surfaces, to spare their memory.
+COMPARED, FAR_FROM_FREE, MOST_TRIANGLES = 5.0, 4.0, 1_000_000
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
@@ -58,20 +63,27 @@ def quality_notes(
             "of least energy"
         )
         notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, told))
-    known = yardstick(target, mesh, uv) if error > CLOSE else None
-    if known is None:
+    if target not in ("disk", "circular holes") or error <= CLOSE:
         return notes
-    reachable = float(angle_errors(mesh, known).mean())
-    if error <= min(FAR * reachable, COLLAPSED * collapsed_error(mesh), POOR):
+    known = yardstick(target, mesh, uv)
+    reachable = np.inf if known is None else float(angle_errors(mesh, known).mean())
+    free = free_error(mesh) if error > COMPARED else np.inf
+    most = FAR * reachable, FAR_FROM_FREE * free, COLLAPSED * collapsed_error(mesh), POOR
+    if error <= min(most):
         return notes
     causes = "; ".join(likely_causes(mesh, uv, extras))
     harmonic = "a harmonic map of this mesh by harmonic measure"
     if error > FAR * reachable:
         compared = f"but {harmonic} reaches {reachable:.2f}"
         causes = causes or "the method, not the mesh"
+    elif error > FAR_FROM_FREE * free:
+        compared = f"but a free boundary, e.g. -a abf-linear, reaches {free:.2g}"
+        causes = causes or "the surface is too long, or its mesh too coarse, for this domain"
     else:
-        compared = f"and {harmonic} is no better ({reachable:.2f})"
-        causes = causes or "the mesh is too coarse for this domain"
+        others = {harmonic: reachable, "a free boundary": free}
+        known_others = [f"{name} ({one:.2f})" for name, one in others.items() if one < np.inf]
+        compared = f"and hardly better in {' or '.join(known_others) or 'any map known here'}"
+        causes = causes or "the mesh is too coarse"
     text = (
         f"far from conformal: the mean angle error is {error:.2f} degrees, {compared}. Likely "
         f"cause: {causes}"
@@ -140,6 +152,21 @@ def likely_causes(mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]) ->
     if crowded > CROWDED_SHARE:
         causes.append(f"crowding ({crowded:.0%} of the triangles have almost no area left)")
     return causes
+
+
+def free_error(mesh: TriangleMesh) -> float:
+    """Return the mean angle error of the map with a free boundary of least E_C, in degrees.
+
+    One factorisation: two boundary vertices are pinned (LSCM). Infinite where it has folds, where
+    it cannot be computed, and above :data:`MOST_TRIANGLES`.
+    """
+    if not isinstance(mesh, DiskMesh | HoledMesh) or mesh.m > MOST_TRIANGLES:
+        return np.inf
+    try:
+        uv = pinned_map(laplacian(mesh, delaunay=True), mesh.loops, two_distant_vertices(mesh))
+    except AlgorithmFailed:
+        return np.inf
+    return np.inf if flipped_triangles(mesh, uv) else float(angle_errors(mesh, uv).mean())
 
 
 def yardstick(target: str, mesh: TriangleMesh, uv: Complex) -> Complex | None:

@@ -16,12 +16,20 @@ from cembench.surfaces.spherical_cap import spherical_cap
 import cembench
 from cembench import DiskMesh
 from cembench.conformal.metrics import angle_errors
-from cembench.core.notices import NoticeKind
-from cembench.mesh.triangle_mesh import HoledMesh
+from cembench.core.notices import NoticeKind, of_kind
+from cembench.mesh.triangle_mesh import HoledMesh, TriangleMesh
 from cembench.registry import load_registry
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.quality import collapsed_error, likely_causes, quality_notes, yardstick
+from cembench.running.quality import (
+    COMPARED,
+    POOR,
+    collapsed_error,
+    free_error,
+    likely_causes,
+    quality_notes,
+    yardstick,
+)
 from tests import gallery
 from tests.hard_surfaces import hard_surface
 
@@ -137,9 +145,47 @@ def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_b
     flat = mesh.V[:, 0] + 1e-3j * mesh.V[:, 1]
     assert angle_errors(mesh, flat).mean() == pytest.approx(collapsed_error(mesh), rel=0.3)
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
+    monkeypatch.setattr("cembench.running.quality.free_error", lambda _: np.inf)
     (note,) = notes_on("disk", mesh, flat, {})
-    assert "no better" in note.text
+    assert "hardly better in a harmonic map" in note.text
     assert "too coarse" in note.text
+    monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: None)
+    (note,) = notes_on("disk", mesh, flat, {})
+    assert "hardly better in any map known here" in note.text
+
+
+@pytest.mark.parametrize("algorithm", ["direct-cem", "bff", "cetm-flips", "harmonic-circle"])
+def test_a_surface_too_long_for_a_disk_is_told_by_its_free_boundary(algorithm):
+    """All disk maps are above 10 degrees, and so is the yardstick."""
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(3, 60))
+    assert free_error(mesh) < 1e-6
+    result = cembench.parameterize(mesh, algorithm)
+    assert result.metrics["angle_error_mean_deg"] > POOR
+    notes = of_kind(NoticeKind.FAR_FROM_CONFORMAL, result.outcome.notes)
+    assert len(notes) == 1
+    assert not cembench.parameterize(mesh, algorithm, check="fast").outcome.notes
+
+
+def test_a_free_boundary_is_mapped_only_above_the_stated_angle_error(monkeypatch):
+    monkeypatch.setattr("cembench.running.quality.free_error", lambda _: pytest.fail("mapped"))
+    mesh = hemi_ellipsoid(200)
+    assert 1 < angle_errors(mesh, direct_cem(mesh).uv).mean() < COMPARED
+    assert notes_on("disk", mesh, direct_cem(mesh).uv, {}) == []
+
+
+def test_a_poor_map_of_a_disk_whose_free_boundary_is_good_names_it(monkeypatch):
+    mesh = flat_disk(200)
+    poor = harmonic_circle(flat_disk(200, stretch=2.2)).uv
+    assert COMPARED < angle_errors(mesh, poor).mean() < POOR
+    monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: poor)
+    (note,) = notes_on("disk", mesh, poor, {})
+    assert "a free boundary, e.g. -a abf-linear, reaches" in note.text
+
+
+def test_the_free_map_of_a_flat_surface_with_holes_is_itself():
+    assert free_error(gallery.three_holes()) < 1e-6
+    assert 0.1 < free_error(hemi_ellipsoid(200)) < COMPARED
+    assert free_error(TriangleMesh.from_arrays(*gallery.tetrahedron())) == np.inf
 
 
 def test_a_free_boundary_has_no_yardstick():
