@@ -104,7 +104,14 @@ def map_numbered(
         z = harmonic_extension(L, b, z[b])
     else:
         z = linear_beltrami_solver(mesh.F, _weights(z, mesh.F, mesh.V), b, z[b])
-    z, folds = accepted_repair(mesh, z, L, repair=repair)
+    try:
+        z, folds = accepted_repair(mesh, z, L, repair=repair)
+    except AlgorithmFailed as error:
+        raise AlgorithmFailed(
+            f"LDM does not lay the boundary of this surface around the disk: {error}. This is a "
+            "limit of the method where a surface is long for its boundary; use direct-cem, or "
+            "last_resort=True"
+        ) from error
     return Parameterization(z, extras=folds)
 
 

@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.planar import backward_arcs, folded_triangles
+from cembench.conformal.planar import backward_arcs, folded_triangles, winding_words
 from cembench.conformal.untangling import untangled
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -175,8 +175,8 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     scrambled = backward_arcs(circle) > MOST_BACKWARD * len(circle)
     if turns != 1:
         raise AlgorithmFailed(
-            f"the boundary winds around the circle {turns} times counter-clockwise; it must do so "
-            "once, and its order cannot be repaired"
+            f"the boundary {winding_words(turns)}; it must go around it once, counter-clockwise, "
+            "and no repair of its order changes that"
         )
     if scrambled or backward_arcs(ordered):
         raise AlgorithmFailed(

@@ -93,6 +93,14 @@ def turns(z: Complex) -> tuple[int, int, int]:
     return around, winding, int(np.count_nonzero(backward))
 
 
+def winding_words(winding: int) -> str:
+    """Return in words how a loop goes around the origin, given its winding number."""
+    if not winding:
+        return "does not go around the circle"
+    times = {1: "once", 2: "twice"}.get(abs(winding), f"{abs(winding)} times")
+    return f"goes around the circle {times}, {'counter-' if winding > 0 else ''}clockwise"
+
+
 def backward_arcs(f_b: Complex) -> int:
     """Return the number of arcs of a loop that do not run counter-clockwise about 0."""
     return int(np.count_nonzero(~(np.imag(np.conj(f_b) * np.roll(f_b, -1)) > 0)))

@@ -22,7 +22,7 @@ from pydantic import BaseModel, ConfigDict
 
 from cembench.conformal.atlas import AtlasFigures, cut_map
 from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
-from cembench.conformal.planar import crossing_polygons, polygon_area, turns
+from cembench.conformal.planar import crossing_polygons, polygon_area, turns, winding_words
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.registry import Algorithm, Target
@@ -153,9 +153,7 @@ def _of_the_circle(
         found.append(_fault(FaultKind.OFF_CIRCLE, told))
     around, winding, backward = turns(z)
     if around != 1 and winding not in (0, 1):  # 0: all points may be on one half of the circle
-        told = (
-            f"the {name} winds around the circle {winding} times instead of once counter-clockwise"
-        )
+        told = f"the {name} {winding_words(winding)}; it must go around it once, counter-clockwise"
         found.append(_fault(FaultKind.WINDING, told))
     elif around != 1:
         told = f"{backward} of {len(z)} arcs of the {name} go backward"

@@ -53,6 +53,31 @@ def test_a_mesh_without_interior_is_refused():
         ldm(strip)
 
 
+def cone_over(corners, rings=60, height=8.0):
+    """A tall cone over a polygon; its rings shrink by a tenth from one to the next."""
+    k, ring = np.arange(corners), np.arange(rings)[:, None]
+    z = 0.9**ring * np.exp(2j * np.pi * (k + 0.5 * (ring % 2)) / corners)
+    V = np.stack([z.real, z.imag, height * (1 - np.abs(z))], axis=-1).reshape(-1, 3)
+    F = []
+    for j in range(rings - 1):
+        a, b = j * corners + k, j * corners + (k + 1) % corners
+        x, y = a + corners, b + corners
+        x, y = (x, np.roll(x, 1)) if j % 2 == 0 else (y, x)
+        F += [np.stack([a, b, x], axis=1), np.stack([a, x, y], axis=1)]
+    last = (rings - 1) * corners
+    tip = np.full(corners, len(V))
+    F.append(np.stack([last + k, last + (k + 1) % corners, tip], axis=1))
+    return DiskMesh.from_arrays(np.vstack([V, [0, 0, height]]), np.concatenate(F))
+
+
+def test_a_boundary_beside_the_centre_is_named_as_a_limit_of_the_method():
+    mesh = cone_over(45)
+    with pytest.raises(AlgorithmFailed, match=r"LDM does not lay the boundary .* use direct-cem"):
+        ldm(mesh)
+    found = ldm(mesh, last_resort=True)
+    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+
+
 @pytest.mark.parametrize("noise", [0, 0.03])
 def test_delaunay_weights_change_only_what_is_not_delaunay(noise):
     mesh = flat_disk(600)

@@ -12,6 +12,7 @@ from cembench.conformal.planar import (
     polygon_area,
     signed_areas,
     turns,
+    winding_words,
 )
 
 
@@ -174,3 +175,17 @@ def test_turns_of_a_loop():
 def test_no_circle_is_fitted_to_points_that_are_no_numbers():
     assert np.isnan(fitted_circle(np.array([1, 1j, np.nan, -1]))[1])
     assert np.isnan(fitted_circle(np.array([1, 1j, np.inf, -1]))[1])
+
+
+@pytest.mark.parametrize(
+    ("winding", "words"),
+    [
+        (0, "does not go around the circle"),
+        (1, "goes around the circle once, counter-clockwise"),
+        (-1, "goes around the circle once, clockwise"),
+        (2, "goes around the circle twice, counter-clockwise"),
+        (-3, "goes around the circle 3 times, clockwise"),
+    ],
+)
+def test_a_winding_number_in_words(winding, words):
+    assert winding_words(winding) == words

@@ -52,7 +52,7 @@ def tasks_of(*names, faces=600, **how):
         ("off-circle", "invalid", "off the unit circle by up to 0.001"),
         ("folded", "invalid", "triangles are folded"),
         ("writes", "invalid", "changed the mesh"),
-        ("wound-twice", "invalid", "winds around the circle 2 times instead of once"),
+        ("wound-twice", "invalid", "goes around the circle twice, counter-clockwise; it must"),
         ("raises-real-time-signal", "failed", "ended by signal 37"),
         ("exits-politely", "failed", "SystemExit: 0"),
     ],

@@ -36,9 +36,9 @@ def test_a_double_cover_of_the_disk_is_refused():
     assert np.count_nonzero(orientations(doubled(FLAT), DISK.F) <= 0) == 0
     (fault,) = faults(solver("disk"), DISK, doubled(FLAT))
     assert fault.kind is FaultKind.WINDING
-    assert (
-        fault.detail
-        == "the boundary winds around the circle 2 times instead of once counter-clockwise"
+    assert fault.detail == (
+        "the boundary goes around the circle twice, counter-clockwise; it must go around it once, "
+        "counter-clockwise"
     )
 
 
