@@ -17,15 +17,21 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from cembench.api.benchmark import Run, benchmark
-    from cembench.api.catalogue import list_algorithms, list_surfaces, surface
+    from cembench.api.catalogue import (
+        Catalogue,
+        catalogue,
+        list_algorithms,
+        list_surfaces,
+        surface,
+    )
     from cembench.api.cut import cut
-    from cembench.api.holes import holes
+    from cembench.api.holes import HoledMaps, holes
     from cembench.api.map_files import map_files
     from cembench.api.morph_surfaces import morph
     from cembench.api.parameterize import Result, parameterize
     from cembench.api.parameterize_many import parameterize_many
     from cembench.api.repair import Repair, repair
-    from cembench.api.reproduce import reproduce
+    from cembench.api.reproduce import Reproduction, reproduce
     from cembench.api.theory import theory
     from cembench.api.validate import validate
     from cembench.core.errors import (
@@ -66,15 +72,21 @@ _PLACES = {
     "cembench.registry": ("algorithm", "external_program", "surface_family"),
     "cembench.running.surfaces": ("load_surface",),
     "cembench.api.benchmark": ("Run", "benchmark"),
-    "cembench.api.catalogue": ("list_algorithms", "list_surfaces", "surface"),
+    "cembench.api.catalogue": (
+        "Catalogue",
+        "catalogue",
+        "list_algorithms",
+        "list_surfaces",
+        "surface",
+    ),
     "cembench.api.cut": ("cut",),
-    "cembench.api.holes": ("holes",),
+    "cembench.api.holes": ("HoledMaps", "holes"),
     "cembench.api.map_files": ("map_files",),
     "cembench.api.morph_surfaces": ("morph",),
     "cembench.api.parameterize": ("Result", "parameterize"),
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
-    "cembench.api.reproduce": ("reproduce",),
+    "cembench.api.reproduce": ("Reproduction", "reproduce"),
     "cembench.api.theory": ("theory",),
     "cembench.api.validate": ("validate",),
 }
@@ -83,9 +95,11 @@ _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 __all__ = [
     "AlgorithmFailed",
     "Atlas",
+    "Catalogue",
     "CembenchError",
     "DatasetError",
     "DiskMesh",
+    "HoledMaps",
     "HoledMesh",
     "MapStep",
     "MeshError",
@@ -97,12 +111,14 @@ __all__ = [
     "RegistryError",
     "RenderError",
     "Repair",
+    "Reproduction",
     "Result",
     "Run",
     "TriangleMesh",
     "__version__",
     "algorithm",
     "benchmark",
+    "catalogue",
     "cut",
     "external_program",
     "holes",

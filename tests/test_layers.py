@@ -73,13 +73,13 @@ BUDGETS = {
     "conformal": 5_550,
     "registry": 950,
     "results": 4_200,
-    "running": 7_250,
+    "running": 7_300,
     "drawing": 1_600,
     "report": 7_900,
     "validation": 2_250,
     "morphing": 1_750,
-    "api": 5_700,
-    "commands": 3_150,
+    "api": 6_000,
+    "commands": 2_950,
 }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -166,13 +165,40 @@ class Run:
         compared = table[table["reference"].notna()]
         return compared[[*columns, "verdict"]].reset_index(drop=True)
 
-    def report(self, folder: str | os.PathLike[str] | None = None) -> Report:
-        """Write the report, like `cembench report`.
+    def report(
+        self,
+        folder: AnyPath | None = None,
+        *,
+        tables: Sequence[AnyPath] = (),
+        paper: str | None = None,
+        verify: bool = False,
+        command: str = "",
+        jobs: int = 1,
+        reporter: Reporter = SILENT,
+    ) -> Report:
+        """Write a report of a run: the paper's tables, figures and claims, as measured.
+
+        The folder holds index.html (one file that works offline), report.md, report.tex, and each
+        table, figure and its data as separate files. docs/tables.md says how `tables` of your own
+        are declared.
 
         Parameters
         ----------
         folder : path, optional
-            The report's folder; default: ``report`` in the run's folder.
+            The report's folder (default: report in the run's folder).
+        tables : sequence of paths
+            A TOML file that declares more tables and plots.
+        paper : str, optional
+            The paper whose tables and claims it has: an installed one, or its folder.
+        verify : bool
+            Recompute the figures of all maps, not just of a sample.
+        command : str
+            The command that makes it again, if that is not `cembench report`.
+        jobs : int
+            Number of processes that draw. A script needs ``if __name__ == "__main__"`` for two or
+            more.
+        reporter : Reporter
+            Receives what is being done.
 
         Returns
         -------
@@ -184,14 +210,34 @@ class Run:
         MissingExtra
             A package for reports is not installed.
         RecordError
-            The run has no records, or the folder cannot be written.
+            The run has no records, a record or a map is damaged, or the folder cannot be written.
+        ParameterError
+            A declaration of a table is wrong, or does not fit the run.
+        RegistryError
+            There is no such paper.
 
         """
         from cembench.report.write_report import write_report
+        from cembench.results.papers import find_paper
+        from cembench.results.store import Store
+        from cembench.results.verify import Depth, sound_records
 
-        target = Path(folder) if folder is not None else self.folder / "report"
-        command = f"cembench report {self.folder} -o {target}"
-        return write_report(self.folder, target, command)
+        require(Extra.REPORT, "a report")
+        asked = find_paper(paper) if paper else None
+        records = sound_records(Store(self.folder), Depth.everything if verify else Depth.sample)
+        files = [Path(file) for file in tables]
+        words = ["cembench", "report", self.folder, *(["-o", folder] if folder else [])]
+        words += [word for file in files for word in ("--tables", file)]
+        words += ["--paper", paper] if paper else []
+        target = Path(folder) if folder else self.folder / "report"
+        with reporter.counting() as count:
+            return write_report(
+                *(self.folder, target, command or " ".join(map(str, words)), count),
+                jobs=jobs,
+                tables=files,
+                paper=asked,
+                records=records,
+            )
 
     def _repr_html_(self) -> str:
         from cembench.conformal.metrics import METRICS

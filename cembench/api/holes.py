@@ -2,20 +2,69 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+from cembench.api.settings import AnyPath, Faces
 from cembench.core.arguments import Range, checked
+from cembench.core.errors import AlgorithmFailed
+from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
     from cembench.api.parameterize import Result
     from cembench.running.surfaces import SurfaceInput
 
 
+class HoledMaps(dict[str, "Result"]):
+    """The valid maps of a surface with holes, by the name of the algorithm.
+
+    A name whose map failed raises :class:`AlgorithmFailed` with the cause. Koebe's map is that of
+    one sweep, the paper's Algorithm 2.
+
+    Parameters
+    ----------
+    maps : mapping of Result
+        The valid maps.
+    rows : sequence of dict
+        A row for each map, as ``cembench holes --json`` prints it, with its status and figures.
+        Koebe's method has a second one for the best number of sweeps, unless that is one.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> found = cembench.holes(cembench.surface("catenoid-ring", 200), sweeps=1)
+    >>> [row["status"] for row in found.rows]
+    ['ok', 'ok', 'ok']
+
+    """
+
+    def __init__(self, maps: Mapping[str, Result], rows: Sequence[dict[str, Any]]) -> None:
+        super().__init__(maps)
+        self.rows = list(rows)
+
+    def __missing__(self, name: str) -> Result:
+        for row in self.rows:
+            if row["algorithm"] == name:
+                raise AlgorithmFailed(f"{row['mesh']} / {name}: {row['status']}: {row['cause']}")
+        raise KeyError(name)
+
+
 @checked
 def holes(
-    surface: SurfaceInput, *, outer: Annotated[int, Range(0, 2**63 - 1)] | None = None
-) -> dict[str, Result]:
-    """Map a surface with holes to a disk with circular holes, with every suitable algorithm.
+    surface: SurfaceInput,
+    *,
+    outer: Annotated[int, Range(0, 2**63 - 1)] | None = None,
+    sweeps: Annotated[int, Range(1, 1000)] = 8,
+    faces: Faces | None = None,
+    run: AnyPath | None = None,
+    reporter: Reporter = SILENT,
+) -> HoledMaps:
+    """Map surfaces with holes, and draw the steps of Koebe's method.
+
+    One sweep is the paper's Algorithm 2. The table compares it with the best number of sweeps, by
+    conformal energy, and with every other algorithm for this class. docs/holes.md explains it.
 
     Parameters
     ----------
@@ -23,47 +72,63 @@ def holes(
         A surface of genus 0 with two boundary loops or more.
     outer : int, optional
         A vertex of the outer boundary, counted from 0 (default: the widest boundary).
+    sweeps : int
+        Maximum number of sweeps to try.
+    faces : int, optional
+        Number of triangles of generated surfaces.
+    run : path, optional
+        Add the pictures and the table to this run, as exhibits that its report shows.
+    reporter : Reporter
+        Receives what is being done.
 
     Returns
     -------
-    dict of Result
-        The maps by algorithm name, without algorithms that found no valid map.
+    HoledMaps
+        The maps by algorithm name, without algorithms that found no valid map, and the figures of
+        all.
 
     Raises
     ------
     MeshError
-        The surface is damaged or has no hole.
-    AlgorithmFailed
-        No algorithm found a valid map; the message gives the cause for each.
+        The surface is damaged or has no hole, or `outer` is not on a boundary.
+    RecordError
+        The folder `run` is not a run, or cannot be written to.
 
     Examples
     --------
     >>> import cembench
-    >>> found = cembench.holes(cembench.surface("catenoid-ring", 200))
+    >>> found = cembench.holes(cembench.surface("catenoid-ring", 200), sweeps=1)
     >>> sorted(found)
     ['direct-cem-holes', 'harmonic-filled', 'koebe-cem']
 
     """
-    from cembench.api.parameterize import parameterize
-    from cembench.core.errors import AlgorithmFailed
+    from cembench.api.holes_exhibits import examine_holes, write_holes_table
     from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
+    from cembench.results import run_folder
     from cembench.running.surfaces import load_surface
 
-    mesh = load_surface(surface, (HoledMesh,))
-    given: dict[str, Any] = {} if outer is None else {"outer": outer}
-    found, causes = {}, []
-    for name, algorithm in load_registry().algorithms.items():
-        if algorithm.target != "circular holes":
-            continue
-        known = {parameter.name for parameter in algorithm.parameters}
-        try:
-            own: dict[str, Any] = given if "outer" in known else {}
-            found[name] = parameterize(mesh, name, **own)
-        except AlgorithmFailed as error:
-            causes.append(str(error))
-    if not found:
-        raise AlgorithmFailed(
-            "; ".join(causes) or "no algorithm for surfaces with holes is installed"
+    folder = None if run is None else Path(run)
+    if folder is not None:
+        run_folder.check(folder)
+    registry = load_registry()
+    mesh = load_surface(surface, (HoledMesh,), faces=faces, registry=registry)
+    mesh.outer_and_holes(outer)
+    algorithms = [
+        a for a in registry.algorithms.values() if a.target == "circular holes" and a.usual
+    ]
+    name = Path(surface).name if isinstance(surface, str | os.PathLike) else mesh.name
+    command = holes_command([name], outer=outer, sweeps=sweeps, faces=faces)
+    with reporter.busy(f"Koebe's method on {mesh.name}") as tell:
+        rows, maps = examine_holes(
+            mesh, algorithms, outer, sweeps, folder, command, reporter.warn, tell
         )
-    return found
+    if folder is not None:
+        write_holes_table(rows, folder, command)
+    return HoledMaps(maps, rows)
+
+
+def holes_command(names: Sequence[str], **options: int | None) -> str:
+    """Return the command that makes the exhibits of surfaces with holes again."""
+    words = (f" --{name} {value}" for name, value in options.items() if value is not None)
+    return f"cembench holes {' '.join(names)}{''.join(words)}"

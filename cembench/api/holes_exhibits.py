@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from cembench.api.parameterize import Result
 from cembench.conformal.metrics import circle_of, dirichlet_energy, image_area
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import MapStep
@@ -37,18 +38,19 @@ def examine_holes(
     algorithms: Sequence[Algorithm],
     outer: int | None,
     sweeps: int,
-    run: Path,
+    run: Path | None,
     command: str,
-    complain: Callable[[str], object],
+    warn: Callable[[str], object],
     tell: Callable[[str], object] = lambda _: None,
-) -> list[dict[str, Any]]:
-    """Map a surface by every algorithm; return a row for each and write two exhibits.
+) -> tuple[list[dict[str, Any]], dict[str, Result]]:
+    """Map a surface by every algorithm; return a row for each, and the first valid map of each.
 
-    `outer` is a vertex of the outer boundary, `sweeps` the maximum number of sweeps, `command` the
-    command that recreates the exhibits. `complain` is called if Koebe's method fails, `tell`
-    before each step.
+    Two exhibits are written if there is a `run`. `outer` is a vertex of the outer boundary,
+    `sweeps` the maximum number of sweeps, `command` the command that recreates the exhibits. `warn`
+    is called if Koebe's method fails, `tell` before each step.
     """
-    rows = []
+    rows: list[dict[str, Any]] = []
+    maps: dict[str, Result] = {}
     for algorithm in algorithms:
         steps: list[MapStep] = []
         counts: list[int | None] = [None]
@@ -60,17 +62,19 @@ def examine_holes(
                     tell(_next_step(mesh, algorithm, step, sweeps))
                 counts = [*sorted({1, _best_sweep(mesh, steps)})]
             except AlgorithmFailed as error:
-                complain(f"{mesh.name}: {error}")
+                warn(f"{mesh.name}: {error}")
                 counts = [1]
         for count in counts:
             swept = f", {count} sweep{'s' if count > 1 else ''}" if count else ""
             tell(f"{algorithm.title} on {mesh.name}{swept}: mapping, checking")
             row, record, uv = _measured(mesh, algorithm, outer, count)
             rows.append(row)
-            if uv is not None and count == 1:
+            if uv is not None and record.outcome.status == "ok":
+                maps.setdefault(algorithm.name, Result(mesh, algorithm, uv, record.outcome))
+            if uv is not None and count == 1 and run is not None:
                 tell(f"{algorithm.title} on {mesh.name}: drawing")
                 _write_figure_exhibits(mesh, steps, uv, record, outer, run, command)
-    return rows
+    return rows, maps
 
 
 def _next_step(mesh: HoledMesh, algorithm: Algorithm, step: MapStep, sweeps: int) -> str:

@@ -1,4 +1,4 @@
-"""The surfaces that `reproduce` measures: the paper's models that are public, else stand-ins."""
+"""The surfaces of the paper that `reproduce` measures: public models, and stand-ins."""
 
 from __future__ import annotations
 
@@ -8,19 +8,14 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from time import monotonic
 
-from cembench.api.settings import bytes_of
 from cembench.core.errors import CembenchError, RecordError
 from cembench.core.extras import MissingExtra
-from cembench.core.reporter import Reporter
-from cembench.mesh.datasets import Dataset, fetch_all, is_fetched, surface_file
+from cembench.mesh.datasets import Dataset, fetch_all, is_fetched
 from cembench.mesh.download import Progress
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Algorithm, Registry, Surface, load_registry
-from cembench.results import profiles
-from cembench.running.environment import usable_cores
-from cembench.running.plan import PaperRole, paper_role_of, paper_roles
+from cembench.registry import Registry, Surface, load_registry
 from cembench.running.process_pool import process_pool
-from cembench.running.surfaces import generate_surface, kinds_of, load_file
+from cembench.running.surfaces import generate_surface
 
 #: Seconds for fetching the paper's models, in all.
 FETCH_SECONDS = 20.0
@@ -28,36 +23,6 @@ FETCH_SECONDS = 20.0
 STAND_IN_BYTES = 2**30
 #: The group of datasets that are models of the paper.
 GROUP = "paper"
-
-
-def surfaces_at_hand(
-    registry: Registry, algorithms: Sequence[Algorithm], reporter: Reporter, *, offline: bool
-) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
-    """Return a surface for each row: the model if it is there, else its stand-in; and the roles."""
-    stand_ins = {
-        registry.surface(s).paper_row: s
-        for s in profiles.surfaces_of(profiles.Profile.quick, registry)
-    }
-    public = public_models(registry, list(stand_ins))
-    if public and not offline:
-        with reporter.downloads(public) as progress:
-            reporter.say(fetch_models(public, progress))
-    models = {one.paper_row: one for one in public if is_fetched(one)}
-    lacking = {row: name for row, name in stand_ins.items() if row not in models}
-    reporter.say(f"the paper's models: {', '.join(models) or 'none'}")
-    reporter.say(f"stand-ins: {', '.join(lacking) or 'none'}")
-    names = list(lacking.values())
-    jobs = min(usable_cores(), bytes_of(None) // STAND_IN_BYTES)
-    with reporter.busy("making stand-ins", logged=True) as tell:
-
-        def made(name: str, done: int, total: int) -> None:
-            tell(f"[{done}/{total}] made {name}")
-
-        generated = make_stand_ins(registry, names, jobs, made)
-    kinds = kinds_of(algorithms)
-    read = [load_file(surface_file(one), kinds).mesh for one in models.values()]
-    roles = {mesh.name: paper_role_of(registry, mesh) for mesh in read}
-    return [*read, *generated], roles | paper_roles(registry, names)
 
 
 def public_models(registry: Registry, rows: Sequence[str]) -> list[Dataset]:

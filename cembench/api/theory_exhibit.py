@@ -6,48 +6,55 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from cembench.api.theory_facts import LOOKS, theory_facts
+from cembench.api.theory_facts import LOOKS, TheoryFacts
 from cembench.api.theory_plot import write_theory_plot
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import Algorithm
 from cembench.results.exhibits import (
     Exhibit,
     ExhibitPicture,
     ExhibitTable,
     exhibit_folder,
+    place_of,
     write_exhibit,
 )
 
+#: The file of the picture.
+PICTURE = "theory.png"
 
-def examine_theory(
-    mesh: DiskMesh, rival: Algorithm | None, iterations: int, run: Path, command: str
-) -> Exhibit:
-    """Test Section 4 on a surface, and add the exhibit to a run.
 
-    `rival` is the algorithm whose energy is shown for comparison, `command` the command that makes
-    the exhibit again.
-    """
-    name = f"theory-{mesh.name}"
-    folder = exhibit_folder(run, name)  # fail now, not after the computation
-    found = theory_facts(mesh, rival, iterations)
-    facts = dict(found.facts)
+def claim_exhibit(run: Path, mesh: DiskMesh) -> Path:
+    """Return the folder of a surface's exhibit in a run; raise if it cannot be written to."""
+    return exhibit_folder(run, f"theory-{mesh.name}")
+
+
+def add_exhibit(run: Path, found: TheoryFacts, command: str) -> None:
+    """Add the exhibit of what was found to a run; `command` is the one that makes it again."""
+    facts = found.facts
+    exhibit = theory_exhibit(found, command)
     write_theory_plot(
-        folder / "theory.png",
-        f"{mesh.name}: {mesh.n:,} vertices, {facts['boundary_vertices']} on the boundary",
+        place_of(run, exhibit.name, PICTURE),
+        f"{facts['mesh']}: {facts['vertices']:,} vertices, {facts['boundary_vertices']} on the "
+        "boundary",
         found.spectrum,
         found.trajectories,
         found.others,
         facts["rate_predicted"],
     )
-    exhibit = Exhibit(
-        name=name,
-        title=f"Section 4 on {mesh.name}",
+    write_exhibit(run, exhibit)
+
+
+def theory_exhibit(found: TheoryFacts, command: str = "") -> Exhibit:
+    """Return what was found as an exhibit: a summary, tables, and the name of a picture."""
+    facts = dict(found.facts)
+    return Exhibit(
+        name=f"theory-{facts['mesh']}",
+        title=f"Section 4 on {facts['mesh']}",
         text=_summary(facts) + (f" {found.missing}" if found.missing else ""),
         command=command,
         origin="surface",
         pictures=(
             ExhibitPicture(
-                file="theory.png",
+                file=PICTURE,
                 caption="Spectrum of K, conformal energy and steps of the bare iterations.",
                 alternative=_summary(facts),
             ),
@@ -55,8 +62,6 @@ def examine_theory(
         tables=tuple(_tables(facts)),
         facts=facts,
     )
-    write_exhibit(run, exhibit)
-    return exhibit
 
 
 def _summary(facts: dict[str, Any]) -> str:

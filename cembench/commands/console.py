@@ -125,23 +125,43 @@ class Shown(Reporter):
         return shlex.join(["cembench", *sys.argv[1:]])
 
     @contextmanager
-    def busy(self, text: str, *, logged: bool = False) -> Iterator[Callable[[str], object]]:
+    def busy(self, text: str) -> Iterator[Callable[[str], object]]:
         """Show a spinner."""
         if out.quiet:
             yield lambda text: None
             return
         with err.status(text, spinner="line") as status:
-            yield self.say if logged and not err.is_terminal else status.update
+            yield status.update
 
     def step(self, text: str) -> None:
         """Print a line."""
         if not out.quiet:
             err.print(f"{text} ...", style="dim")
 
-    def say(self, text: str) -> None:
+    def info(self, text: str) -> None:
         """Print a line."""
         if not out.quiet:
             err.print(text, soft_wrap=True)
+
+    @contextmanager
+    def counting(self) -> Iterator[Callable[[str, int, int], None]]:
+        """Show a bar on a terminal, and lines elsewhere."""
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+        if out.quiet:
+            yield lambda text, done, end: None
+            return
+        text_column = TextColumn("{task.description}", markup=False)
+        columns = BarColumn(20), MofNCompleteColumn(), text_column
+        with Progress(*columns, console=err, transient=True) as bar:
+            task = bar.add_task("reading")
+
+            def count(text: str, done: int, end: int) -> None:
+                bar.update(task, description=text, completed=done, total=end)
+                if not err.is_terminal and done < end:
+                    err.print(f"[{done + 1}/{end}] {text}", soft_wrap=True)
+
+            yield count
 
     def note(self, text: str) -> None:
         """Print a remark."""

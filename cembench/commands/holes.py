@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from cembench.api.holes import holes as map_all
+from cembench.api.holes import holes as examine
+from cembench.api.holes import holes_command
 from cembench.commands.console import SHOWN, Json, complain, out, print_json
 from cembench.commands.from_api import Call, from_api
-from cembench.commands.options import Faces
 from cembench.commands.run import DEFAULT_RUN
 
 #: The surface that is mapped where none is named.
 STAND_IN = "ho-face-with-holes"
 
 
-@from_api(map_all, only=("outer",))
+@from_api(examine, without=("surface", "reporter"))
 def holes(
     call: Call,
     meshes: Annotated[
@@ -27,47 +27,25 @@ def holes(
         ),
     ] = [STAND_IN],  # noqa: B006 - typer copies defaults
     *,
-    sweeps: Annotated[
-        int, typer.Option(min=1, max=1000, help="Maximum number of sweeps to try.")
-    ] = 8,
-    faces: Faces = None,
     run: Annotated[
         Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
     ] = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
-    """Map surfaces with holes, and draw the steps of Koebe's method.
-
-    One sweep is the paper's Algorithm 2. The table compares it with the best
-    number of sweeps, by conformal energy, and with every other algorithm for this
-    class. docs/holes.md explains it.
-    """
-    from cembench.api.holes_exhibits import examine_holes, write_holes_table
+    """Print a table of all surfaces, and add it to the run."""
+    from cembench.api.holes_exhibits import write_holes_table
     from cembench.mesh.triangle_mesh import HoledMesh
-    from cembench.registry import load_registry
     from cembench.report.content.exhibits import tables_shown
     from cembench.results import run_folder
     from cembench.running.surfaces import load_surface
 
     run_folder.check(run)
-    outer = call.keywords["outer"]
-    registry = load_registry()
-    surfaces = [load_surface(name, (HoledMesh,), faces=faces, registry=registry) for name in meshes]
-    for mesh in surfaces:
-        mesh.outer_and_holes(outer)
-    algorithms = [a for a in registry.algorithms.values() if a.target == "circular holes"]
-    rows: list[dict[str, Any]] = []
-    options = "".join(
-        f" --{option} {value}"
-        for option, value in (("outer", outer), ("sweeps", sweeps), ("faces", faces))
-        if value is not None
-    )
-    for name, mesh in zip(meshes, surfaces, strict=True):
-        with SHOWN.busy(f"Koebe's method on {mesh.name}") as tell:
-            command = f"cembench holes {Path(name).name}{options}"
-            rows += examine_holes(mesh, algorithms, outer, sweeps, run, command, complain, tell)
-    files = " ".join(Path(name).name for name in meshes)
-    exhibit = write_holes_table(rows, run, f"cembench holes {files}{options}")
+    given = call.keywords
+    for name in meshes[1:]:  # a wrong one ends the command before the first takes its time
+        load_surface(name, (HoledMesh,), faces=given["faces"]).outer_and_holes(given["outer"])
+    rows = [row for name in meshes for row in call(name, run=run, reporter=SHOWN).rows]
+    command = holes_command([Path(name).name for name in meshes], **given)
+    exhibit = write_holes_table(rows, run, command)
     if as_json:
         print_json(rows)
     else:

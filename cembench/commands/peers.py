@@ -72,7 +72,7 @@ def peers(
     fails or maps badly is a result: the exit code is 1 only if one of our
     algorithms fails.
     """
-    from cembench.commands.report import make_report
+    from cembench.commands.report import drawing_jobs
     from cembench.core import folders
     from cembench.results import run_folder
     from cembench.results.record_rows import rows
@@ -101,7 +101,8 @@ def peers(
         reporter=SHOWN,
     )
     records = measured.asked
-    _, folder = make_report(output, None, f"cembench peers -o {output}")
+    folder = output / "report"
+    measured.report(command=f"cembench peers -o {output}", jobs=drawing_jobs(), reporter=SHOWN)
     if as_json:
         page = str(folder / "index.html")
         print_json({"cells": rows(records), "not_here": lacking, "report": page})

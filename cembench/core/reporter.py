@@ -18,20 +18,19 @@ class Reporter:
         """The command that makes this call; empty in Python."""
         return ""
 
-    def busy(
-        self, text: str, *, logged: bool = False
-    ) -> AbstractContextManager[Callable[[str], object]]:
-        """Show a text during a block, which can replace it by calling what it gets.
-
-        If `logged`, the later texts are shown as lines where a text cannot be replaced.
-        """
+    def busy(self, text: str) -> AbstractContextManager[Callable[[str], object]]:
+        """Show a text during a block, which can replace it by calling what it gets."""
         return nullcontext(lambda text: None)
 
     def step(self, text: str) -> None:
         """Show what begins."""
 
-    def say(self, text: str) -> None:
+    def info(self, text: str) -> None:
         """Show what was found or done."""
+
+    def counting(self) -> AbstractContextManager[Callable[[str, int, int], None]]:
+        """Show a count during a block, which gets a function of a text, the count and its end."""
+        return nullcontext(lambda text, done, end: None)
 
     def note(self, text: str) -> None:
         """Show a remark."""

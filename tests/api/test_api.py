@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 import cembench
+from cembench import HoledMaps
 from tests import gallery
 
 ROOT = Path(cembench.__file__).parents[1]
@@ -255,3 +256,12 @@ def test_map_tells_the_certificate(tmp_path):
     assert mapped.certificate == "only for maps of disks to the disk"
     (mapped,) = cembench.map_files([tmp_path / "a.obj"])
     assert mapped.certificate == ""
+
+
+def test_a_map_of_a_surface_with_holes_that_failed_has_its_cause():
+    row = {"mesh": "ring", "algorithm": "koebe-cem", "status": "failed", "cause": "it gave up"}
+    found = HoledMaps({}, [row])
+    with pytest.raises(cembench.AlgorithmFailed, match="ring / koebe-cem: failed: it gave up"):
+        found["koebe-cem"]
+    with pytest.raises(KeyError):
+        found["lscm"]

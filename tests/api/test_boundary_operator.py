@@ -114,6 +114,15 @@ def test_the_verb_shows_and_lays_down_an_exhibit(cli):
     assert exhibit.tables[1].rows[0][:3] == ("K 1 = 1", "Theorem 2", "yes")
 
 
+def test_in_python_too_the_exhibit_names_the_command_that_makes_it_again(tmp_path):
+    import cembench
+
+    found = cembench.theory("flat-disk", faces=100, iterations=10, run=tmp_path / "r")
+    (exhibit,) = read_exhibits(tmp_path / "r")
+    assert exhibit.command == "cembench theory flat-disk --iterations 10 --faces 100"
+    assert exhibit.facts["vertices"] == found.facts["vertices"]
+
+
 def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
     mesh = flat_disk(100)
 

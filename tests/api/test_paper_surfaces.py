@@ -101,9 +101,8 @@ def test_stand_ins_made_side_by_side_have_the_same_bytes(tmp_path, monkeypatch):
     assert found[1] == found[2]
     assert {name for name, _, _ in told} == set(SMALL)
     assert [counts for _, *counts in told] == [[1, 2], [2, 2]] * 2
-    monkeypatch.setattr(
-        paper_surfaces, "process_pool", None
-    )  # what is in the cache is not made again
+    # What is in the cache is not made again.
+    monkeypatch.setattr(paper_surfaces, "process_pool", None)
     again = make_stand_ins(registry, SMALL, 2, lambda *words: told.append(words))
     assert [mesh.hash for mesh in again] == [mesh.hash for mesh in made]
     assert len(told) == 4

@@ -85,7 +85,8 @@ def test_it_tells_its_steps_while_it_works(tmp_path):
     algorithms = [load_registry().algorithm("koebe-cem")]
     heard = []
     run = (tmp_path / "run", "cembench holes", pytest.fail, heard.append)
-    rows = examine_holes(mesh, algorithms, None, 2, *run)
+    rows, maps = examine_holes(mesh, algorithms, None, 2, *run)
+    assert list(maps) == ["koebe-cem"]
     steps = [words for words in heard if "is a circle" in words]
     assert len(steps) == len(set(steps)) == 2 * len(mesh.loops)
     assert len(heard) == len(steps) + 1 + len(rows) + 1

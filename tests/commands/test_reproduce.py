@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+import cembench
 from cembench import registry
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.files import read_mesh
@@ -62,6 +63,20 @@ def test_a_model_replaces_its_stand_in_and_all_is_reported(cli, one_model):
         "stand-ins: Cowboy Hat",
         "[1/1] made cowboy-hat-stand-in",
     ]
+
+
+def test_the_call_does_what_the_command_does(cli, one_model, monkeypatch):
+    names = ["nefertiti-stand-in"]
+    monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
+    code, out, err = cli("reproduce", "-o", "here", "--offline", "--budget", "0s", "--json")
+    assert code == 0, err
+    printed = json.loads(out)
+    found = cembench.reproduce(cli.folder / "here", offline=True, budget=0)  # resumes
+    assert dict(found.surfaces) == printed["surfaces"]
+    cells = {row["algorithm"]: row["conformal_energy"] for row in printed["cells"]}
+    metrics = {r.cell.algorithm: r.outcome.metrics["conformal_energy"] for r in found.run.asked}
+    assert metrics == cells
+    assert found.report.title == printed["report"]["title"]
 
 
 def test_offline_no_server_is_asked_and_a_failed_cell_ends_with_1(cli, one_model, monkeypatch):
