@@ -71,17 +71,25 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
 
 def _is_delaunay(F: Indices, lengths: Real, weights: Real) -> bool:
     """Whether all edges are known to be Delaunay: few angles are obtuse, their edges all right."""
-    obtuse = np.flatnonzero(weights < 0)
-    if not len(obtuse) or len(obtuse) > FEW * weights.size:
-        return not len(obtuse)
+    obtuse = np.count_nonzero(weights < 0)
+    if not obtuse or obtuse > FEW * weights.size:
+        return not obtuse
+    near = opposite_to_obtuse(F, weights)
+    part = _Corners(F[near], lengths[near], weights[near])
+    return not len(part.not_delaunay(np.flatnonzero(part.weight < 0)))
+
+
+def opposite_to_obtuse(F: Indices, weights: Real) -> NDArray[np.bool_]:
+    """Return a mask (m,) of triangles that has both at every edge opposite to an obtuse angle.
+
+    Only these edges may not be Delaunay. `weights` (m, 3) have the signs of the cotangents.
+    """
     of_edge = np.zeros(int(F.max()) + 1, dtype=bool)
-    _, *others = _following(obtuse)
+    _, *others = _following(np.flatnonzero(weights < 0))
     for corner in others:
         of_edge[F.ravel()[corner]] = True
     # A triangle at such an edge has both of its ends.
-    near = np.count_nonzero(of_edge[F], axis=1) >= 2
-    part = _Corners(F[near], lengths[near], weights[near])
-    return not len(part.not_delaunay(np.flatnonzero(part.weight < 0)))
+    return np.asarray(np.count_nonzero(of_edge[F], axis=1) >= 2)
 
 
 class _Corners:

@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay
+from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay, opposite_to_obtuse
 from cembench.core.blocks import blocks
 from cembench.core.clock import phase
 from cembench.mesh.gluing import SLOTS, opposite_edge_ends, twins_of_half_edges
@@ -147,8 +147,11 @@ def by_rows(L: scipy.sparse.csc_array) -> scipy.sparse.csr_array:
 
 def non_delaunay_share(mesh: TriangleMesh) -> float:
     """Return the share of interior edges with opposite angles above 180 degrees in sum."""
-    twin = twins_of_half_edges(mesh.F)
-    interior = np.flatnonzero(twin >= 0)  # every edge twice, which leaves the share as it is
-    weight = half_cotangents(mesh.V, mesh.F)[:, [2, 0, 1]].ravel()  # of the half-edges
-    opposite = weight[interior] + weight[twin[interior]]
-    return float((opposite < -1e-12).mean()) if len(interior) else 0.0
+    weights = half_cotangents(mesh.V, mesh.F)
+    near = opposite_to_obtuse(mesh.F, weights)
+    twin = twins_of_half_edges(mesh.F[near])
+    inside = np.flatnonzero(twin >= 0)  # every edge twice
+    weight = weights[near][:, [2, 0, 1]].ravel()  # of the half-edges
+    bad = np.count_nonzero(weight[inside] + weight[twin[inside]] < -1e-12)
+    interior = mesh.F.size - sum(len(loop) for loop in mesh.loops)
+    return bad / interior if interior else 0.0
