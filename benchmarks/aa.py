@@ -265,4 +265,4 @@ def section(output: Path) -> Section:
         for f in rows
         if f.get("speedups_compared")
     ]
-    return Section([Table(rows, LAYOUT), note, *shared, *repeated], "docs/measuring.md")
+    return Section([Table(rows, LAYOUT), note, *shared, *repeated], "docs/measuring_details.md")

@@ -40,7 +40,7 @@ def allocator(
         rows += [row(surface, way, [pair[way] for pair in pairs]) for way in WAYS]
     how = f"CEM, {processes} processes of each kind in turns, {calls} calls in each. "
     how += "A number is a spherical cap of so many triangles."
-    return Section([Table(rows, LAYOUT), how], "docs/measuring.md")
+    return Section([Table(rows, LAYOUT), how], "docs/measuring_details.md")
 
 
 def row(surface: str, way: str, seconds: list[float]) -> dict[str, Any]:

@@ -115,4 +115,6 @@ def precision(*, runs: int = 4000) -> Section:
         corrected.append({"noise": model, "wrong": np.mean(chunks)})
     note = f"{runs:,} simulated runs a line, at most {USUAL_MOST_ROUNDS} rounds; "
     note += f"of the second table {40 * runs:,}."
-    return Section([Table(rows, LAYOUT), Table(corrected, CORRECTED), note], "docs/measuring.md")
+    return Section(
+        [Table(rows, LAYOUT), Table(corrected, CORRECTED), note], "docs/measuring_details.md"
+    )

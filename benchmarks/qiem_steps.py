@@ -58,7 +58,7 @@ def qiem_steps(surfaces: Sequence[str] = SURFACES, *, faces: int = 3000) -> Sect
     meshes = [generate_surface(registry, name, faces) for name in surfaces]
     rows = [row(variant, meshes) for variant in progress(VARIANTS)]
     note = f"{', '.join(surfaces)}, {faces:,} triangles each; medians over them."
-    return Section([note, Table(rows, LAYOUT)], "docs/algorithms.md")
+    return Section([note, Table(rows, LAYOUT)], "docs/readings.md")
 
 
 @contextmanager

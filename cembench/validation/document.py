@@ -118,7 +118,7 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
 
 def _found(finding: ValidationFinding) -> Value:
     if finding.undecided:
-        return words("cannot be told", "doubtful")
+        return words("inconclusive", "doubtful")
     return words("ok", "good") if finding.ok else words("fault", "bad")
 
 

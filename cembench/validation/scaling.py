@@ -54,7 +54,7 @@ class GrowthAnswer(StrEnum):
     fine = "fine"
     too_steep = "too_steep"
     #: The intervals contain the limits, or there are none yet.
-    cannot_tell = "cannot_tell"
+    inconclusive = "inconclusive"
 
 
 class Growth(BaseModel):
@@ -119,13 +119,13 @@ def answer_of(exponents: Sequence[float], above: Sequence[float] | None) -> Grow
     """
     own = _interval(exponents)
     if own is None:
-        return GrowthAnswer.cannot_tell
+        return GrowthAnswer.inconclusive
     beside = None if above is None else _interval(above)
     if own.low > MOST_EXPONENT and (beside is None or beside.low > MOST_ABOVE_REFERENCE):
         return GrowthAnswer.too_steep
     if own.high <= MOST_EXPONENT or (beside and beside.high <= MOST_ABOVE_REFERENCE):
         return GrowthAnswer.fine
-    return GrowthAnswer.cannot_tell
+    return GrowthAnswer.inconclusive
 
 
 def growth_of(
@@ -171,7 +171,7 @@ def more_rounds(
     What looks too steep after the first rounds is not left there: it gets its interval.
     """
     rounds = found.ours.rounds
-    if rounds >= MOST_ROUNDS or found.answer is not GrowthAnswer.cannot_tell:
+    if rounds >= MOST_ROUNDS or found.answer is not GrowthAnswer.inconclusive:
         return 0
     more = next_look(rounds, MOST_ROUNDS) - rounds
     first = found.ours.low is None
@@ -191,7 +191,7 @@ def largest_two(records: Sequence[Record], ours: str) -> list[str]:
 
 
 def scales(found: GrowthComparison | None) -> ValidationFinding:
-    """Check our growth; None for too few sizes. What cannot be told is no fault."""
+    """Check our growth; None for too few sizes. An inconclusive answer is not a fault."""
     measured = "it could not be timed on two sizes"
     if found is not None:
         measured = _words(found)
@@ -199,7 +199,7 @@ def scales(found: GrowthComparison | None) -> ValidationFinding:
         stage="scaling",
         name="growth of the seconds",
         ok=found is not None and found.answer is not GrowthAnswer.too_steep,
-        undecided=found is not None and found.answer is GrowthAnswer.cannot_tell,
+        undecided=found is not None and found.answer is GrowthAnswer.inconclusive,
         measured=measured,
         allowed=f"an exponent of {MOST_EXPONENT:g} at most, or {MOST_ABOVE_REFERENCE:g} more than "
         "the reference's in the same rounds; factoring a planar Laplacian has 1.5",
@@ -215,10 +215,10 @@ def _words(found: GrowthComparison) -> str:
     if found.above is not None:
         told += f", {found.above:.2f}{_range(found.above_low, found.above_high)} above "
         told += ", ".join(f"{other.what} {other.exponent:.2f}" for other in found.others[:1])
-    if found.answer is GrowthAnswer.cannot_tell:
+    if found.answer is GrowthAnswer.inconclusive:
         few = ours.low is None
         why = f"{ours.rounds} rounds are too few" if few else f"not after {ours.rounds} rounds"
-        told += f"; whether that is too steep cannot be told ({why})"
+        told += f"; inconclusive ({why})"
     return told
 
 

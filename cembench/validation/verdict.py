@@ -83,8 +83,8 @@ def sentence(validation: Validation) -> str:
             if against.solve_time:
                 told += f", in the solve time of the external program ({against.solve_time})"
             parts.append(told)
-    if validation.growth is not None and validation.growth.answer is GrowthAnswer.cannot_tell:
-        parts.append("whether its seconds grow too steeply cannot be told")
+    if validation.growth is not None and validation.growth.answer is GrowthAnswer.inconclusive:
+        parts.append("the growth of its seconds is inconclusive")
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
     if validation.no_map_on:
