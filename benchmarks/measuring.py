@@ -56,9 +56,9 @@ def in_fresh_process(
     The numerical libraries have so many threads, and the environment is that of timed processes,
     `without` some of its variables.
     """
-    words = [function.__module__, function.__qualname__, json.dumps(arguments)]
+    arguments_of_process = [function.__module__, function.__qualname__, json.dumps(arguments)]
     environment = {k: v for k, v in for_measuring(threads).items() if k not in without}
-    command = [sys.executable, "-m", "benchmarks.measuring", *words]
+    command = [sys.executable, "-m", "benchmarks.measuring", *arguments_of_process]
     run = subprocess.run(command, capture_output=True, text=True, env=environment)
     if run.returncode:
         raise SystemExit(run.stderr)

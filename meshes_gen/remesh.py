@@ -173,7 +173,7 @@ def cut(
     g[np.abs(g) < 1e-3 * spacing] = 0.0
     sign = np.sign(g).astype(int)
     s = sign[F]
-    kept = [F[(s >= 0).all(axis=1) & (s > 0).any(axis=1)]]
+    pieces = [F[(s >= 0).all(axis=1) & (s > 0).any(axis=1)]]
     mixed = F[(s > 0).any(axis=1) & (s < 0).any(axis=1)]
     s = sign[mixed]
     edges = edges_of(mixed, len(V))
@@ -202,8 +202,8 @@ def cut(
             ),
         ):
             k = (sa == pattern[0]) & (sb == pattern[1]) & (sd == pattern[2])
-            kept += [np.stack(corners, axis=1) for corners in triangles(a[k], b[k], d[k])]
-    V, F = compact(np.concatenate([V, new]), np.concatenate(kept))
+            pieces += [np.stack(corners, axis=1) for corners in triangles(a[k], b[k], d[k])]
+    V, F = compact(np.concatenate([V, new]), np.concatenate(pieces))
     return largest_piece(V, F)
 
 

@@ -184,11 +184,11 @@ def arrays_of(
     for name in members:
         declared_array(archive, name)
     check_room(" and ".join(members), sum(m.file_size for m in members.values()), copies)
-    found: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     for name, member in members.items():
         with archive.open(member) as file:
-            found[name] = npy.read_array(file, allow_pickle=False)
-    return found
+            arrays[name] = npy.read_array(file, allow_pickle=False)
+    return arrays
 
 
 def declared_array(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
@@ -242,12 +242,12 @@ def files_in(folder: Path, pattern: str, root: Path | None = None) -> list[Path]
     try:
         if root is not None:
             check_no_link(folder, root)
-        found = [path for path in folder.iterdir() if fnmatch(path.name, pattern)]
+        files = [path for path in folder.iterdir() if fnmatch(path.name, pattern)]
     except FileNotFoundError:
         return []
     except _REFUSED as error:
         raise unreadable(folder, error) from error
-    return sorted(found)
+    return sorted(files)
 
 
 def is_there(path: Path) -> bool:

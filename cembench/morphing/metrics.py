@@ -34,7 +34,7 @@ def registration_metrics(
     registration: Registration,
     carried: Real,
     F: Ints,
-    here: Ints,
+    landmarks: Ints,
     there: Ints,
 ) -> dict[str, Any]:
     """Return the metrics of a registration map and of the carried surface.
@@ -49,7 +49,7 @@ def registration_metrics(
         The first surface's vertices, carried onto the target.
     F : int64 (m, 3)
         The first surface's triangles.
-    here, there : int64 (k,)
+    landmarks, there : int64 (k,)
         The landmarks on the first surface and on the target.
 
     Returns
@@ -63,12 +63,12 @@ def registration_metrics(
 
     """
     stretch = dilatations(target, registration.uv)
-    apart = np.linalg.norm(carried[here] - target.V[there], axis=1)
+    apart = np.linalg.norm(carried[landmarks] - target.V[there], axis=1)
     edge = mean_edge(target)
     there_and_back = distances(carried, F, target), distances_back(target, carried, F)
     figures: dict[str, Any] = {
-        "landmark_error_share": float(apart.max() / size_of(target.V)) if len(here) else None,
-        "landmark_error_disk": registration.landmark_error if len(here) else None,
+        "landmark_error_share": float(apart.max() / size_of(target.V)) if len(landmarks) else None,
+        "landmark_error_disk": registration.landmark_error if len(landmarks) else None,
         "lambdas": list(registration.lambdas),
         "dirichlet_energy": dirichlet_energy(target, registration.uv),
         "dilatation_mean": float(stretch.mean()),

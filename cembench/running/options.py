@@ -46,6 +46,6 @@ class Options:
     #: Number of checks that run in parallel, sharing the memory. Timed processes run alone.
     jobs: int = 1
 
-    def measures_again(self, kept: Record) -> bool:
+    def measures_again(self, record: Record) -> bool:
         """Whether a cell with this record is measured again."""
-        return self.fresh or (self.rerun_failed and kept.outcome.status != "ok")
+        return self.fresh or (self.rerun_failed and record.outcome.status != "ok")

@@ -65,14 +65,14 @@ def _main(plugin: str, answer: Path, parent: int) -> None:
     die_with_parent(parent)
     try:
         declared_by(plugin)
-        told = _LOADED
+        content = _LOADED
     except RegistryError as error:
-        told = str(error).encode(errors="replace")
+        content = str(error).encode(errors="replace")
     except BaseException as error:  # only the plug-in can interrupt this process
-        told = f"plug-in {plugin!r} cannot be imported: {describe_error(error)}.".encode(
+        content = f"plug-in {plugin!r} cannot be imported: {describe_error(error)}.".encode(
             errors="replace"
         )
-    answer.write_bytes(told)
+    answer.write_bytes(content)
     os._exit(0)
 
 

@@ -162,8 +162,8 @@ def run_limited(
         code, left = _end_all(process, tree, *(("", 0) if alone else (mark, inherited)))
     with suppress(OSError), log.open("rb") as file:  # the process may have removed it
         said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
-    words = said.decode(errors="replace").strip()
-    return ProcessEnd(code, limit, seen, words, left, tuple(running))
+    output = said.decode(errors="replace").strip()
+    return ProcessEnd(code, limit, seen, output, left, tuple(running))
 
 
 def _ended_within(process: StartedProcess, seconds: float) -> bool:
@@ -269,14 +269,14 @@ def _is_running(process: psutil.Process) -> bool:
 
 def _marked(mark: str, inherited: int) -> list[psutil.Process]:
     """Return the processes with one of the marks, whatever their parent is now."""
-    found = []
+    processes = []
     for one in psutil.process_iter():
         with suppress(psutil.Error, OSError):
             if (inherited and one.rlimit(_LIMIT)[1] == inherited) or one.environ().get(
                 MARK
             ) == mark:
-                found.append(one)
-    return found
+                processes.append(one)
+    return processes
 
 
 def finds_all() -> bool:
