@@ -55,7 +55,7 @@ def row(surface: str, way: str, seconds: list[float]) -> dict[str, Any]:
 
 
 def measure(surface: str, calls: int) -> list[float]:
-    """Return the seconds of so many calls of CEM in this process."""
+    """Return the seconds of several calls of CEM in this process."""
     from cembench.algorithms.cem import cem
 
     from cembench.linear_algebra.cholesky import linear_algebra

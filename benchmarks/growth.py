@@ -37,7 +37,7 @@ class Simulated:
 def simulate(
     model: str, runs: int, ours: float, reference: float, *, dearer: float = 1.0, seed: int = 0
 ) -> Simulated:
-    """Validate a solver so many times; large meshes are `dearer` on the machine by this factor."""
+    """Validate a solver `runs` times; large meshes cost more by the factor `dearer`."""
     calls = noise.MODELS[model](np.random.default_rng(seed), runs, 4 * MOST_ROUNDS)
     calls = np.random.default_rng(seed + 1).permuted(calls.reshape(runs, MOST_ROUNDS, 4), axis=2)
     logs = np.log(calls) / log(RATIO)

@@ -133,7 +133,7 @@ class NoProcess(CellTimer):
 
 
 def empty_cells(count: int) -> tuple[float, float]:
-    """Seconds to plan so many cells, and to record them with all their rounds."""
+    """Return the seconds to plan `count` cells, and to record them with all their rounds."""
     cem = load_registry().algorithm("cem")
     meshes = [spherical_cap(600 + 60 * k).renamed(f"cap-{k}") for k in range(20)]
     start = perf_counter()

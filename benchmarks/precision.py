@@ -54,7 +54,7 @@ def looks(most: int) -> list[int]:
 def simulate(
     model: str, runs: int, precision: float, most: int = USUAL_MOST_ROUNDS, seed: int = 0
 ) -> Simulated:
-    """Measure so many pairs of algorithms of one cost until they are precise, or `most` rounds."""
+    """Measure pairs of algorithms of equal cost until they are precise, or `most` rounds."""
     seconds = np.log(noise.pairs(model, np.random.default_rng(seed), runs, most))
     rounds = np.zeros(runs, dtype=np.int64)
     wrong, ever, precise = (np.zeros(runs, dtype=bool) for _ in range(3))
@@ -72,7 +72,7 @@ def simulate(
 
 
 def family_error(model: str, runs: int, rng: np.random.Generator, comparisons: int = 100) -> float:
-    """Return at most how often a table of so many equal algorithms has a wrong verdict.
+    """Return an upper bound on how often a table of equal algorithms has a wrong verdict.
 
     That is the chance that one of them passes Holm's first step at any look, times their number.
     """

@@ -37,7 +37,7 @@ VARIANTS: tuple[dict[str, float], ...] = (
     {"tolerance": 1e-7},
     {"tolerance": 1e-8},
 )
-#: Enough for every variant; how many were needed is what the table tells.
+#: Enough for every variant; the table has the number needed.
 MOST_STEPS = 2000
 LAYOUT = """
 | first dt | growth | stop | steps | factorisations | over CEM's | right-hand sides over CEM's \

@@ -34,7 +34,7 @@ PAGE, FIGURE, PAIRS = (f"docs/registration.{suffix}" for suffix in ("md", "png",
 #: Triangles of the first and of the second face of a pair.
 FACES = (8_000, 9_000)
 COUNTS = (0, 3, 6, 20)
-#: An error is kept with so many digits behind the point.
+#: Number of decimals of an error.
 DIGITS = 4
 KINDS = {
     "identity": "other people",
@@ -43,7 +43,7 @@ KINDS = {
 }
 #: The methods. "fitted" is the Moebius map that meets the landmarks best, where the paper's takes
 #: the first landmark to the centre and turns; "oracle" is fitted to the true correspondence of all
-#: vertices of the face, which nobody knows. "floor" is the face on itself.
+#: vertices of the face, which is unknown in practice. "floor" is the face on itself.
 PLAIN, FITTED, PAPER, ORACLE, FLOOR = "Moebius", "Moebius, fitted", "(34)", "oracle", "floor"
 TITLES = {
     PLAIN: "Moebius, as the paper aligns",

@@ -46,7 +46,7 @@ M = TypeVar("M", bound=TriangleMesh)
 #: Largest count that is remeshed directly; above it, meshes are subdivided.
 BASE = 110_000
 
-#: One in so many triangles of a first mesh, all oriented alike, shows whether that is outwards.
+#: Every how manyth triangle of a first mesh, all oriented alike, is tested for facing outwards.
 ORIENTED_BY = 16
 
 #: Share of the interior edges that `delaunay=False` makes non-Delaunay.

@@ -429,7 +429,7 @@ def benchmark(
     from cembench.results.records import REFERENCE
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
-    from cembench.running.external.present import missing
+    from cembench.running.external.installed import missing
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 

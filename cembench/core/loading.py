@@ -175,7 +175,7 @@ def read_arrays(
 def arrays_of(
     archive: zipfile.ZipFile, names: Iterable[str], copies: int = 1
 ) -> dict[str, NDArray[Any]]:
-    """Return arrays of an archive, of which memory must be able to hold so many `copies`.
+    """Return arrays of an archive; memory must be able to hold `copies` copies of them.
 
     Nothing is unpacked before all sizes are known. Raises ValueError, :class:`TooLargeError` among
     them, or what the library raises on damaged bytes.
@@ -215,7 +215,7 @@ class TooLargeError(ValueError):
 
 
 def check_room(what: str, size: int, copies: int = 1) -> None:
-    """Raise :class:`TooLargeError` if memory cannot hold so many copies of `size` bytes."""
+    """Raise :class:`TooLargeError` if memory cannot hold this number of copies of `size` bytes."""
     if copies * size > free_memory():
         times = f" {copies} times, as reading and checking need" if copies > 1 else ""
         raise TooLargeError(

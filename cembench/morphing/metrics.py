@@ -89,12 +89,12 @@ def registration_metrics(
 
 def distances(carried: Real, F: Ints, target: DiskMesh) -> Real:
     """Return the distances of points on the carried surface from the target."""
-    return _to_surface(_samples(carried, F), target.V, target.F)
+    return distances_to(_samples(carried, F), target.V, target.F)
 
 
 def distances_back(target: DiskMesh, carried: Real, F: Ints) -> Real:
     """Return the distances of points on the target from the carried surface."""
-    return _to_surface(_samples(target.V, target.F), carried, F)
+    return distances_to(_samples(target.V, target.F), carried, F)
 
 
 def _samples(V: Real, F: Ints) -> Real:
@@ -108,7 +108,8 @@ def _samples(V: Real, F: Ints) -> Real:
     return np.vstack([V, p[face] + u * (q - p)[face] + v * (r - p)[face]])
 
 
-def _to_surface(points: Real, V: Real, F: Ints) -> Real:
+def distances_to(points: Real, V: Real, F: Ints) -> Real:
+    """Return the distances (p,) of points (p, 3) from the surface of V (n, 3) and F (m, 3)."""
     import igl  # slow to load
 
     squared, _, _ = igl.point_mesh_squared_distance(points, np.ascontiguousarray(V), F)

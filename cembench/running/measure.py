@@ -40,7 +40,7 @@ from cembench.results.records import (
     not_ok,
 )
 from cembench.running.external.call import ProgramCalls
-from cembench.running.external.present import library_version, missing
+from cembench.running.external.installed import library_version, missing
 from cembench.running.map_checks import judged_check
 from cembench.running.map_promises import Promise
 from cembench.running.memory import Memory, memory_of_call
@@ -183,7 +183,7 @@ def check_cell(
 
 @contextmanager
 def _raised_by_signals() -> Iterator[list[BaseException]]:
-    """Yield a list of what handlers of signals raise, which is no fault of the algorithm's."""
+    """Yield a list of the exceptions raised by signal handlers, not by the algorithm."""
     raised: list[BaseException] = []
     handlers: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():  # where signals arrive

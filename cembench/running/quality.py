@@ -36,11 +36,11 @@ Complex = NDArray[np.complex128]
 FAR = 2.0
 #: Below this mean angle error, in degrees, none is, so a large smooth surface needs no yardstick.
 CLOSE = 0.1
-#: So is a map above this share of the mean angle error of collapsed triangles, or above so many
-#: degrees; the yardstick may be as bad there.
+#: So is a map above this share of the mean angle error of collapsed triangles, or above this number
+#: of degrees; the yardstick may be as bad there.
 COLLAPSED, POOR = 0.25, 10.0
-#: Above so many degrees a map is also compared with a free boundary, and is far from conformal
-#: above this multiple of its mean angle error; not on larger surfaces, to spare their memory.
+#: Above this number of degrees a map is also compared with a free boundary, and is far from
+#: conformal above this multiple of its mean angle error; not on larger surfaces, to save memory.
 COMPARED, FAR_FROM_FREE, MOST_TRIANGLES = 5.0, 4.0, 1_000_000
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.

@@ -22,7 +22,7 @@ from pathlib import Path
 
 from cembench.core.errors import RegistryError
 from cembench.registry import Algorithm
-from cembench.running.external.present import program_sources
+from cembench.running.external.installed import program_sources
 
 #: Functions that import a module by name.
 _IMPORTERS = ("import_module", "__import__")

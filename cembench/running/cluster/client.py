@@ -35,7 +35,7 @@ from cembench.running.plan import Task
 from cembench.running.recorder import Recorder, now, record_of, recording
 from cembench.running.watcher import Step, Watcher
 
-#: A unit that ended so many workers is recorded as failed.
+#: Number of lost workers after which a unit is recorded as failed.
 MOST_LOST = 2
 #: Seconds between two looks at the connected workers.
 LOOK_EVERY = 1.0

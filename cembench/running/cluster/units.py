@@ -46,7 +46,7 @@ class Unit(BaseModel):
     def key(self) -> str:
         """Hash of the measured content and the run; settings such as the budget are excluded.
 
-        So a worker resumes an unfinished unit of a run that goes on with another budget, or with
+        So a worker resumes an unfinished unit if the run continues with another budget, or with
         more machines to share it.
         """
         content = self.model_dump_json(include={"token", "cells", "mesh_type"})

@@ -148,7 +148,7 @@ class Forwarder(Watcher):
 
 @contextmanager
 def _cancelling(cancelled: threading.Event, is_wanted: Callable[[], bool]) -> Iterator[None]:
-    """Set the event as soon as nobody waits for the unit that is measured in this block."""
+    """Set the event as soon as the client cancels the unit that is measured in this block."""
     ended = threading.Event()
 
     def look() -> None:

@@ -35,7 +35,7 @@ from cembench.running.external.exchange import (
     read_output,
     write_input,
 )
-from cembench.running.external.present import missing
+from cembench.running.external.installed import missing
 from cembench.running.sanitized_result import Returned
 
 #: Phase name for the wall clock of a program.
