@@ -77,10 +77,10 @@ def aa(
     Runs the harness several times with four algorithms and a twin of each (the same function under
     another name, ``twins.py``) on five small surfaces: ten runs are 200 comparisons, of which at
     most 5 % may be called different. Also reports how often two runs agree: whether the intervals
-    of CEM's speedups in two runs overlap. Stopped, it goes on where it was when called again::
+    of CEM's speedups in two runs overlap. A stopped study is resumed by the same call::
 
         python -m benchmarks aa                      # a machine with nothing else to do
-        python -m benchmarks aa --busy 1             # beside so many processes that never rest
+        python -m benchmarks aa --busy 1             # beside one process that never rests
         python -m benchmarks aa --pairing process    # rounds with a shared process too
         python -m benchmarks aa --pairing shared --faces 500    # these alone: quicker
         python -m benchmarks aa --profile quick --runs 2 --budget 4m --output results/aa-quick
@@ -145,7 +145,7 @@ def shared_run(
 
 @contextmanager
 def neighbours(number: int) -> Iterator[None]:
-    """Keep so many processes at work meanwhile."""
+    """Keep `number` processes busy during the block."""
     loop = [sys.executable, "-c", "while True: pass"]
     started = [subprocess.Popen(loop) for _ in range(number)]
     try:
@@ -265,4 +265,4 @@ def section(output: Path) -> Section:
         for f in rows
         if f.get("speedups_compared")
     ]
-    return Section([Table(rows, LAYOUT), note, *shared, *repeated], "docs/measuring.md")
+    return Section([Table(rows, LAYOUT), note, *shared, *repeated], "docs/measuring_details.md")

@@ -40,7 +40,7 @@ def allocator(
         rows += [row(surface, way, [pair[way] for pair in pairs]) for way in WAYS]
     how = f"CEM, {processes} processes of each kind in turns, {calls} calls in each. "
     how += "A number is a spherical cap of so many triangles."
-    return Section([Table(rows, LAYOUT), how], "docs/measuring.md")
+    return Section([Table(rows, LAYOUT), how], "docs/measuring_details.md")
 
 
 def row(surface: str, way: str, seconds: list[float]) -> dict[str, Any]:
@@ -55,7 +55,7 @@ def row(surface: str, way: str, seconds: list[float]) -> dict[str, Any]:
 
 
 def measure(surface: str, calls: int) -> list[float]:
-    """Return the seconds of so many calls of CEM in this process."""
+    """Return the seconds of several calls of CEM in this process."""
     from cembench.algorithms.cem import cem
 
     from cembench.linear_algebra.cholesky import linear_algebra

@@ -30,13 +30,13 @@ def best_maps(folders: Sequence[str], *, largest: int = 20_000) -> Section:
     Disks of more than `largest` vertices and flat ones are left out. The mean of the ratios is
     geometric, of valid maps; seconds are medians of ratios of single calls.
     """
-    found = []
+    maps = []
     for path in progress(sorted(chain(*(map(str, Path(f).iterdir()) for f in folders)))):
         if (mesh := _disk(path, largest)) is not None:
-            found.append({name: _map(mesh, name) for name in NAMES})
-    others = [{n: e for n, (e, _) in row.items() if n != "best" and e is not None} for row in found]
+            maps.append({name: _map(mesh, name) for name in NAMES})
+    others = [{n: e for n, (e, _) in row.items() if n != "best" and e is not None} for row in maps]
     bests = [min(row.values(), default=0.0) for row in others]
-    held = [(row, best) for row, best in zip(found, bests, strict=True) if best > FLAT]
+    held = [(row, best) for row, best in zip(maps, bests, strict=True) if best > FLAT]
     rows = [_row(name, held) for name in NAMES]
     return Section([Table(rows, LAYOUT), f"{len(held)} disks."], "docs/maps.md")
 

@@ -33,7 +33,7 @@ def cluster_cost(*, cells: int = 2000) -> Section:
     """Measure what a cell costs on a cluster, in CPU seconds.
 
     Cells of algorithms that are never called go through two workers of this machine, and through
-    the local runner. CPU seconds of all processes that take part hang on what else the machine does
+    the local runner. CPU seconds of all processes that take part depend on the machine's other work
     much less than the clock. A unit is a sitting of its own, so its rounds have their own reference
     kernel; the local runner has one for the rounds of all cells. What that makes is given too.
     """

@@ -22,6 +22,8 @@ from cembench.running.map_promises import faults
 #: Two of a kind are measured once.
 LEFT_OUT = ("chinese_lion.mat",)
 FOLDERS = (".", "stress")
+#: The figure whose tables stand on the page of the algorithms.
+FIRST = "mean"
 #: The tables of each target: figure and heading; E_C of disks in one gauge.
 TABLES = {
     "disk": {
@@ -39,7 +41,7 @@ TABLES = {
 }
 
 
-def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9) -> Section:
+def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9) -> list[Section]:
     """Call every algorithm for disks once on the meshes of a folder.
 
     For what a map is: its status and figures. `stress` in the folder is read too. With --results,
@@ -60,7 +62,11 @@ def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9)
                 row["maps"][spec.name] = figures(spec, mesh)
                 if results:
                     write_text(results, json.dumps(measured, indent=1))
-    return Section(list(tables(measured, algorithms())), "docs/algorithms.md")
+    by_page: dict[str, list[Table | str]] = {"docs/algorithms.md": [], "docs/field.md": []}
+    for figure, heading, table in tables(measured, algorithms()):
+        page = "docs/algorithms.md" if figure == FIRST else "docs/field.md"
+        by_page[page] += [heading, table]
+    return [Section(parts, page) for page, parts in by_page.items()]
 
 
 def algorithms() -> list[Algorithm]:
@@ -102,8 +108,8 @@ def figures(spec: Algorithm, mesh: DiskMesh) -> dict[str, Any]:
     return row
 
 
-def tables(measured: dict[str, Any], known: list[Algorithm]) -> Iterator[Table | str]:
-    """Yield what compares between methods, of both targets."""
+def tables(measured: dict[str, Any], known: list[Algorithm]) -> Iterator[tuple[str, str, Table]]:
+    """Yield what compares between methods, of both targets: figure, heading and table."""
     ordered = sorted(measured.items(), key=lambda item: item[1]["triangles"])
     for target, headings in TABLES.items():
         names = [spec.name for spec in known if spec.target == target]
@@ -112,15 +118,12 @@ def tables(measured: dict[str, Any], known: list[Algorithm]) -> Iterator[Table |
         )
         layout += f"| {{surface}} | {{triangles:,}} | {' | '.join(f'{{{one}}}' for one in names)} |"
         for figure, heading in headings.items():
-            yield heading
-            yield Table(
-                [
-                    {"surface": surface, "triangles": row["triangles"]}
-                    | {name: cell(row["maps"].get(name, {}), figure) for name in names}
-                    for surface, row in ordered
-                ],
-                layout,
-            )
+            rows = [
+                {"surface": surface, "triangles": row["triangles"]}
+                | {name: cell(row["maps"].get(name, {}), figure) for name in names}
+                for surface, row in ordered
+            ]
+            yield figure, heading, Table(rows, layout)
 
 
 def cell(one: dict[str, Any], figure: str) -> str:

@@ -37,7 +37,7 @@ class Simulated:
 def simulate(
     model: str, runs: int, ours: float, reference: float, *, dearer: float = 1.0, seed: int = 0
 ) -> Simulated:
-    """Validate a solver so many times; large meshes are `dearer` on the machine by this factor."""
+    """Validate a solver `runs` times; large meshes cost more by the factor `dearer`."""
     calls = noise.MODELS[model](np.random.default_rng(seed), runs, 4 * MOST_ROUNDS)
     calls = np.random.default_rng(seed + 1).permuted(calls.reshape(runs, MOST_ROUNDS, 4), axis=2)
     logs = np.log(calls) / log(RATIO)
@@ -49,7 +49,7 @@ def simulate(
     for exponents, differences in zip(own.tolist(), above.tolist(), strict=True):
         for n in (look for look in LOOKS if look <= MOST_ROUNDS):
             answer = answer_of(exponents[:n], differences[:n])
-            if answer is not GrowthAnswer.cannot_tell:
+            if answer is not GrowthAnswer.inconclusive:
                 break
         answers[answer] += 1
         rounds += n
@@ -75,6 +75,6 @@ def growth(*, runs: int = 1000) -> Section:
             shares = [one.share(answer) for one in answers]
             row[name] = dict(zip(heads, shares, strict=True))
         rows.append(row)
-    note = f"*too steep* / *fine* of {runs:,} simulated validations; the rest cannot be told. "
+    note = f"*too steep* / *fine* of {runs:,} simulated validations; the rest are inconclusive. "
     note += f"The reference grows like faces^{REFERENCE:g}, in the last column like faces."
-    return Section([Table(rows, layout), note], "docs/measuring.md")
+    return Section([Table(rows, layout), note], "docs/measuring_details.md")

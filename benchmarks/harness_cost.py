@@ -89,11 +89,11 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
         starting = CellTimer(Path(folder), Options(), forks=False)
 
         def by(timer: CellTimer) -> float:
-            found = timer.time(task, Checked())
+            measured = timer.time(task, Checked())
             timer.close()  # as in a run: another server each round
-            if isinstance(found, Outcome):
-                sys.exit(found.cause)
-            return found.seconds
+            if isinstance(measured, Outcome):
+                sys.exit(measured.cause)
+            return measured.seconds
 
         def bare() -> float:
             command = [sys.executable, "-c", BARE, str(faces)]
@@ -106,10 +106,10 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
             "fresh": lambda: by(starting),
         }
         for k in range(most_rounds):
-            found = {way: ways[way]() for way in shuffled.sample(list(ways), len(ways))}
-            ratios["reported / bare"].append(found["forked"] / found["bare"])
-            ratios["forked / fresh"].append(found["forked"] / found["fresh"])
-            print(f"round {k + 1}: {found}", file=sys.stderr)
+            measured = {way: ways[way]() for way in shuffled.sample(list(ways), len(ways))}
+            ratios["reported / bare"].append(measured["forked"] / measured["bare"])
+            ratios["forked / fresh"].append(measured["forked"] / measured["fresh"])
+            print(f"round {k + 1}: {measured}", file=sys.stderr)
             if k + 1 >= FEWEST_ROUNDS and all(map(is_narrow, ratios.values())):
                 break
     return ratios
@@ -117,9 +117,9 @@ def measure_ratios(faces: int, most_rounds: int) -> dict[str, list[float]]:
 
 def is_narrow(ratios: list[float]) -> bool:
     """Is the interval of the median within :data:`NARROW` of it?"""
-    found = compare_ratios(ratios)
-    i = found.interval
-    return i is not None and i.high - i.low < 2 * NARROW * found.ratio
+    comparison = compare_ratios(ratios)
+    i = comparison.interval
+    return i is not None and i.high - i.low < 2 * NARROW * comparison.ratio
 
 
 class NoProcess(CellTimer):
@@ -133,7 +133,7 @@ class NoProcess(CellTimer):
 
 
 def empty_cells(count: int) -> tuple[float, float]:
-    """Seconds to plan so many cells, and to record them with all their rounds."""
+    """Return the seconds to plan `count` cells, and to record them with all their rounds."""
     cem = load_registry().algorithm("cem")
     meshes = [spherical_cap(600 + 60 * k).renamed(f"cap-{k}") for k in range(20)]
     start = perf_counter()

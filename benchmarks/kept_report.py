@@ -30,9 +30,9 @@ def short_records(text: str) -> str:
     """Return records in CSV without the columns that are left out."""
     csv.field_size_limit(2**31 - 1)
     rows = list(csv.DictReader(io.StringIO(text)))
-    kept = [name for name in rows[0] if name not in LEFT_OUT]
+    columns = [name for name in rows[0] if name not in LEFT_OUT]
     lines = io.StringIO()
-    writer = csv.DictWriter(lines, kept, extrasaction="ignore", lineterminator="\n")
+    writer = csv.DictWriter(lines, columns, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return lines.getvalue()

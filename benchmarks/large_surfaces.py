@@ -40,7 +40,7 @@ def large_surfaces(
                  for way in ways} for _ in range(rounds)]  # fmt: skip
         rows += [row(surface, *way, [one[way] for one in runs]) for way in ways]
     how = f"Medians of {rounds} processes with one call of `{algorithm}`."
-    return Section([Table(rows, LAYOUT), how], "docs/algorithms.md")
+    return Section([Table(rows, LAYOUT), how], "docs/speed.md")
 
 
 def row(surface: str, backend: str, threads: int, runs: list[dict[str, Any]]) -> dict[str, Any]:

@@ -29,7 +29,7 @@ LAYOUT = """
 def last_resort(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
     """Count the disks that end in a valid map by each tool, and what that cost in angles.
 
-    Every surface below the folders that is a disk of at most so many triangles is mapped once.
+    Every surface below the folders that is a disk of at most `faces` triangles is mapped once.
     """
     disks = list(disks_below(folders, faces))
     outcomes = [[outcome(mesh, name) for name in TOOLS] for mesh in progress(disks)]
@@ -43,7 +43,7 @@ def last_resort(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
 
 
 def disks_below(folders: Sequence[Path], faces: int) -> Iterator[DiskMesh]:
-    """Give the disks in these folders that have no more than so many triangles."""
+    """Yield the disks in these folders with at most `faces` triangles."""
     for path in sorted(p for folder in folders for p in folder.rglob("*") if p.suffix in SUFFIXES):
         try:
             mesh = read_mesh(path, DiskMesh)

@@ -72,7 +72,7 @@ def limit(
     """
     rows = [in_fresh_process(measure, one, rounds, clock) for one in progress(surfaces)]
     how = f"Medians of {rounds} rounds, {CLOCKS[clock]}, one thread."
-    return Section([*tables(rows), how], "docs/algorithms.md")
+    return Section([*tables(rows), how], "docs/speed.md")
 
 
 def tables(rows: list[dict[str, Any]]) -> list[Table | str]:

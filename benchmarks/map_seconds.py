@@ -51,20 +51,20 @@ def _row(faces: int, rounds: int, folder: Path) -> dict[str, float]:
 
 
 def _round(mesh: cembench.TriangleMesh, faces: int, folder: Path) -> dict[str, float]:
-    found = {
+    seconds = {
         form: _seconds("map", f"{folder}/{faces}.{form}", "-o", f"{folder}/uv.{form}", "--force")
         for form in ("obj", "ply")
     }
     for check in ("full", "fast"):
         start = perf_counter()
         result = cembench.parameterize(mesh.fresh(), check=check)
-        found[check] = perf_counter() - start
-        found["call"] = result.seconds or 0.0
-    return found
+        seconds[check] = perf_counter() - start
+        seconds["call"] = result.seconds or 0.0
+    return seconds
 
 
-def _seconds(*words: str) -> float:
+def _seconds(*arguments: str) -> float:
     start = perf_counter()
-    command = [sys.executable, "-m", "cembench", *words]
+    command = [sys.executable, "-m", "cembench", *arguments]
     subprocess.run(command, check=True, capture_output=True)
     return perf_counter() - start

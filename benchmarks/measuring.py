@@ -24,9 +24,9 @@ T = TypeVar("T")
 
 
 def read_surface(name: str) -> Any:
-    """Read ``FILE``, or ``FILE@SPLITS`` with every triangle split into four so many times.
+    """Read ``FILE``, or ``FILE@SPLITS`` with every triangle split into four SPLITS times.
 
-    A number is a spherical cap with so many triangles.
+    A number is a spherical cap with that number of triangles.
     """
     import igl
     import numpy as np
@@ -53,12 +53,12 @@ def in_fresh_process(
 ) -> Any:
     """Return what a study's function returns in a process of its own; all of it is JSON.
 
-    The numerical libraries have so many threads, and the environment is that of timed processes,
+    The numerical libraries have `threads` threads, and the environment is that of timed processes,
     `without` some of its variables.
     """
-    words = [function.__module__, function.__qualname__, json.dumps(arguments)]
+    arguments_of_process = [function.__module__, function.__qualname__, json.dumps(arguments)]
     environment = {k: v for k, v in for_measuring(threads).items() if k not in without}
-    command = [sys.executable, "-m", "benchmarks.measuring", *words]
+    command = [sys.executable, "-m", "benchmarks.measuring", *arguments_of_process]
     run = subprocess.run(command, capture_output=True, text=True, env=environment)
     if run.returncode:
         raise SystemExit(run.stderr)
@@ -76,7 +76,7 @@ def in_turns(
 ) -> dict[str, list[Timing]]:
     """Time every call once a round, after rounds to warm up.
 
-    Rounds go on until `at_least` seconds have gone, but no more than `at_most` of them are added.
+    Rounds continue until `at_least` seconds have passed, but at most `at_most` are added.
     """
     from cembench.core.clock import measure
 

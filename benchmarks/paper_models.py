@@ -48,34 +48,34 @@ class Cells:
         return f"{self.energy:.4f}", f"{self.mean:.2f}", f"{self.sd:.2f}"
 
 
-def cells(mesh: DiskMesh, found: Parameterization) -> Cells:
+def cells(mesh: DiskMesh, result: Parameterization) -> Cells:
     """Return the figures of a map."""
-    metrics = all_metrics(mesh, found.uv)
+    metrics = all_metrics(mesh, result.uv)
     return Cells(
         metrics["conformal_energy"],
         metrics["angle_error_mean_deg"],
         metrics["angle_error_sd_deg"],
-        found.iterations,
+        result.iterations,
         metrics["flipped_triangles"],
     )
 
 
 def models(folder: Path) -> dict[str, DiskMesh]:
     """Return the paper's models among the files of a folder, in the paper's order."""
-    registry, found = load_registry(), {}
+    registry, meshes = load_registry(), {}
     for path in sorted(filter(is_named_like_a_mesh, folder.iterdir())):
         try:
             mesh = read_mesh(path)
         except MeshError:
             continue  # not a disk, and every model is one
         if row := paper_role_of(registry, mesh).paper_row:
-            found[row] = mesh
+            meshes[row] = mesh
     rows = {dataset.paper_row for dataset in registry.datasets.values() if dataset.paper_row}
-    if missing := rows - found.keys():
+    if missing := rows - meshes.keys():
         raise SystemExit(
             f"{folder} lacks {', '.join(sorted(missing))}: cembench fetch --group paper"
         )
-    return {row: found[row] for row in CEM_PAPER.models if row in found}
+    return {row: meshes[row] for row in CEM_PAPER.models if row in meshes}
 
 
 def printed(model: str, algorithm: str) -> tuple[str, str, str]:
@@ -230,7 +230,7 @@ def ranges(folder: Path) -> Iterator[dict[str, Any]]:
 
 def nefertiti(mesh: DiskMesh) -> str:
     """Return what the choices on Nefertiti say of the printed cell of LDM."""
-    found = ldm_choices(mesh)
+    choices = ldm_choices(mesh)
     said = printed("Nefertiti", "ldm")
     lowest = int(np.argmin(mesh.boundary))
     first, mirrored = (
@@ -239,12 +239,12 @@ def nefertiti(mesh: DiskMesh) -> str:
     )
     spans = [
         f"{min(one.energy for one in half):.4f} to {max(one.energy for one in half):.4f}"
-        for half in (found[: len(found) // 2], found[len(found) // 2 :])
+        for half in (choices[: len(choices) // 2], choices[len(choices) // 2 :])
     ]
-    near = [one for one in found if one.shown()[1:] == said[1:]]
+    near = [one for one in choices if one.shown()[1:] == said[1:]]
     energies = sorted({one.shown()[0] for one in near})
     return (
-        f"LDM on Nefertiti is printed {' '.join(said)}. Over {len(found)} choices E_C runs from "
+        f"LDM on Nefertiti is printed {' '.join(said)}. Over {len(choices)} choices E_C runs from "
         f"{spans[0]} with the triangle of the first copy, and from {spans[1]} with that of the "
         f"mirror copy; {len(near)} of them give the printed mean and SD, with E_C "
         f"{', '.join(energies)}. The lowest-numbered vertex gives {first}, or {mirrored} from the "

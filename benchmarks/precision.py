@@ -54,7 +54,7 @@ def looks(most: int) -> list[int]:
 def simulate(
     model: str, runs: int, precision: float, most: int = USUAL_MOST_ROUNDS, seed: int = 0
 ) -> Simulated:
-    """Measure so many pairs of algorithms of one cost until they are precise, or `most` rounds."""
+    """Measure pairs of algorithms of equal cost until they are precise, or `most` rounds."""
     seconds = np.log(noise.pairs(model, np.random.default_rng(seed), runs, most))
     rounds = np.zeros(runs, dtype=np.int64)
     wrong, ever, precise = (np.zeros(runs, dtype=bool) for _ in range(3))
@@ -72,7 +72,7 @@ def simulate(
 
 
 def family_error(model: str, runs: int, rng: np.random.Generator, comparisons: int = 100) -> float:
-    """Return at most how often a table of so many equal algorithms has a wrong verdict.
+    """Return an upper bound on how often a table of equal algorithms has a wrong verdict.
 
     That is the chance that one of them passes Holm's first step at any look, times their number.
     """
@@ -115,4 +115,6 @@ def precision(*, runs: int = 4000) -> Section:
         corrected.append({"noise": model, "wrong": np.mean(chunks)})
     note = f"{runs:,} simulated runs a line, at most {USUAL_MOST_ROUNDS} rounds; "
     note += f"of the second table {40 * runs:,}."
-    return Section([Table(rows, LAYOUT), Table(corrected, CORRECTED), note], "docs/measuring.md")
+    return Section(
+        [Table(rows, LAYOUT), Table(corrected, CORRECTED), note], "docs/measuring_details.md"
+    )

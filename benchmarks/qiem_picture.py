@@ -55,24 +55,24 @@ def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict
                 rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MOST_STEPS)
             ends[tolerance] = len(tried) - 1  # the first trial is the start
             if tolerance == min(TOLERANCES):
-                kept = list(tried)
+                trials = list(tried)
     finally:
         vars(rules)["_centred"] = centred
     L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
-    return list(_finished(mesh, L, _accepted(L_double, kept))), ends
+    return list(_finished(mesh, L, _accepted(L_double, trials))), ends
 
 
 def _accepted(L_double: Any, tried: list[Any]) -> Iterator[Any]:
     """Yield each trial that lowered the sphere's energy, None for the others."""
     least = math.inf
     for S in tried:
-        found = math.inf if S is None else float((S * (L_double @ S)).sum())
-        yield S if found <= least else None
-        least = min(least, found)
+        energy = math.inf if S is None else float((S * (L_double @ S)).sum())
+        yield S if energy <= least else None
+        least = min(least, energy)
 
 
-def _finished(mesh: DiskMesh, L: Any, kept: Iterator[Any]) -> Iterator[float]:
-    for S in kept:
+def _finished(mesh: DiskMesh, L: Any, accepted: Iterator[Any]) -> Iterator[float]:
+    for S in accepted:
         if S is None:
             yield math.nan
             continue

@@ -37,7 +37,7 @@ VARIANTS: tuple[dict[str, float], ...] = (
     {"tolerance": 1e-7},
     {"tolerance": 1e-8},
 )
-#: Enough for every variant; how many were needed is what the table tells.
+#: Enough for every variant; the table has the number needed.
 MOST_STEPS = 2000
 LAYOUT = """
 | first dt | growth | stop | steps | factorisations | over CEM's | right-hand sides over CEM's \
@@ -58,7 +58,7 @@ def qiem_steps(surfaces: Sequence[str] = SURFACES, *, faces: int = 3000) -> Sect
     meshes = [generate_surface(registry, name, faces) for name in surfaces]
     rows = [row(variant, meshes) for variant in progress(VARIANTS)]
     note = f"{', '.join(surfaces)}, {faces:,} triangles each; medians over them."
-    return Section([note, Table(rows, LAYOUT)], "docs/algorithms.md")
+    return Section([note, Table(rows, LAYOUT)], "docs/readings.md")
 
 
 @contextmanager

@@ -31,13 +31,13 @@ def ratios(records: Path, algorithm: str, policy: str) -> list[list[float]]:
     """
     there = [row for row in _rows(records) if row["solves"] == policy and row["status"] == "ok"]
     counts = Counter((row["algorithm"], row["parameters"]) for row in there)
-    found: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
+    rows: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in sorted(there, key=lambda row: counts[row["algorithm"], row["parameters"]]):
         if row["paper_row"] and row["seconds"]:
-            found.setdefault((row["paper_row"], row["origin"]), {})[row["algorithm"]] = row
+            rows.setdefault((row["paper_row"], row["origin"]), {})[row["algorithm"]] = row
     both = {
         model: _paired(by[algorithm], by["cem"])
-        for (model, _), by in sorted(found.items(), key=lambda one: one[0][1] == "model")
+        for (model, _), by in sorted(rows.items(), key=lambda one: one[0][1] == "model")
         if algorithm in by and "cem" in by
     }
     return list(both.values())
@@ -55,8 +55,8 @@ def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
     """Return the interval of an average in words; nothing where cells have too few rounds."""
     if not records.exists():
         return ""
-    found = rate_interval(ratios(records, algorithm, policy), AVERAGES[reading])
-    return f" ({found.low:.1f} to {found.high:.1f})" if found else ""
+    rate = rate_interval(ratios(records, algorithm, policy), AVERAGES[reading])
+    return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
 
 
 def readme_speedups(*, report: Path | None = None) -> Section:

@@ -24,12 +24,12 @@ SHARES = (10, 50, 90)
 def by_algorithm(records: Path) -> dict[str, list[dict[str, str]]]:
     """Return the rows of maps to the disk or with a free boundary, by the algorithm's title."""
     csv.field_size_limit(2**31 - 1)
-    found = defaultdict(list)
+    values = defaultdict(list)
     with records.open(encoding="utf-8", newline="") as lines:
         for row in csv.DictReader(lines):
             if row["target"] in TARGETS:
-                found[row["title"]].append(row)
-    return dict(found)
+                values[row["title"]].append(row)
+    return dict(values)
 
 
 def over_best(rows: dict[str, list[dict[str, str]]], column: str) -> dict[str, list[float]]:
@@ -56,8 +56,8 @@ def real_picture(*, report: Path = ROOT / "reports/real") -> Section:
         likely = binomtest(ok, n).proportion_ci(method="wilson")
         axes[0].plot([100 * likely.low, 100 * likely.high], [y, y], color=colour, lw=1.2)
         axes[0].plot(100 * ok / n, y, "o", color=colour, ms=5)
-        for axis, found in ((axes[1], errors), (axes[2], seconds)):
-            least, middle, most = np.percentile(found[name], SHARES)
+        for axis, figures in ((axes[1], errors), (axes[2], seconds)):
+            least, middle, most = np.percentile(figures[name], SHARES)
             axis.plot([least, most], [y, y], color=colour, lw=1.2)
             axis.plot(middle, y, "o", color=colour, ms=5)
     axes[0].set_yticks(range(len(names)), names, fontsize=8)

@@ -34,7 +34,7 @@ PAGE, FIGURE, PAIRS = (f"docs/registration.{suffix}" for suffix in ("md", "png",
 #: Triangles of the first and of the second face of a pair.
 FACES = (8_000, 9_000)
 COUNTS = (0, 3, 6, 20)
-#: An error is kept with so many digits behind the point.
+#: Number of decimals of an error.
 DIGITS = 4
 KINDS = {
     "identity": "other people",
@@ -43,7 +43,7 @@ KINDS = {
 }
 #: The methods. "fitted" is the Moebius map that meets the landmarks best, where the paper's takes
 #: the first landmark to the centre and turns; "oracle" is fitted to the true correspondence of all
-#: vertices of the face, which nobody knows. "floor" is the face on itself.
+#: vertices of the face, which is unknown in practice. "floor" is the face on itself.
 PLAIN, FITTED, PAPER, ORACLE, FLOOR = "Moebius", "Moebius, fitted", "(34)", "oracle", "floor"
 TITLES = {
     PLAIN: "Moebius, as the paper aligns",
@@ -106,10 +106,10 @@ def face(seed: int, expression: str, faces: int, algorithm: str) -> Face:
     """Return a sample with its conformal map and its landmarks."""
     mesh = ict_face(faces, seed=seed, expression=expression, part="disk")
     assert isinstance(mesh, DiskMesh)
-    found = landmarks_of(triangulation("disk", faces))
+    landmarks = landmarks_of(triangulation("disk", faces))
     z = parameterize(mesh, algorithm).z
     whole = sample(load_model(), seed, expression)
-    return Face(mesh, z, np.array(list(found.values())), whole)
+    return Face(mesh, z, np.array(list(landmarks.values())), whole)
 
 
 def errors_of_pair(
@@ -138,29 +138,29 @@ def errors_of_pair(
         at = locate(uv, other.mesh.F, other.mesh.boundary, z[seen])
         return error(at.carry(other.mesh.F, other.mesh.V))
 
-    found: dict[tuple[str, int], float] = {}
+    errors: dict[tuple[str, int], float] = {}
     stretch = _stretch(other)
     true_image = _interpolated(truth, other, other.z)
     best = fitted(first.z[seen], true_image, weights * _interpolated(truth, other, stretch))
-    found[ORACLE, 0] = carried(other.z, _applied(best, first.z))
+    errors[ORACLE, 0] = carried(other.z, _applied(best, first.z))
     if itself is not None:
-        found[FLOOR, 0] = errors_of_pair(first, itself)[PLAIN, COUNTS[-1]]
+        errors[FLOOR, 0] = errors_of_pair(first, itself)[PLAIN, COUNTS[-1]]
     for count in COUNTS:
-        here, there = first.landmarks[:count], other.landmarks[:count]
-        z = centred(first.mesh, first.z, here)
-        moved = aligned(other.mesh, other.z, there, first.mesh, z, here)
-        found[PLAIN, count] = carried(moved, z)
+        own, others = first.landmarks[:count], other.landmarks[:count]
+        z = centred(first.mesh, first.z, own)
+        moved = aligned(other.mesh, other.z, others, first.mesh, z, own)
+        errors[PLAIN, count] = carried(moved, z)
         if not count:
             continue
-        move = fitted(first.z[here], other.z[there], stretch[there])
-        found[FITTED, count] = carried(other.z, _applied(move, first.z))
+        move = fitted(first.z[own], other.z[others], stretch[others])
+        errors[FITTED, count] = carried(other.z, _applied(move, first.z))
         try:
-            check_order(list(LANDMARKS)[:count], z[here], moved[there], ("first", "other"))
-            uv = register(other.mesh, moved, there, z[here]).uv
+            check_order(list(LANDMARKS)[:count], z[own], moved[others], ("first", "other"))
+            uv = register(other.mesh, moved, others, z[own]).uv
         except (AlgorithmFailed, ParameterError):
             continue  # counted as a failure
-        found[PAPER, count] = carried(uv, z)
-    return found
+        errors[PAPER, count] = carried(uv, z)
+    return errors
 
 
 #: So many of the model's first vertices are the face without neck, skull and sockets.
@@ -215,12 +215,14 @@ def fitted(z: np.ndarray, targets: np.ndarray, weights: np.ndarray) -> Moebius:
 
 def specimens(pairs: int) -> list[tuple[str, tuple[int, str], tuple[int, str]]]:
     """Return the kind of each pair, and the seed and expression of its faces."""
-    found = []
+    chosen = []
     for k in range(pairs):
         kind = list(KINDS)[k % 3]
         other = 1_000 + k if kind != "expression" else k
-        found.append((kind, (k, "neutral"), (other, "random" if kind != "identity" else "neutral")))
-    return found
+        chosen.append(
+            (kind, (k, "neutral"), (other, "random" if kind != "identity" else "neutral"))
+        )
+    return chosen
 
 
 def measured(pairs: int, algorithm: str) -> tuple[list[Row], int]:
@@ -229,9 +231,9 @@ def measured(pairs: int, algorithm: str) -> tuple[list[Row], int]:
     for k, (kind, one, another) in enumerate(progress(specimens(pairs))):
         first, itself = (face(*one, faces, algorithm) for faces in FACES)
         other = face(*another, FACES[1], algorithm)
-        found = errors_of_pair(first, other, itself)
+        errors = errors_of_pair(first, other, itself)
         rows += [
-            Row(k, kind, method, count, found.get((method, count))) for method, count in METHODS
+            Row(k, kind, method, count, errors.get((method, count))) for method, count in METHODS
         ]
     return rows, len(load_model().identities)
 

@@ -43,7 +43,7 @@ def repeatability(
     - how often an algorithm is called faster or slower than its twin: the stated rate is at most
       5 %.
 
-    Stopped, it goes on where it was when called again. Needs a machine with nothing else to do.
+    A stopped study is resumed by the same call. It needs a machine with nothing else to do.
     """
     options = ["--surfaces", surfaces] if surfaces else ["--profile", profile]
     options += ["--repeats", str(repeats), *(["--faces", str(faces)] if faces else [])]

@@ -107,7 +107,7 @@ class _Registered:
     module: str
     file: Path | None
 
-    def arguments(self, given: Mapping[str, Any]) -> dict[str, Any]:
+    def arguments(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Return all keyword arguments of a call: given ones checked, others at their defaults.
 
         Raises
@@ -117,14 +117,14 @@ class _Registered:
 
         """
         known = {p.name: p for p in self.parameters}
-        for name in given:
+        for name in values:
             if name not in known:
                 allowed = ", ".join(known) or "none"
                 raise ParameterError(
                     f"{self.name} has no parameter {name!r}; its parameters are: {allowed}."
                 )
         return {
-            name: p.parse(given[name], self.name) if name in given else p.default
+            name: p.parse(values[name], self.name) if name in values else p.default
             for name, p in known.items()
         }
 
@@ -326,21 +326,21 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
         The declaration is invalid.
 
     """
-    given = dict(declared)
-    command, name, target = (given.pop(key, "") for key in ("command", "name", "target"))
+    settings = dict(declared)
+    command, name, target = (settings.pop(key, "") for key in ("command", "name", "target"))
     for key in ("input", "output"):  # a format may be called "obj" as well as ".obj"
-        if key in given and "." not in given[key]:
-            given[key] = f".{given[key]}"
+        if key in settings and "." not in settings[key]:
+            settings[key] = f".{settings[key]}"
     name = name or _program_name(command)
     source = command
     if command.endswith(".m") and (folder / command).is_file():
         function_file = of_matlab_function(folder / command)
         command = function_file.pop("command")
-        given = function_file | given
+        settings = function_file | settings
     place = ("cembench.registry", None)
     about = {"target": target or "disk", "source": source, "notes": ""}
     function = _TAKES.get(target, _of_disks)
-    return _program_of(function, place, name, name, about, command, folder, given)
+    return _program_of(function, place, name, name, about, command, folder, settings)
 
 
 def _of_disks(mesh: DiskMesh) -> None:
@@ -361,9 +361,9 @@ _TAKES = {"circular holes": _of_holes, "atlas": _of_any}
 
 def _program_name(command: str) -> str:
     """Return a short name for a command: its program, or the script that an interpreter runs."""
-    words = [Path(word) for word in command.split()]
-    script = next((word for word in words[1:] if word.suffix in (".py", ".m", ".sh", ".js")), None)
-    return (script or next(iter(words), Path("program"))).stem or "program"
+    parts = [Path(word) for word in command.split()]
+    script = next((word for word in parts[1:] if word.suffix in (".py", ".m", ".sh", ".js")), None)
+    return (script or next(iter(parts), Path("program"))).stem or "program"
 
 
 def _program_of(
@@ -383,8 +383,8 @@ def _program_of(
         raise RegistryError(
             f"program {name!r}: {unknown[0]!r} is unknown; allowed: {', '.join(known)}."
         )
-    given = dict(how) | {"version": found_words(how.get("version", ""), folder)}
-    program = Program(command=found_words(command, folder), **given)
+    settings = dict(how) | {"version": found_words(how.get("version", ""), folder)}
+    program = Program(command=found_words(command, folder), **settings)
     spec = _algorithm_of(function, place, name, f"{title} (external program)", about)
     program = checked_program(name, program, [p.name for p in spec.parameters])
     return replace(spec, program=program)
@@ -609,11 +609,11 @@ class Registry:
     @property
     def groups(self) -> dict[str, list[Dataset]]:
         """Return the datasets and parts of models by group, in the order of their listing."""
-        found: dict[str, list[Dataset]] = {}
+        by_group: dict[str, list[Dataset]] = {}
         for dataset in (*self.datasets.values(), *self.parts.values()):
             if dataset.group:
-                found.setdefault(dataset.group, []).append(dataset)
-        return found
+                by_group.setdefault(dataset.group, []).append(dataset)
+        return by_group
 
     def group(self, name: str) -> list[Dataset]:
         """Return the datasets of this group; :class:`RegistryError` lists the known groups."""
@@ -678,7 +678,7 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
 def _installed() -> Registry:
     """Return the registry of all entry points, each loaded when it is first asked for."""
     installed = entry_points()  # once: it reads the files of every installed package
-    found = functools.cache(functools.partial(_all_datasets, installed))
+    datasets = functools.cache(functools.partial(_all_datasets, installed))
     algorithms, peers = (
         _Declared.by_name(installed, Algorithm, group) for group in (_GROUPS[Algorithm], PEERS)
     )
@@ -686,9 +686,9 @@ def _installed() -> Registry:
     return Registry(
         algorithms,
         families,
-        _Late(lambda: {name: one for name, one in found().items() if one.part is None}),
+        _Late(lambda: {name: one for name, one in datasets().items() if one.part is None}),
         peers,
-        _Late(lambda: {name: one for name, one in found().items() if one.part is not None}),
+        _Late(lambda: {name: one for name, one in datasets().items() if one.part is not None}),
     )
 
 
@@ -904,9 +904,9 @@ def _stdout_to_stderr() -> Iterator[None]:
     with ExitStack() as back:
         with suppress(AttributeError, OSError, ValueError):  # it may be missing or closed
             sys.stdout.flush()
-            kept = os.dup(1)
-            back.callback(os.close, kept)
-            back.callback(os.dup2, kept, 1)
+            stdout = os.dup(1)
+            back.callback(os.close, stdout)
+            back.callback(os.dup2, stdout, 1)
             os.dup2(2, 1)
         with redirect_stdout(sys.stderr):
             yield

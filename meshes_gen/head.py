@@ -211,7 +211,7 @@ class Head:
     def landmarks(self) -> dict[str, NDArray[np.float64]]:
         """Return points near the surface: nose tip, corners of eyes and mouth, lips; (3,) each."""
         c, P, mouth = self._points, self.person, self._between_lips()
-        found = {
+        vertices = {
             "nose_tip": c["tip"] + (0, -0.085 * P.nose_width, 0),
             "mouth_corner_right": mouth[0],
             "mouth_corner_left": mouth[4],
@@ -221,9 +221,9 @@ class Head:
         }
         for s, side in ((-1, "right"), (1, "left")):
             eye = c[f"eye_{side}"]
-            found[f"eye_inner_{side}"] = eye + (-0.115 * s, -0.09, -0.005)
-            found[f"eye_outer_{side}"] = eye + (0.115 * s, -0.09, -0.005)
-        return found
+            vertices[f"eye_inner_{side}"] = eye + (-0.115 * s, -0.09, -0.005)
+            vertices[f"eye_outer_{side}"] = eye + (0.115 * s, -0.09, -0.005)
+        return vertices
 
 
 def with_skin(head: Field, seed: int, amplitude: float = 0.0025) -> Field:

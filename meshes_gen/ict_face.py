@@ -184,10 +184,10 @@ def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict
         order, weights = rng.permutation(len(EXPRESSIONS)), rng.random(len(EXPRESSIONS))
         there = [k for k in order.tolist() if EXPRESSIONS[k] in model.expressions]
         return {EXPRESSIONS[k]: float(weights[k]) for k in there[:MIXED]}
-    found: dict[str, float] = {}
+    by_name: dict[str, float] = {}
     for term in expression.split("+"):
-        name, _, given = term.strip().partition(":")
-        weight = _weight(given, expression) if given else 1.0
+        name, _, value = term.strip().partition(":")
+        weight = _weight(value, expression) if value else 1.0
         sides = [one for one in (name, f"{name}_L", f"{name}_R") if one in model.expressions]
         if not sides:
             known = name in EXPRESSIONS or f"{name}_L" in EXPRESSIONS
@@ -196,19 +196,19 @@ def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict
                 f"ict-face: expression {name!r} {why}; available are: neutral, random"
                 f"{''.join(f', {one}' for one in sorted(model.expressions))}."
             )
-        found |= dict.fromkeys(sides, weight)
-    return found
+        by_name |= dict.fromkeys(sides, weight)
+    return by_name
 
 
-def _weight(given: str, expression: str) -> float:
+def _weight(value: str, expression: str) -> float:
     """Return a weight between 0 and 1 from text."""
     try:
-        weight = float(given)
+        weight = float(value)
     except ValueError:
         weight = -1.0
     if not 0 <= weight <= 1:
         raise ParameterError(
-            f"ict-face: expression={expression!r}: the weight {given!r} is not a number from 0 to "
+            f"ict-face: expression={expression!r}: the weight {value!r} is not a number from 0 to "
             "1, as in jawOpen:0.5+mouthSmile:0.3."
         )
     return weight
@@ -252,6 +252,6 @@ def _decimated(V: Real, F: Ints, faces: int) -> tuple[Ints, Ints]:
     )
     made = meshes.current_mesh()
     made.compact()
-    apart, kept = scipy.spatial.KDTree(V).query(made.vertex_matrix())
+    apart, nearest = scipy.spatial.KDTree(V).query(made.vertex_matrix())
     assert apart.max() == 0, "a vertex of the decimated face is not a vertex of the model"
-    return kept.astype(np.int64), made.face_matrix().astype(np.int64)
+    return nearest.astype(np.int64), made.face_matrix().astype(np.int64)

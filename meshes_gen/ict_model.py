@@ -127,20 +127,20 @@ def _arrays(folder: Path, name: str) -> tuple[Real, Ints, Ints]:
     """Return the kept vertices, corners and sizes of a file, small or as published."""
     small = folder / f"{name}.npz"
     if small.is_file():
-        found = read_small(small)
-        if found is None:
+        arrays = read_small(small)
+        if arrays is None:
             raise DatasetError(f"{small} is damaged; delete it, and fetch the model again.")
-        return found
+        return arrays
     published = folder / f"{name}.obj"
     key = hashlib.sha256(published.read_bytes()).hexdigest()
-    kept = cache_directory() / "ict-face" / "read" / f"{key}.npz"
-    found = read_small(kept)
-    if found is None:
+    copy = cache_directory() / "ict-face" / "read" / f"{key}.npz"
+    arrays = read_small(copy)
+    if arrays is None:
         content = small_arrays(published)
         with suppress(RecordError):  # the cache cannot be written to
-            write_bytes(kept, content)
-        found = _of_bytes(content)
-    return found
+            write_bytes(copy, content)
+        arrays = _of_bytes(content)
+    return arrays
 
 
 def small_arrays(published: Path) -> bytes:

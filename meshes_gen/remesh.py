@@ -46,7 +46,7 @@ M = TypeVar("M", bound=TriangleMesh)
 #: Largest count that is remeshed directly; above it, meshes are subdivided.
 BASE = 110_000
 
-#: One in so many triangles of a first mesh, all oriented alike, shows whether that is outwards.
+#: Every how manyth triangle of a first mesh, all oriented alike, is tested for facing outwards.
 ORIENTED_BY = 16
 
 #: Share of the interior edges that `delaunay=False` makes non-Delaunay.
@@ -173,7 +173,7 @@ def cut(
     g[np.abs(g) < 1e-3 * spacing] = 0.0
     sign = np.sign(g).astype(int)
     s = sign[F]
-    kept = [F[(s >= 0).all(axis=1) & (s > 0).any(axis=1)]]
+    pieces = [F[(s >= 0).all(axis=1) & (s > 0).any(axis=1)]]
     mixed = F[(s > 0).any(axis=1) & (s < 0).any(axis=1)]
     s = sign[mixed]
     edges = edges_of(mixed, len(V))
@@ -202,8 +202,8 @@ def cut(
             ),
         ):
             k = (sa == pattern[0]) & (sb == pattern[1]) & (sd == pattern[2])
-            kept += [np.stack(corners, axis=1) for corners in triangles(a[k], b[k], d[k])]
-    V, F = compact(np.concatenate([V, new]), np.concatenate(kept))
+            pieces += [np.stack(corners, axis=1) for corners in triangles(a[k], b[k], d[k])]
+    V, F = compact(np.concatenate([V, new]), np.concatenate(pieces))
     return largest_piece(V, F)
 
 

@@ -75,8 +75,8 @@ def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
     taken = np.minimum(tree.row, tree.col) * np.int64(m + 1) + np.maximum(tree.row, tree.col)
     a, b = edges.face[free, 0], outside[free]
     left = free[~np.isin(np.minimum(a, b) * (m + 1) + np.maximum(a, b), taken)]
-    found = [_loop(before, int(i[e]), int(j[e])) for e in left]
-    return sorted((loop for loop in found if len(loop)), key=len)
+    loops = [_loop(before, int(i[e]), int(j[e])) for e in left]
+    return sorted((loop for loop in loops if len(loop)), key=len)
 
 
 def _loop(before: NDArray[np.int32], u: int, v: int) -> Faces:

@@ -50,8 +50,8 @@ def surface(name: str, faces: int) -> TriangleMesh:
 
 def algorithm_names(mesh_type: type[TriangleMesh]) -> list[str]:
     """The usual algorithms that take this kind of surface."""
-    found = load_registry().algorithms.values()
-    return sorted(a.name for a in found if a.usual and issubclass(mesh_type, a.mesh_type))
+    algorithms = load_registry().algorithms.values()
+    return sorted(a.name for a in algorithms if a.usual and issubclass(mesh_type, a.mesh_type))
 
 
 def mapping(algorithm: str, mesh: TriangleMesh) -> Callable[[], Any]:

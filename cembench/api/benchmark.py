@@ -429,7 +429,7 @@ def benchmark(
     from cembench.results.records import REFERENCE
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
-    from cembench.running.external.present import missing
+    from cembench.running.external.installed import missing
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 
@@ -507,7 +507,7 @@ def benchmark(
             for notice in mesh.notices:
                 reporter.note(f"{mesh.name}: {notice}")
     with reporter.watching(len(tasks), on_cluster=cluster is not None) as shown:
-        records = plan.measure(watcher or shown, faces=faces, same_environment=same_environment)
+        records = plan.measure(watcher or shown, same_environment=same_environment)
     return Run(folder, tuple(records), plan)
 
 

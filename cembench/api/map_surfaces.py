@@ -32,7 +32,7 @@ from cembench.mesh import datasets
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
-from cembench.running.here import map_here, may_run_here
+from cembench.running.in_this_process import map_here, may_run_here
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
 from cembench.running.surfaces import SurfaceFile

@@ -86,9 +86,7 @@ class Plan:
         """Return what the run is expected to take on this machine."""
         return planned_seconds([c for c in costs if c is not None], self.options.budget)
 
-    def measure(
-        self, watcher: Watcher | None, *, faces: int | None = None, same_environment: bool = False
-    ) -> list[Record]:
+    def measure(self, watcher: Watcher | None, *, same_environment: bool = False) -> list[Record]:
         """Measure the cells that the folder does not hold; return the records of all."""
         if self.cluster is None:
             return run_tasks(self.tasks, self.store, self.options, watcher)
@@ -104,7 +102,6 @@ class Plan:
         with where as client:
             return run_on_cluster(
                 *(self.tasks, self.store, client, self.options, watcher),
-                faces=faces,
                 same_environment=same_environment,
             )
 

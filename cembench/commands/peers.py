@@ -76,7 +76,7 @@ def peers(
     from cembench.core import folders
     from cembench.results import run_folder
     from cembench.results.record_rows import rows
-    from cembench.running.external.present import missing
+    from cembench.running.external.installed import missing
 
     run_folder.check(output)
     folders.check(output / "report", "report")

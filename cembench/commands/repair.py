@@ -79,10 +79,10 @@ def repair(
 
 def print_steps(steps: Mapping[str, int]) -> None:
     """Print how often each step of a repair was applied."""
-    from cembench.mesh.repair import TITLES, Step
+    from cembench.mesh.repair import TITLES
 
     for step, count in steps.items():
-        out.print(f"{count:>9,}  {TITLES[Step(step)]}", style="" if count else "dim")
+        out.print(f"{count:>9,}  {TITLES[step]}", style="" if count else "dim")
 
 
 #: Each command with the examples in its help.

@@ -109,7 +109,7 @@ class BorderedLaplacian:
 
     @cached_property
     def _rows_beside(self) -> NDArray[np.int64] | None:
-        """Where `beside` is in the interior; None for all of it."""
+        """Positions of `beside` in the interior; None if it is all of it."""
         if len(self.beside) == len(self.interior):
             return None
         return np.searchsorted(self.interior, self.beside)

@@ -25,11 +25,11 @@ LEAST_AGREEMENT = 0.25
 def quasi_newton_minimum(
     here: EnergyModel, *, tolerance: float, max_iterations: int
 ) -> Minimum | None:
-    """Minimise the conformal energy from `here` on, in its gauge; None if steps do not do as told.
+    """Minimise the conformal energy from `here` on, in its gauge.
 
-    Ends when E_C can decrease by at most the share `tolerance`, as :func:`minimise` does, which is
-    for the boundaries that this gives up: where a step lowers E_C by much less than predicted, an
-    arc would have to be held, or :data:`MOST_STEPS` do not suffice.
+    Ends when E_C can decrease by at most the share `tolerance`. Returns None if a step lowers E_C
+    by much less than predicted, if an arc would have to be held, or if :data:`MOST_STEPS` steps do
+    not suffice; :func:`minimise` is for these boundaries.
     """
     energies, pairs = [here.energy], list[tuple[Real, Real]]()
     while True:

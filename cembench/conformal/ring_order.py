@@ -1,4 +1,4 @@
-"""Whether the interior vertices beside the boundary are eliminated last but the boundary.
+"""Decide whether the vertices next to the boundary are eliminated just before it.
 
 CEM's energy and its boundary steps (23), (30) need a harmonic map only at these vertices N, the
 *ring*. With the order "other interior, N, boundary B" the factor ends in a dense triangle of order
@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 
-#: Real disks have 45 to 95 n log2(n) / 14 entries in a factor; on average so many n log2(n).
+#: Entries of a factor over n log2(n), on average; real disks have 45 / 14 to 95 / 14.
 ENTRIES = 4.5
-#: A dense factorisation does so many operations while a substitution of two columns passes one
+#: Operations of a dense factorisation in the time in which a substitution of two columns passes one
 #: entry of a sparse factor, which waits for memory.
 OPERATIONS_AN_ENTRY = 60
 #: What share of a factor leads from the ring and the boundary to its end, on real disks: an
@@ -34,7 +34,7 @@ def ring_pays(interior: int, ring: int, boundary: int, iterations: int) -> bool:
     interior, ring, boundary : int
         Numbers of vertices; the ring's are among the interior's.
     iterations : int
-        How many there may be; more than :data:`LIKELY_ITERATIONS` count as so many.
+        Maximum number of iterations, capped at :data:`LIKELY_ITERATIONS`.
 
     Examples
     --------

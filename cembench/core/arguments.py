@@ -69,16 +69,16 @@ class Argument:
         """The allowed values, if it is a choice."""
         return next((get_args(kind) for kind in self.kinds if get_origin(kind) is Literal), ())
 
-    def check(self, given: Any) -> None:
+    def check(self, passed: Any) -> None:
         """Raise :class:`ParameterError` if a value is not allowed; None always is."""
-        if given is None or (self.range is None and not self.choices):
+        if passed is None or (self.range is None and not self.choices):
             return
         if self.range is not None:
             integer = float not in self.kinds
             allowed = f"{'an integer' if integer else 'a number'} {self.range}"
         else:
             allowed = f"one of {', '.join(map(repr, self.choices))}"
-        for value in given if self.many and not isinstance(given, str) else (given,):
+        for value in passed if self.many and not isinstance(passed, str) else (passed,):
             if value is not None and not (value in self.choices or self._is_in_range(value)):
                 raise ParameterError.about(
                     "{given} is not allowed; write {allowed}.",
@@ -99,7 +99,7 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
     function = inspect.unwrap(function)
     meanings = _meanings(inspect.getdoc(function) or "")
     names = _Names(function.__globals__)
-    found = {}
+    arguments = {}
     for name, parameter in inspect.signature(function).parameters.items():
         annotation = parameter.annotation
         if isinstance(annotation, str):
@@ -111,8 +111,8 @@ def arguments_of(function: Callable[..., Any]) -> dict[str, Argument]:
         plain = tuple(get_args(k)[0] if get_origin(k) is Annotated else k for k in kinds)
         limits = next(iter(ranges), None)
         meaning = meanings.get(name, "")
-        found[name] = Argument(name, plain, bool(sequences), parameter.default, limits, meaning)
-    return found
+        arguments[name] = Argument(name, plain, bool(sequences), parameter.default, limits, meaning)
+    return arguments
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:

@@ -27,8 +27,6 @@ from cembench.core.names import digest
 M = TypeVar("M", bound=BaseModel)
 
 _DRAFT = re.compile(r"\.draft-([0-9a-f]{12})-(\d+)-[0-9a-f]{32}(\.\w+)?")
-#: Drafts from older versions, whose names do not hold a process.
-_OLDER_DRAFT = re.compile(r"\.draft-[0-9a-f]{32}")
 #: The bits of a file's mode that say who may read, write and execute it.
 _PERMISSIONS = 0o777
 #: Error codes of a full disk or quota: another folder on the same disk would not help.
@@ -149,15 +147,10 @@ def draft_folder(path: Path) -> Iterator[Path]:
 
 
 def clear_drafts(folder: Path, of: Path | None = None) -> None:
-    """Delete drafts in a folder whose processes have ended; only those `of` one file, if given.
-
-    Without `of` the folder must be one of ours, since older drafts are recognised by name alone.
-    """
+    """Delete drafts in a folder whose processes have ended; only those `of` one file, if given."""
     for path in folder.glob(".draft-*"):
         named = _DRAFT.fullmatch(path.name)
         if named is None:
-            if of is None and _OLDER_DRAFT.fullmatch(path.name) and path.is_file():
-                path.unlink(missing_ok=True)
             continue
         if (of is None or named[1] == digest(of.name)[:12]) and not _runs(int(named[2])):
             if path.is_dir() and not path.is_symlink():
@@ -168,7 +161,7 @@ def clear_drafts(folder: Path, of: Path | None = None) -> None:
 
 def is_draft(path: Path) -> bool:
     """Whether a path has the name of a draft."""
-    return bool(_DRAFT.fullmatch(path.name) or _OLDER_DRAFT.fullmatch(path.name))
+    return _DRAFT.fullmatch(path.name) is not None
 
 
 def unwritable(

@@ -175,7 +175,7 @@ def read_arrays(
 def arrays_of(
     archive: zipfile.ZipFile, names: Iterable[str], copies: int = 1
 ) -> dict[str, NDArray[Any]]:
-    """Return arrays of an archive, of which memory must be able to hold so many `copies`.
+    """Return arrays of an archive; memory must be able to hold `copies` copies of them.
 
     Nothing is unpacked before all sizes are known. Raises ValueError, :class:`TooLargeError` among
     them, or what the library raises on damaged bytes.
@@ -184,11 +184,11 @@ def arrays_of(
     for name in members:
         declared_array(archive, name)
     check_room(" and ".join(members), sum(m.file_size for m in members.values()), copies)
-    found: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     for name, member in members.items():
         with archive.open(member) as file:
-            found[name] = npy.read_array(file, allow_pickle=False)
-    return found
+            arrays[name] = npy.read_array(file, allow_pickle=False)
+    return arrays
 
 
 def declared_array(archive: zipfile.ZipFile, name: str) -> tuple[tuple[int, ...], np.dtype[Any]]:
@@ -215,7 +215,7 @@ class TooLargeError(ValueError):
 
 
 def check_room(what: str, size: int, copies: int = 1) -> None:
-    """Raise :class:`TooLargeError` if memory cannot hold so many copies of `size` bytes."""
+    """Raise :class:`TooLargeError` if memory cannot hold this number of copies of `size` bytes."""
     if copies * size > free_memory():
         times = f" {copies} times, as reading and checking need" if copies > 1 else ""
         raise TooLargeError(
@@ -242,12 +242,12 @@ def files_in(folder: Path, pattern: str, root: Path | None = None) -> list[Path]
     try:
         if root is not None:
             check_no_link(folder, root)
-        found = [path for path in folder.iterdir() if fnmatch(path.name, pattern)]
+        files = [path for path in folder.iterdir() if fnmatch(path.name, pattern)]
     except FileNotFoundError:
         return []
     except _REFUSED as error:
         raise unreadable(folder, error) from error
-    return sorted(found)
+    return sorted(files)
 
 
 def is_there(path: Path) -> bool:

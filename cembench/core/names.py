@@ -89,13 +89,13 @@ def distinct_slugs(names: Mapping[str, str]) -> dict[str, str]:
     plain = {key: slug(name) for key, name in names.items()}
     shared = [one for one in set(plain.values()) if list(plain.values()).count(one) > 1]
     taken: set[str] = set()
-    found = {}
+    slugs = {}
     for key, name in plain.items():
         wanted = f"{name}-{slug(key)[:8]}" if name in shared else name
         tries = [wanted, *(f"{wanted}-{k}" for k in range(2, len(names) + 2))]
-        found[key] = next(one for one in tries if one not in taken)
-        taken.add(found[key])
-    return found
+        slugs[key] = next(one for one in tries if one not in taken)
+        taken.add(slugs[key])
+    return slugs
 
 
 def digest(name: str) -> str:

@@ -195,16 +195,16 @@ def of_matlab_function(file: Path) -> dict[str, str]:
         f"uv = {file.stem}(double(mesh.v), double(mesh.f)); "
         "fprintf('solve: %.9f s\\n', toc(started)); save('-v7', {output}, 'uv');"
     )
-    words = [octave, "--norc", "--quiet", "--eval", code]
+    command = [octave, "--norc", "--quiet", "--eval", code]
     if not octave:
-        words = ["matlab" if shutil.which("matlab") else "octave-cli", "-batch", code]
+        command = ["matlab" if shutil.which("matlab") else "octave-cli", "-batch", code]
     return {
-        "command": shlex.join(words),
+        "command": shlex.join(command),
         "input": ".mat",
         "output": ".mat",
         "language": "matlab",
         "seconds": r"^solve: (\S+) s$",
-        "version": f"{words[0]} --version" if octave else "",
+        "version": f"{command[0]} --version" if octave else "",
         "remedy": "Install Octave (in Debian: apt-get install octave-cli), or MATLAB",
     }
 
@@ -221,10 +221,10 @@ def found_words(command: str, folder: Path) -> tuple[str, ...]:
 
     """
     try:
-        words = shlex.split(command)
+        arguments = shlex.split(command)
     except ValueError as error:
         raise RegistryError(f"the command {command!r} cannot be split: {error}.") from None
-    return tuple(_absolute(word, folder) for word in words)
+    return tuple(_absolute(word, folder) for word in arguments)
 
 
 def _absolute(word: str, folder: Path) -> str:

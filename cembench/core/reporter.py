@@ -46,7 +46,7 @@ class Reporter:
     def watching(
         self, cells: int, *, on_cluster: bool = False, resumes: bool = True
     ) -> AbstractContextManager[Any]:
-        """Show the progress of so many cells during a block, which gets a watcher or None.
+        """Show the progress of `cells` cells during a block, which gets a watcher or None.
 
         `resumes` says whether the same call resumes the work if it is stopped.
         """

@@ -14,7 +14,7 @@ _MODULES: dict[Backend, tuple[str, ...]] = {
     "superlu": ("scipy",),
     "pardiso": ("pypardiso",),
 }
-#: The extras that bring back ends.
+#: The extras that install back ends.
 EXTRAS: dict[str, Extra] = {"cvxopt-metis": Extra.METIS, "pardiso": Extra.PARDISO}
 
 

@@ -298,9 +298,9 @@ class Cholesky:
         k = self._leading
         if self._kept is not None:
             with phase("solves"):
-                found = self._kept.condensed(b)
-            if found is not None:
-                return found
+                block = self._kept.condensed(b)
+            if block is not None:
+                return block
         return b[k:] - scipy.sparse.csr_array(self._A[k:, :k]) @ self.solve_leading(b[:k])
 
     def extended(self, x: NDArray[Any], rows: NDArray[np.int64] | None = None) -> NDArray[Any]:

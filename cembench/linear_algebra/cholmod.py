@@ -12,9 +12,8 @@ from scipy import sparse
 
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
-from cembench.linear_algebra.cholmod_options import set_options
 from cembench.linear_algebra.factor_part import FactorPart, FactorTree
-from cembench.linear_algebra.orderings import as_permutation, minimum_degree
+from cembench.linear_algebra.orderings import as_permutation, minimum_degree, set_options
 from cembench.linear_algebra.supernodes import factor_entries, trailing_block
 from cembench.linear_algebra.triangular import triangle_solved, triangle_times
 from cembench.linear_algebra.work import count_analysis, count_columns, count_factorisation
@@ -43,9 +42,9 @@ class CholmodFactor:
         self._leading = leading
         with phase("ordering"):
             self._lower, self._below = _lower_triangle(A)
-            found = _order(self._lower, leading, order)
-            self._permutation = as_permutation(found)
-            self.order: NDArray[np.int64] | None = found
+            permutation = _order(self._lower, leading, order)
+            self._permutation = as_permutation(permutation)
+            self.order: NDArray[np.int64] | None = permutation
         self._analyse()
         self._factor()
 

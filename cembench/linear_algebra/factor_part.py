@@ -20,8 +20,7 @@ import numpy as np
 from cvxopt import cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 
-from cembench.linear_algebra.cholmod_options import set_options
-from cembench.linear_algebra.orderings import as_permutation, minimum_degree
+from cembench.linear_algebra.orderings import as_permutation, minimum_degree, set_options
 from cembench.linear_algebra.supernodes import CAPSULE, FactorStructure, Supernodes, held_factor
 
 Real = NDArray[np.float64]
@@ -82,21 +81,21 @@ class FactorPart:
 
     def __init__(self, tree: FactorTree, rows: Indices) -> None:
         self._tree, nodes = tree, tree.nodes
-        kept = tree.with_ancestors(rows)
-        widths, heights = nodes.widths[kept], nodes.heights[kept]
-        self.columns = _ranges(nodes.first[kept], widths)
+        supernodes = tree.with_ancestors(rows)
+        widths, heights = nodes.widths[supernodes], nodes.heights[supernodes]
+        self.columns = _ranges(nodes.first[supernodes], widths)
         self.at = np.searchsorted(self.columns, tree.positions[rows])
-        below = nodes.rows[_ranges(nodes.row_at[kept], heights)]
+        below = nodes.rows[_ranges(nodes.row_at[supernodes], heights)]
         self._indices = {
             "super": np.append(0, widths.cumsum()),
             "pi": np.append(0, heights.cumsum()),
-            "px": np.append(nodes.value_at[kept], 0),
+            "px": np.append(nodes.value_at[supernodes], 0),
             "s": np.searchsorted(self.columns, below),
         }
         self._own = _Padded(known=tree.whole)
         mine = self._own.known
         mine.n = mine.minor = len(self.columns)
-        mine.nsuper, mine.ssize = len(kept), len(below)
+        mine.nsuper, mine.ssize = len(supernodes), len(below)
         for name, of_part in self._indices.items():
             setattr(mine, name, of_part.ctypes.data)
         new = ctypes.pythonapi.PyCapsule_New

@@ -36,9 +36,11 @@ def permuted_lower(A: scipy.sparse.csr_array, order: NDArray[np.int64]) -> scipy
     place = np.full(A.shape[0], k, dtype=kind)
     place[order] = np.arange(k, dtype=kind)
     columns = place[rows.indices]
-    kept = columns <= np.repeat(np.arange(k, dtype=kind), np.diff(rows.indptr))
-    ends = np.concatenate([[0], np.cumsum(kept)])[rows.indptr].astype(kind)
-    lower = scipy.sparse.csr_array((rows.data[kept], columns[kept], ends), shape=(k, k)).tocsc()
+    in_triangle = columns <= np.repeat(np.arange(k, dtype=kind), np.diff(rows.indptr))
+    ends = np.concatenate([[0], np.cumsum(in_triangle)])[rows.indptr].astype(kind)
+    lower = scipy.sparse.csr_array(
+        (rows.data[in_triangle], columns[in_triangle], ends), shape=(k, k)
+    ).tocsc()
     # Turning rows into columns takes them one after the other.
     lower.has_sorted_indices = True
     return lower

@@ -1,4 +1,4 @@
-"""Fill-reducing orderings of sparse symmetric matrices for CHOLMOD.
+"""Options of CHOLMOD, and fill-reducing orderings of sparse symmetric matrices for it.
 
 Approximate minimum degree (AMD) is cheap. Nested dissection (METIS) takes several times as long; on
 large irregular meshes its factors are smaller, so it pays for many factorisations of one pattern,
@@ -12,8 +12,22 @@ from cvxopt import amd, cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
 
-from cembench.linear_algebra.cholmod_options import set_options
 from cembench.linear_algebra.supernodes import order_of
+
+
+def set_options(*, postorder: bool) -> None:
+    """Set all options of CHOLMOD that matter, as needed before each analysis and factorisation.
+
+    cvxopt keeps them in one dictionary for the whole process.
+
+    ``supernodal = 2`` also makes an indefinite matrix an error; without ``nmethods = 1`` a given
+    permutation may be ignored. With `postorder` the given order is changed to the postorder of its
+    elimination tree, which mixes a disconnected leading block with the rows after it.
+    """
+    cholmod.options["supernodal"] = 2
+    cholmod.options["nmethods"] = 1
+    cholmod.options["print"] = 0
+    cholmod.options["postorder"] = postorder
 
 
 def minimum_degree(lower: spmatrix) -> NDArray[np.int64]:
@@ -43,8 +57,8 @@ def nested_dissection(lower: spmatrix) -> NDArray[np.int64]:
 def _postordered(lower: spmatrix, order: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the equivalent order by the postorder of the elimination tree."""
     set_options(postorder=True)
-    found = order_of(cholmod.symbolic(lower, as_permutation(order)), len(order))
-    return order if found is None else np.asarray(found, dtype=np.int64)
+    postorder = order_of(cholmod.symbolic(lower, as_permutation(order)), len(order))
+    return order if postorder is None else np.asarray(postorder, dtype=np.int64)
 
 
 def as_permutation(order: NDArray[np.int64]) -> matrix:

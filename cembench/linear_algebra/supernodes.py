@@ -75,10 +75,10 @@ class Supernodes(NamedTuple):
 
     def parents(self) -> NDArray[np.int64]:
         """Return each supernode's parent in the elimination tree; -1 for a root."""
-        found = np.full(len(self.widths), -1)
+        parents = np.full(len(self.widths), -1)
         inner = np.flatnonzero(self.heights > self.widths)
-        found[inner] = self.of_columns(self.rows[self.row_at[inner] + self.widths[inner]])
-        return found
+        parents[inner] = self.of_columns(self.rows[self.row_at[inner] + self.widths[inner]])
+        return parents
 
 
 def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | None:
@@ -111,14 +111,14 @@ def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | N
         dense = values[value_at[k] : value_at[k] + len(rows) * len(columns)]
         dense = dense.reshape(len(columns), len(rows)).T
         top, left = np.searchsorted(rows, leading), np.searchsorted(columns, leading)
-        here = slice(int(columns[left]) - leading, int(columns[-1]) + 1 - leading)
+        block = slice(int(columns[left]) - leading, int(columns[-1]) + 1 - leading)
         below = rows[top:] - leading
         if len(below) == below[-1] + 1 - below[0]:
-            C[below[0] : below[-1] + 1, here] = dense[top:, left:]
+            C[below[0] : below[-1] + 1, block] = dense[top:, left:]
         else:
-            C[below, here] = dense[top:, left:]
+            C[below, block] = dense[top:, left:]
         # Entries above the diagonal of a supernode are undefined.
-        C[here, here] = np.tril(C[here, here])
+        C[block, block] = np.tril(C[block, block])
     return C
 
 

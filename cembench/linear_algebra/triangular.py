@@ -30,7 +30,7 @@ def triangle_solved(C: Real, X: Real, *, transposed: bool = False) -> Real:
 
 def _by_column(one: Callable[[Real], Real], X: Real) -> Real:
     """Apply a function to each column."""
-    found = np.empty(X.shape, order="F")
+    solved = np.empty(X.shape, order="F")
     for k in range(X.shape[1]):
-        found[:, k] = one(X[:, k])
-    return found
+        solved[:, k] = one(X[:, k])
+    return solved

@@ -108,8 +108,8 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
             "Name two vertices that lie farther apart."
         )
     F, origin = net.cut(graph)
-    told = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
-    notice = Notice(NoticeKind.CUT_OPEN, told)
+    message = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
+    notice = Notice(NoticeKind.CUT_OPEN, message)
     disk = DiskMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=(*mesh.notices, notice))
     edges = net.edges[np.array(sorted(graph), dtype=np.int64)]
     return Cut(disk, origin, edges, net.length(graph))
@@ -246,12 +246,12 @@ def _graph(edges: Indices, weights: Points, n: int) -> sparse.csr_array:
 
 def _neighbours(net: _Net, graph: Iterable[int]) -> dict[int, list[Edge]]:
     """Return the edges of a cut graph at each of its vertices, as (edge, other end)."""
-    found: dict[int, list[Edge]] = defaultdict(list)
+    around: dict[int, list[Edge]] = defaultdict(list)
     for number in sorted(graph):
         i, j = net.edges[number].tolist()
-        found[i].append((number, j))
-        found[j].append((number, i))
-    return found
+        around[i].append((number, j))
+        around[j].append((number, i))
+    return around
 
 
 def _held(net: _Net, marks: frozenset[int]) -> frozenset[int]:

@@ -20,7 +20,7 @@ from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
-from cembench.mesh.fans import vertices_of_several_fans
+from cembench.mesh.gluing import vertices_of_several_fans
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -129,20 +129,20 @@ _RESCALE = "Angles do not depend on the scale: divide all coordinates by the sam
 def _remedies_in_python(problems: Sequence[Problem], path: Path | None) -> str:
     """Return the calls that repair a surface, in the order of their use."""
     needed = {p.remedy for p in problems}
-    given = "surface" if path is None else repr(str(path))
+    surface = "surface" if path is None else repr(str(path))
     filled = max(p.edges for p in problems)
     fill = f", fill_holes={filled}" if Remedy.fill in needed else ""
     others = "Use an algorithm for {} (see `cembench.list_algorithms()`)."
     advice = [_RESCALE] if Remedy.rescale in needed else []
     if Remedy.repair in needed or fill:
         does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
-        advice.append(f"`cembench.repair({given}{fill})` {does}; its `mesh` is the new surface.")
-        given = "mesh"
+        advice.append(f"`cembench.repair({surface}{fill})` {does}; its `mesh` is the new surface.")
+        surface = "mesh"
     if fill:
         advice.append(others.format("surfaces with holes where they should stay"))
     if Remedy.cut in needed:
         advice.append(
-            f"`cembench.cut({given})` makes it a disk; `map_files(cut=True)` writes the UVs for "
+            f"`cembench.cut({surface})` makes it a disk; `map_files(cut=True)` writes the UVs for "
             "the uncut surface."
         )
     if Remedy.other_algorithm in needed:
@@ -153,25 +153,25 @@ def _remedies_in_python(problems: Sequence[Problem], path: Path | None) -> str:
 def _remedies_in_shell(problems: Sequence[Problem], path: Path | None) -> str:
     """Return the commands that repair a surface, in the order of their use."""
     needed = {p.remedy for p in problems}
-    given = "IN" if path is None else shlex.quote(str(path))
+    source = "IN" if path is None else shlex.quote(str(path))
     mended = "OUT" if path is None else f"{shlex.quote(path.stem + '_repaired')}.obj"
     fill = f" --fill-holes {max(p.edges for p in problems)}" if Remedy.fill in needed else ""
     advice = [_RESCALE] if Remedy.rescale in needed else []
     if Remedy.repair in needed:
         does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
         advice.append(
-            f"`cembench repair {given} -o {mended}` {does}, or add --repair to map or run."
+            f"`cembench repair {source} -o {mended}` {does}, or add --repair to map or run."
         )
-        given = mended
+        source = mended
     if fill:
         advice.append(
-            f"`cembench repair {given} -o {mended}{fill}` fills the holes; or use an algorithm for "
-            "surfaces with holes (see `cembench list algorithms`)."
+            f"`cembench repair {source} -o {mended}{fill}` fills the holes; or use an algorithm "
+            "for surfaces with holes (see `cembench list algorithms`)."
         )
     if Remedy.cut in needed:
         cut = "OUT" if path is None else f"{shlex.quote(path.stem + '_cut')}.obj"
         advice.append(
-            f"`cembench cut {given} -o {cut}` makes it a disk, or add --cut to map, which writes "
+            f"`cembench cut {source} -o {cut}` makes it a disk, or add --cut to map, which writes "
             "the UVs for the uncut surface."
         )
     if Remedy.other_algorithm in needed:
@@ -266,34 +266,34 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
     inside: Mask = np.asarray(((F >= 0) & (len(V) > F)).all(axis=1))
     sound: Mask = inside & finite[np.where(inside[:, None], F, 0)].all(axis=1)
     number = np.flatnonzero(sound)
-    kept = F if sound.all() else F[sound]
-    scale = out_of_scale(V, kept)
-    found = [
-        _not_finite(np.flatnonzero(~finite)),
-        _out_of_range(np.flatnonzero(~inside), F, len(V)),
+    valid = F if sound.all() else F[sound]
+    scale = out_of_scale(V, valid)
+    findings = [
+        _problem(Defect.not_finite, np.flatnonzero(~finite)),
+        _problem(Defect.out_of_range, np.flatnonzero(~inside), F, last=len(V) - 1),
         scale,
-        _isolated(np.flatnonzero(finite & ~_used(F[inside], len(V)))),
+        _problem(Defect.isolated, np.flatnonzero(finite & ~_used(F[inside], len(V)))),
     ]
     turned = np.zeros(0, dtype=bool)
-    if len(kept):
-        facing, turned, contradictions = oriented(kept)
-        areas = np.ones(0) if scale else relative_areas(V, kept)
-        found += [
-            _degenerate(number[np.flatnonzero(areas <= DEGENERATE_AREA)], F),
-            *_edges(kept, contradictions),
+    if len(valid):
+        facing, turned, contradictions = oriented(valid)
+        areas = np.ones(0) if scale else relative_areas(V, valid)
+        findings += [
+            _problem(Defect.degenerate, number[np.flatnonzero(areas <= DEGENERATE_AREA)], F),
+            *_edges(valid, contradictions),
             _vertices(facing, len(V), consistent=not len(contradictions)),
-            components(kept, len(V)) if connected else None,
+            components(valid, len(V)) if connected else None,
         ]
-    problems = [p for p in found if p is not None]
+    problems = [p for p in findings if p is not None]
     if not problems:
         slivers = np.flatnonzero(areas <= SLIVER_AREA)
         return Examination(facing, (*_slivers(slivers), *_turned(turned)), ())
-    if len(kept):
+    if len(valid):
         one_sided = any(p.defect is Defect.one_sided for p in problems)
         more = [
             coincident(V),
-            _duplicates(F, number),
-            None if one_sided else _orientation(number[turned], F),
+            _problem(Defect.duplicate, number[duplicates(F[number])], F),
+            None if one_sided else _problem(Defect.orientation, number[turned], F),
         ]
         problems += [p for p in more if p is not None]
     ordered = sorted(problems, key=lambda p: list(Defect).index(p.defect))
@@ -308,7 +308,7 @@ def degenerate(V: Points, F: Indices) -> Mask:
 
 def relative_areas(V: Points, F: Indices) -> Points:
     """Return each triangle's area over its longest edge squared; 0 where all corners coincide."""
-    found = np.zeros(len(F))
+    shares = np.zeros(len(F))
     for block, corners in _corners(V, F):
         (ax, bx, cx), (ay, by, cy), (az, bz, cz) = corners[:, [1, 2, 0]] - corners
         double_area = np.sqrt(
@@ -317,16 +317,16 @@ def relative_areas(V: Points, F: Indices) -> Points:
         longest = np.maximum(
             np.maximum(ax**2 + ay**2 + az**2, bx**2 + by**2 + bz**2), cx**2 + cy**2 + cz**2
         )
-        np.divide(double_area, 2 * longest, out=found[block], where=longest > 0)
-    return found
+        np.divide(double_area, 2 * longest, out=shares[block], where=longest > 0)
+    return shares
 
 
 def _extents(V: Points, F: Indices) -> Points:
     """Return the largest side of each triangle's bounding box."""
-    found = np.empty(len(F))
+    extents = np.empty(len(F))
     for block, corners in _corners(V, F):
-        found[block] = np.ptp(corners, axis=1).max(axis=0)
-    return found
+        extents[block] = np.ptp(corners, axis=1).max(axis=0)
+    return extents
 
 
 def _corners(V: Points, F: Indices) -> Iterator[tuple[slice, Points]]:
@@ -407,8 +407,8 @@ def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
         return F, np.zeros(len(F), dtype=bool), np.empty((0, 2), dtype=np.int64)
     import igl  # imported here: every measured process would wait for it, and none needs it
 
-    found, piece = igl.bfs_orient(F)
-    turned = (found != F).any(axis=1)
+    searched, piece = igl.bfs_orient(F)
+    turned = (searched != F).any(axis=1)
     # The search keeps the orientation of its first triangle; keep the majority's instead.
     mostly = np.bincount(piece, weights=turned) > np.bincount(piece) / 2
     turned ^= mostly[piece]
@@ -460,19 +460,19 @@ def _slivers(thin: Indices) -> tuple[Notice, ...]:
     """Return a notice if some triangles are slivers."""
     if not len(thin):
         return ()
-    told = (
+    message = (
         f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
         f"{some(thin)}; energies and dilatations lose digits in rounding there"
     )
-    return (Notice(NoticeKind.SLIVERS, told),)
+    return (Notice(NoticeKind.SLIVERS, message),)
 
 
 def _turned(turned: Mask) -> tuple[Notice, ...]:
     """Return a notice if some triangles were reversed."""
     if not turned.any():
         return ()
-    told = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
-    return (Notice(NoticeKind.ORIENTATION_REPAIRED, told),)
+    message = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
+    return (Notice(NoticeKind.ORIENTATION_REPAIRED, message),)
 
 
 def _used(F: Indices, n: int) -> Mask:
@@ -482,59 +482,45 @@ def _used(F: Indices, n: int) -> Mask:
     return used
 
 
-def _not_finite(bad: Indices) -> Problem | None:
+#: What is wrong, by defect, where a list of vertices or triangles says all: `some` are the first of
+#: them, `first` the vertices of the first triangle.
+_TEXTS = {
+    Defect.not_finite: (
+        "coordinates that are NaN or infinite at vertex {some} (counted from 0); all must be finite"
+    ),
+    Defect.out_of_range: (
+        "triangle {some} (counted from 0) has a vertex index out of range, the first being "
+        "{first}; allowed is 0 to {last}: the file is damaged or was cut short"
+    ),
+    Defect.isolated: "isolated vertices, in no triangle: {some} (counted from 0)",
+    Defect.degenerate: (
+        "degenerate triangles (zero area): {some} (counted from 0), the first with vertices "
+        "{first}; their angles are undefined"
+    ),
+    Defect.duplicate: (
+        "duplicate triangles, with the same three vertices as another: {some} (counted from 0), "
+        "the first with vertices {first}"
+    ),
+    Defect.orientation: (
+        "inconsistent orientation: {count} triangle(s) have the opposite orientation to the rest, "
+        "the first with vertices {first}"
+    ),
+    Defect.vertices: (
+        "non-manifold vertex {some} (counted from 0): its triangles form more than one fan, so "
+        "the surface touches itself at a point"
+    ),
+}
+
+
+def _problem(
+    defect: Defect, bad: Indices, F: Indices | None = None, last: int = 0
+) -> Problem | None:
+    """Return the problem that these vertices, or triangles of F, have a defect; None for none."""
     if not len(bad):
         return None
-    return Problem(
-        Defect.not_finite,
-        len(bad),
-        f"coordinates that are NaN or infinite at vertex {some(bad)} (counted from 0); all must be "
-        "finite",
-    )
-
-
-def _out_of_range(bad: Indices, F: Indices, n: int) -> Problem | None:
-    if not len(bad):
-        return None
-    return Problem(
-        Defect.out_of_range,
-        len(bad),
-        f"triangle {some(bad)} (counted from 0) has a vertex index out of range, the first being "
-        f"{F[bad[0]].tolist()}; allowed is 0 to {n - 1}: the file is damaged or was cut short",
-    )
-
-
-def _isolated(bad: Indices) -> Problem | None:
-    if not len(bad):
-        return None
-    return Problem(
-        Defect.isolated,
-        len(bad),
-        f"isolated vertices, in no triangle: {some(bad)} (counted from 0)",
-    )
-
-
-def _degenerate(bad: Indices, F: Indices) -> Problem | None:
-    if not len(bad):
-        return None
-    return Problem(
-        Defect.degenerate,
-        len(bad),
-        f"degenerate triangles (zero area): {some(bad)} (counted from 0), the first with vertices "
-        f"{F[bad[0]].tolist()}; their angles are undefined",
-    )
-
-
-def _duplicates(F: Indices, number: Indices) -> Problem | None:
-    bad = number[duplicates(F[number])]
-    if not len(bad):
-        return None
-    return Problem(
-        Defect.duplicate,
-        len(bad),
-        f"duplicate triangles, with the same three vertices as another: {some(bad)} (counted "
-        f"from 0), the first with vertices {F[bad[0]].tolist()}",
-    )
+    first = [] if F is None else F[bad[0]].tolist()
+    text = _TEXTS[defect].format(some=some(bad), first=first, count=len(bad), last=last)
+    return Problem(defect, len(bad), text)
 
 
 def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
@@ -549,11 +535,11 @@ def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
     if not len(bad):
         return [_one_sided(contradictions)]
     i, j = edges[bad[0]].tolist()
-    told = (
+    message = (
         f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
         f"{i}-{j} with {faces[bad[0]]}"
     )
-    return [Problem(Defect.edges, len(bad), told)]
+    return [Problem(Defect.edges, len(bad), message)]
 
 
 def _one_sided(contradictions: Indices) -> Problem:
@@ -564,18 +550,6 @@ def _one_sided(contradictions: Indices) -> Problem:
         len(contradictions),
         f"the surface is one-sided (like a Moebius strip): the triangles at edge {i}-{j} "
         "cannot be oriented consistently; a repair cuts the surface there",
-    )
-
-
-def _orientation(bad: Indices, F: Indices) -> Problem | None:
-    if not len(bad):
-        return None
-    return Problem(
-        Defect.orientation,
-        len(bad),
-        f"inconsistent orientation: {len(bad)} triangle(s) have the opposite orientation to the "
-        "rest, the "
-        f"first with vertices {F[bad[0]].tolist()}",
     )
 
 
@@ -597,11 +571,4 @@ def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:
 
         manifold = igl.is_vertex_manifold(proper)  # also false for vertices in no triangle
         bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
-    if not len(bad):
-        return None
-    return Problem(
-        Defect.vertices,
-        len(bad),
-        f"non-manifold vertex {some(bad)} (counted from 0): its triangles form more than one fan, "
-        "so the surface touches itself at a point",
-    )
+    return _problem(Defect.vertices, bad)

@@ -138,7 +138,7 @@ def _check_file(path: Path) -> None:
             "standard input cannot be read as a mesh. Save it to a file and name the file."
         )
     try:
-        found = path.stat()
+        status = path.stat()
     except (FileNotFoundError, NotADirectoryError):
         what = "there is no such file"
         if path.is_symlink():
@@ -150,7 +150,7 @@ def _check_file(path: Path) -> None:
     except ValueError:
         raise MeshError("this cannot be a file name. Check the path.") from None
     for is_special, what in _SPECIAL_FILES:
-        if is_special(found.st_mode):
+        if is_special(status.st_mode):
             raise MeshError(
                 f"this is {what}, not a file. Name a mesh file; save the output of a pipe or a "
                 "device to a file first."
@@ -160,7 +160,7 @@ def _check_file(path: Path) -> None:
             f"unknown mesh format {path.suffix!r}; allowed: {', '.join(READERS)}. "
             "Convert the file to one of these."
         )
-    if found.st_size == 0:
+    if status.st_size == 0:
         raise MeshError("the file is empty (0 bytes). Export or download it again.")
 
 

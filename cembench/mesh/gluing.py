@@ -55,22 +55,22 @@ def partners(i: Indices, j: Indices) -> Indices:
     i and j are integers of one type (k,), which must hold :data:`SLOTS` times their values. No more
     than two edges have the same ends.
     """
-    found = np.full(len(i), -1)
-    _pair_opposite(i, j, found)
+    partner = np.full(len(i), -1)
+    _pair_opposite(i, j, partner)
     # What runs the same way, lost its place in the table, or has no partner.
-    rest = np.flatnonzero(found < 0)
+    rest = np.flatnonzero(partner < 0)
     i, j = i.take(rest).astype(np.int64), j.take(rest).astype(np.int64)
     keys = np.minimum(i, j) * (max(i.max(initial=0), j.max(initial=0)) + 1) + np.maximum(i, j)
     order = np.argsort(keys, kind="stable")
     keys, rest = keys[order], rest[order]
     same = np.flatnonzero(keys[1:] == keys[:-1])
     one, other = rest[same], rest[same + 1]
-    found[one], found[other] = other, one
-    return found
+    partner[one], partner[other] = other, one
+    return partner
 
 
-def _pair_opposite(i: Indices, j: Indices, found: Indices) -> None:
-    """Enter in `found` most pairs of edges ij and ji, faster than by sorting.
+def _pair_opposite(i: Indices, j: Indices, partner: Indices) -> None:
+    """Enter in `partner` most pairs of edges ij and ji, faster than by sorting.
 
     An edge's place in a table is given by its lower vertex and the last bits of the other one;
     where two have the same place, one is lost.
@@ -86,7 +86,7 @@ def _pair_opposite(i: Indices, j: Indices, found: Indices) -> None:
     match = table.take(np.minimum(at, len(table) - 1))
     equal = np.flatnonzero((low.take(match) == low_down) & (high.take(match) == high_down))
     match, down = up.take(match.take(equal)), down.take(equal)
-    found[match], found[down] = down, match
+    partner[match], partner[down] = down, match
 
 
 def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
@@ -120,3 +120,33 @@ def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
     copies = order[is_copy[order]]
     number[copies] = n + np.arange(len(copies))
     return number[fan].reshape(F.shape), np.concatenate([np.arange(n), owner[copies]])
+
+
+def vertices_of_several_fans(F: Indices, n: int) -> Indices:
+    """Return the vertices whose triangles form more than one fan, ascending.
+
+    The triangles at a vertex form fans: each is glued along the edges at the vertex, and is a
+    cycle, or a sequence between two boundary edges.
+
+    The triangles (m, 3) have three different corners each and a consistent orientation, and no edge
+    has more than two of them. From one half-edge of every vertex, the first of its fan if that has
+    an end, all vertices turn counter-clockwise together; a single fan has all corners of its
+    vertex.
+    """
+    twin = twins_of_half_edges(F).reshape(-1, 3)
+    # The side that ends at a vertex, seen from the other triangle, starts there.
+    turned = twin[:, [2, 0, 1]].ravel()
+    tails = F.ravel()
+    first = np.full(n, -1)
+    first[tails] = np.arange(F.size)
+    ends = np.flatnonzero(twin.ravel() < 0)
+    first[tails[ends]] = ends
+    unseen = np.bincount(tails, minlength=n)
+    vertex = np.flatnonzero(first >= 0)
+    at = start = first[vertex]
+    while len(vertex):
+        unseen[vertex] -= 1
+        at = turned[at]
+        goes_on = (at >= 0) & (at != start)
+        vertex, at, start = vertex[goes_on], at[goes_on], start[goes_on]
+    return np.flatnonzero(unseen)

@@ -81,9 +81,9 @@ def _delaunay(P: NDArray[np.float64]) -> Indices | None:
     polygon = shapely.Polygon(flat)
     if len(place) < len(P) or not polygon.is_valid:
         return None
-    found = shapely.constrained_delaunay_triangles(polygon).geoms
+    pieces = shapely.constrained_delaunay_triangles(polygon).geoms
     triangles = np.array(
-        [[place[point] for point in piece.exterior.coords[:3]] for piece in found], dtype=np.int64
+        [[place[point] for point in piece.exterior.coords[:3]] for piece in pieces], dtype=np.int64
     )
     if triangles.shape != (len(P) - 2, 3):
         return None

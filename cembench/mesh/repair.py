@@ -30,7 +30,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,47 +63,37 @@ _FLIP_ROUNDS = 10
 
 
 class Step(StrEnum):
-    """The steps of a repair in order; the value is the name in JSON."""
+    """The steps of a repair in order: the name in JSON, which is the value, and the meaning."""
 
-    invalid_faces = "invalid_faces_dropped"
-    polygons = "polygons_triangulated"
-    weld = "vertices_welded"
-    collapse = "degenerate_triangles_collapsed"
-    flip = "degenerate_triangles_flipped"
-    degenerate = "degenerate_triangles_dropped"
-    duplicate = "duplicate_triangles_dropped"
-    edges = "non_manifold_edges_split"
-    vertices = "non_manifold_vertices_split"
-    orient = "triangles_turned_over"
-    one_sided = "edges_of_one_sided_surfaces_cut"
-    outwards = "closed_components_turned_outwards"
-    components = "components_dropped"
-    component_faces = "triangles_of_dropped_components"
-    ears = "ears_dropped"
-    holes = "holes_filled"
-    isolated = "isolated_vertices_removed"
+    meaning: str
+
+    def __new__(cls, name: str, meaning: str) -> Self:
+        """Return a member whose value is its name in JSON."""
+        member = str.__new__(cls, name)
+        member._value_, member.meaning = name, meaning
+        return member
+
+    invalid_faces = "invalid_faces_dropped", "faces with a missing or non-finite vertex dropped"
+    polygons = "polygons_triangulated", "polygons cut into triangles"
+    weld = "vertices_welded", "coincident vertices welded"
+    collapse = "degenerate_triangles_collapsed", "degenerate triangles collapsed"
+    flip = "degenerate_triangles_flipped", "degenerate triangles flipped"
+    degenerate = "degenerate_triangles_dropped", "degenerate triangles dropped"
+    duplicate = "duplicate_triangles_dropped", "duplicate triangles dropped"
+    edges = "non_manifold_edges_split", "non-manifold edges split"
+    vertices = "non_manifold_vertices_split", "non-manifold vertices split"
+    orient = "triangles_turned_over", "triangles turned over"
+    one_sided = "edges_of_one_sided_surfaces_cut", "edges of one-sided surfaces cut"
+    outwards = "closed_components_turned_outwards", "closed components turned outwards"
+    components = "components_dropped", "components dropped"
+    component_faces = "triangles_of_dropped_components", "triangles of dropped components"
+    ears = "ears_dropped", "ears dropped"
+    holes = "holes_filled", "holes filled"
+    isolated = "isolated_vertices_removed", "isolated vertices removed"
 
 
 #: Description of each step for messages.
-TITLES: dict[Step, str] = {
-    Step.invalid_faces: "faces with a missing or non-finite vertex dropped",
-    Step.polygons: "polygons cut into triangles",
-    Step.weld: "coincident vertices welded",
-    Step.collapse: "degenerate triangles collapsed",
-    Step.flip: "degenerate triangles flipped",
-    Step.degenerate: "degenerate triangles dropped",
-    Step.duplicate: "duplicate triangles dropped",
-    Step.edges: "non-manifold edges split",
-    Step.vertices: "non-manifold vertices split",
-    Step.orient: "triangles turned over",
-    Step.one_sided: "edges of one-sided surfaces cut",
-    Step.outwards: "closed components turned outwards",
-    Step.components: "components dropped",
-    Step.component_faces: "triangles of dropped components",
-    Step.ears: "ears dropped",
-    Step.holes: "holes filled",
-    Step.isolated: "isolated vertices removed",
-}
+TITLES: dict[str, str] = {step: step.meaning for step in Step}
 
 
 @dataclass(frozen=True)
@@ -202,8 +192,8 @@ def repair(
     F = _outwards(points, F, steps)
     surfaces = []
     for piece in _components(F, len(points), components, steps):
-        kept = _drop_ears(piece, len(points), steps)
-        filled = _fill_holes(points, kept, fill_holes, steps)
+        without_ears = _drop_ears(piece, len(points), steps)
+        filled = _fill_holes(points, without_ears, fill_holes, steps)
         surfaces.append(_compact(*filled))
     return Repaired(tuple(surfaces), steps)
 
@@ -223,14 +213,14 @@ def _triangles(V: Points, faces: Indices | Iterable[Indices], steps: dict[Step, 
     blocks = [faces] if isinstance(faces, np.ndarray) else faces
     blocks = [np.asarray(block, dtype=np.int64) for block in blocks]
     finite = np.append(np.isfinite(V).all(axis=1), False)
-    kept = []
+    good_blocks = []
     for block in blocks:
         inside = (block >= 0) & (block < len(V))
         good = finite[np.where(inside, block, -1)].all(axis=1)
         steps[Step.invalid_faces] += int((~good).sum())
-        kept.append(block[good])
-    steps[Step.polygons] = sum(len(block) for block in kept if block.shape[1] > 3)
-    return triangulate(V, kept)
+        good_blocks.append(block[good])
+    steps[Step.polygons] = sum(len(block) for block in good_blocks if block.shape[1] > 3)
+    return triangulate(V, good_blocks)
 
 
 def _weld(V: Points, F: Indices, tolerance: float | None, steps: dict[Step, int]) -> Indices:
@@ -442,14 +432,14 @@ def _drop_ears(F: Indices, n: int, steps: dict[Step, int]) -> Indices:
 
     A surface that would vanish, such as a strip of triangles, is kept as it is.
     """
-    kept = F
-    while len(kept):
-        _, edge, faces = edges_of_half_edges(kept)
+    left = F
+    while len(left):
+        _, edge, faces = edges_of_half_edges(left)
         ears = (faces[edge] == 1).reshape(-1, 3).sum(axis=1) >= 2
         if not ears.any():
-            steps[Step.ears] += len(F) - len(kept)
-            return kept
-        kept = kept[~ears]
+            steps[Step.ears] += len(F) - len(left)
+            return left
+        left = left[~ears]
     return F
 
 

@@ -22,5 +22,5 @@ def side_lengths(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.flo
         In the unit of V. Side c runs from corner c + 1 to corner c + 2 (modulo 3).
 
     """
-    found: NDArray[np.float64] = np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
-    return found
+    lengths: NDArray[np.float64] = np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
+    return lengths

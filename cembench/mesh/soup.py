@@ -188,11 +188,11 @@ class Soup:
         if self.uv is None or self.uv_index is None:
             return self
         pairs = np.stack([self.triangles.ravel(), self.uv_triangles.ravel()], axis=1)
-        found, inverse = np.unique(pairs, axis=0, return_inverse=True)
-        order = np.lexsort((found[:, 0], found[:, 1]))
+        distinct, inverse = np.unique(pairs, axis=0, return_inverse=True)
+        order = np.lexsort((distinct[:, 0], distinct[:, 1]))
         place = np.empty(len(order), dtype=np.int64)
         place[order] = np.arange(len(order))
-        vertex, texture = found[order].T
+        vertex, texture = distinct[order].T
         F = place[inverse.ravel()].reshape(-1, 3)
         return self.of_triangles(self.V[vertex], F, self.uv[texture], name=self.name)
 
@@ -270,9 +270,9 @@ def shown(text: str, most: int = 60) -> str:
     return repr(text if len(text) <= most else text[:most] + "...")
 
 
-def refuse_underscores(words: list[str]) -> None:
+def refuse_underscores(fields: list[str]) -> None:
     """Raise :class:`ValueError` for numbers that only Python accepts, such as 1_000."""
-    if "_" in "".join(words):
+    if "_" in "".join(fields):
         raise ValueError("an underscore is not part of a number")
 
 

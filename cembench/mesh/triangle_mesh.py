@@ -89,11 +89,11 @@ class TriangleMesh:
         """
         kind = type(self)
         V, F = as_arrays(V, F)
-        F, found, problems = examine(V, F, connected=kind is not TriangleMesh)
+        F, remarks, problems = examine(V, F, connected=kind is not TriangleMesh)
         if problems:
             raise UnusableMeshError([*problems, *_problems_when_repaired(kind, V, F, problems)])
         try:
-            notices += found + kind._check_topology(V, F)
+            notices += remarks + kind._check_topology(V, F)
         except UnusableMeshError as error:
             open_seams = coincident(V)
             raise UnusableMeshError(

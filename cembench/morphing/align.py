@@ -123,8 +123,8 @@ def _portrait(mesh: DiskMesh, z: Complex) -> Real:
     )
     log_factor = np.log(vertex_areas(mesh) / image) / 2
     at = locate(z, mesh.F, mesh.boundary, _grid())
-    found = at.carry(mesh.F, log_factor).reshape(RADII, DIRECTIONS)
-    return found - np.average(found, axis=0, weights=_radii()).mean()
+    portrait = at.carry(mesh.F, log_factor).reshape(RADII, DIRECTIONS)
+    return portrait - np.average(portrait, axis=0, weights=_radii()).mean()
 
 
 def _radii() -> Real:
@@ -166,7 +166,7 @@ def _refined(picture: Real, model: Real, turn: float) -> Moebius:
 
     start = np.array([0.0, 0.0, -turn])
     simplex = start + np.vstack([np.zeros(3), np.diag([0.1, 0.1, 0.1])])
-    found = optimize.minimize(
+    optimum = optimize.minimize(
         difference, start, method="Nelder-Mead", options={"initial_simplex": simplex}
     )
-    return move(found.x)
+    return move(optimum.x)

@@ -95,9 +95,9 @@ def read_landmarks(
         raise ParameterError(
             f"landmarks {path}: the file has no rows; add at least one, or name no file."
         )
-    found = Landmarks(tuple(names), np.array(rows, dtype=np.int64))
-    check_landmarks(found, meshes)
-    return found
+    landmarks = Landmarks(tuple(names), np.array(rows, dtype=np.int64))
+    check_landmarks(landmarks, meshes)
+    return landmarks
 
 
 def _vertex(cell: str, mesh: DiskMesh, known: Mapping[str, int], *, where: str) -> int:
@@ -117,9 +117,9 @@ def common_landmarks(meshes: Sequence[DiskMesh], known: Sequence[Mapping[str, in
     """Return the named landmarks that all surfaces have, in the first one's order."""
     names = tuple(name for name in known[0] if all(name in others for others in known[1:]))
     rows = [[places[name] for places in known] for name in names]
-    found = Landmarks(names, np.array(rows, dtype=np.int64).reshape(len(names), len(meshes)))
-    check_landmarks(found, meshes)
-    return found
+    landmarks = Landmarks(names, np.array(rows, dtype=np.int64).reshape(len(names), len(meshes)))
+    check_landmarks(landmarks, meshes)
+    return landmarks
 
 
 def check_landmarks(landmarks: Landmarks, meshes: Sequence[DiskMesh]) -> None:

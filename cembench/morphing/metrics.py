@@ -34,7 +34,7 @@ def registration_metrics(
     registration: Registration,
     carried: Real,
     F: Ints,
-    here: Ints,
+    landmarks: Ints,
     there: Ints,
 ) -> dict[str, Any]:
     """Return the metrics of a registration map and of the carried surface.
@@ -49,7 +49,7 @@ def registration_metrics(
         The first surface's vertices, carried onto the target.
     F : int64 (m, 3)
         The first surface's triangles.
-    here, there : int64 (k,)
+    landmarks, there : int64 (k,)
         The landmarks on the first surface and on the target.
 
     Returns
@@ -63,12 +63,12 @@ def registration_metrics(
 
     """
     stretch = dilatations(target, registration.uv)
-    apart = np.linalg.norm(carried[here] - target.V[there], axis=1)
+    apart = np.linalg.norm(carried[landmarks] - target.V[there], axis=1)
     edge = mean_edge(target)
     there_and_back = distances(carried, F, target), distances_back(target, carried, F)
     figures: dict[str, Any] = {
-        "landmark_error_share": float(apart.max() / size_of(target.V)) if len(here) else None,
-        "landmark_error_disk": registration.landmark_error if len(here) else None,
+        "landmark_error_share": float(apart.max() / size_of(target.V)) if len(landmarks) else None,
+        "landmark_error_disk": registration.landmark_error if len(landmarks) else None,
         "lambdas": list(registration.lambdas),
         "dirichlet_energy": dirichlet_energy(target, registration.uv),
         "dilatation_mean": float(stretch.mean()),
@@ -89,12 +89,12 @@ def registration_metrics(
 
 def distances(carried: Real, F: Ints, target: DiskMesh) -> Real:
     """Return the distances of points on the carried surface from the target."""
-    return _to_surface(_samples(carried, F), target.V, target.F)
+    return distances_to(_samples(carried, F), target.V, target.F)
 
 
 def distances_back(target: DiskMesh, carried: Real, F: Ints) -> Real:
     """Return the distances of points on the target from the carried surface."""
-    return _to_surface(_samples(target.V, target.F), carried, F)
+    return distances_to(_samples(target.V, target.F), carried, F)
 
 
 def _samples(V: Real, F: Ints) -> Real:
@@ -108,7 +108,8 @@ def _samples(V: Real, F: Ints) -> Real:
     return np.vstack([V, p[face] + u * (q - p)[face] + v * (r - p)[face]])
 
 
-def _to_surface(points: Real, V: Real, F: Ints) -> Real:
+def distances_to(points: Real, V: Real, F: Ints) -> Real:
+    """Return the distances (p,) of points (p, 3) from the surface of V (n, 3) and F (m, 3)."""
     import igl  # slow to load
 
     squared, _, _ = igl.point_mesh_squared_distance(points, np.ascontiguousarray(V), F)

@@ -72,8 +72,8 @@ class Morph:
         times = np.linspace(0, 1, frames)
         rows = [
             {"surface": mesh.name}
-            | registration_metrics(mesh, found, carried, first.F, places[:, 0], places[:, k])
-            for k, (mesh, found, carried) in enumerate(
+            | registration_metrics(mesh, registration, carried, first.F, places[:, 0], places[:, k])
+            for k, (mesh, registration, carried) in enumerate(
                 zip(self.meshes[1:], self.registrations, self.carried[1:], strict=True), start=1
             )
         ]
@@ -135,12 +135,12 @@ def morph(
         tell(f"registering {mesh.name}")
         fitted = aligned(mesh, maps[k], there, first, z, places[:, 0])
         check_order(landmarks.names, z[places[:, 0]], fitted[there], (first.name, mesh.name))
-        found = register(mesh, fitted, there, z[places[:, 0]], lam=lam, reach=reach)
+        registration = register(mesh, fitted, there, z[places[:, 0]], lam=lam, reach=reach)
         tell(f"carrying {first.name} onto {mesh.name}")
-        at = locate(found.uv, mesh.F, mesh.boundary, z)
+        at = locate(registration.uv, mesh.F, mesh.boundary, z)
         on = at.carry(mesh.F, mesh.V)
         moved.append(fitted)
-        registrations.append(found)
+        registrations.append(registration)
         carried.append(on)
         stops.append(on if pose == "keep" else _posed(on, first, places[:, 0], pose))
     return Morph(

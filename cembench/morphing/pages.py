@@ -51,7 +51,7 @@ def registration_page(
     Rows: the surface under the checkerboard of its conformal map, and that map; the same for the
     registered map. Red dots are the landmarks, white rings those of the first surface.
     """
-    registered = [morph.aligned[0], *(found.uv for found in morph.registrations)]
+    registered = [morph.aligned[0], *(one.uv for one in morph.registrations)]
     rows: list[list[Picture]] = [[], [], [], []]
     for k, mesh in enumerate(morph.meshes):
         tell(f"drawing {mesh.name}")
@@ -91,10 +91,10 @@ def _page(
     height = top + (side + below) * len(rows) + 4
     figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
-    words: dict[str, Any] = {"color": INK, "ha": "center", "va": "center", "parse_math": False}
+    text_style: dict[str, Any] = {"color": INK, "ha": "center", "va": "center", "parse_math": False}
     for k, head in enumerate(heads):
         x = (left + (k + 0.5) * side) / width
-        figure.text(x, 1 - top / 2 / height, head, fontsize=10, weight="bold", **words)
+        figure.text(x, 1 - top / 2 / height, head, fontsize=10, weight="bold", **text_style)
     for r, pictures in enumerate(rows):
         bottom = height - top - r * (side + below) - side
         if sides:
@@ -104,7 +104,7 @@ def _page(
                 sides[r],
                 rotation=90,
                 fontsize=10,
-                **words,
+                **text_style,
             )
         for k, picture in enumerate(pictures):
             axes = figure.add_axes(
@@ -117,7 +117,7 @@ def _page(
                     axes.plot(FILL * z.real, FILL * z.imag, **style)
             if notes:
                 x = (left + (k + 0.5) * side) / width
-                figure.text(x, (bottom - below / 2) / height, notes[r][k], fontsize=9, **words)
+                figure.text(x, (bottom - below / 2) / height, notes[r][k], fontsize=9, **text_style)
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
     return buffer.getvalue()

@@ -106,9 +106,9 @@ def register(
     """
     if not len(landmarks):
         return Registration(start, (), 0.0)
-    found = _minimisers(mesh, laplacian(mesh), start, landmarks, targets, reach)(lam)
-    if first_fold(start, found, mesh.F) > 1:
-        return Registration(found, (lam,), _error(found, landmarks, targets))
+    uv = _minimisers(mesh, laplacian(mesh), start, landmarks, targets, reach)(lam)
+    if first_fold(start, uv, mesh.F) > 1:
+        return Registration(uv, (lam,), _error(uv, landmarks, targets))
     z, exponent = radially_stretched(mesh, start, landmarks, targets)
     lambdas = []
     for _ in range(MOST_STEPS):
@@ -197,9 +197,9 @@ def _minimisers(
             factor = Cholesky(A)
         else:
             factor.update(A)
-        found = z.copy()
-        found[i] = factor.solve(right + lam * pulled[i])
-        return found
+        image = z.copy()
+        image[i] = factor.solve(right + lam * pulled[i])
+        return image
 
     return minimiser
 
@@ -242,10 +242,10 @@ def radially_stretched(
 
     """
     far = np.minimum(np.abs(z[landmarks]), np.abs(targets)) > 1e-9
-    there, here = np.log(np.abs(targets[far])), np.log(np.abs(z[landmarks][far]))
-    if not len(here):
+    wanted_radii, own_radii = np.log(np.abs(targets[far])), np.log(np.abs(z[landmarks][far]))
+    if not len(own_radii):
         return z, 1.0
-    k = float(there @ here / (here @ here))
+    k = float(wanted_radii @ own_radii / (own_radii @ own_radii))
     modulus = np.maximum(np.abs(z), 1e-300)
     for _ in range(MOST_TRIES):
         new = z * modulus ** (k - 1)

@@ -21,8 +21,8 @@ class BarycentricPlaces:
 
     def carry(self, F: Ints, values: Real) -> Real:
         """Return values at vertices (n, ...) interpolated at these places, (p, ...)."""
-        found: Real = np.einsum("pc,pc...->p...", self.weights, values[F[self.faces]])
-        return found
+        carried: Real = np.einsum("pc,pc...->p...", self.weights, values[F[self.faces]])
+        return carried
 
 
 def locate(uv: Complex, F: Ints, boundary: Ints, points: Complex) -> BarycentricPlaces:

@@ -109,12 +109,12 @@ def _check_mp4(path: Path, frames: int) -> None:
     import imageio_ffmpeg
 
     try:
-        found, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+        count, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
     except RuntimeError:
-        found = 0
-    if found != frames:
+        count = 0
+    if count != frames:
         raise OSError(
-            errno.EIO, f"only {found} of {frames} frames were written; the disk may be full"
+            errno.EIO, f"only {count} of {frames} frames were written; the disk may be full"
         )
 
 

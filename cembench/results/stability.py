@@ -40,7 +40,9 @@ def stability_words(records: Sequence[Record]) -> str:
     unstable = [r for r in timed if is_unstable(r)]
     without = [r for r in timed if seconds_interval(r) is None]
     if len(without) == len(timed):
-        return f"No time has an interval, with too few rounds for one: {_why(without)}."
+        most = max(len(r.outcome.rounds) for r in timed)
+        times = "once" if most == 1 else f"at most {most} times"
+        return f"Each cell was timed {times}, so no intervals are given: {_why(without)}."
     told = (
         f"{len(unstable) or 'None'} of {len(timed)} {'time' if len(timed) == 1 else 'times'} "
         f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "

@@ -57,8 +57,8 @@ def _throttles(system: Path) -> int | None:
 
 
 def _sum(files: Iterable[Path]) -> int | None:
-    found = []
+    counts = []
     for file in files:
         with suppress(OSError, ValueError):
-            found.append(int(file.read_text()))
-    return sum(found) if found else None
+            counts.append(int(file.read_text()))
+    return sum(counts) if counts else None

@@ -284,7 +284,7 @@ class _Run:
     ) -> dict[str, tuple[float, ...]]:
         """Return the calls of these cells in one process; none if these cannot be compared.
 
-        Then the cells go on in processes of their own alone, which show whose fault it is.
+        Afterwards the cells have only their own processes, which show which cell is at fault.
         """
         key = circumstances(cells[0].task.cell)
         if key in self.apart:

@@ -91,12 +91,12 @@ def kept_from_call_to_call(apart: float, scatter: float) -> Fault | None:
     """
     if apart <= max(SAME_MAP, SCATTER * scatter):
         return None
-    told = (
+    message = (
         f"maps of the same surface differ by {apart:.2g} between a fresh process and one with "
         f"earlier calls, but by {scatter:.2g} at most between fresh ones: results are kept from "
         "call to call"
     )
-    return Fault(kind=FaultKind.KEPT_RESULT, detail=told)
+    return Fault(kind=FaultKind.KEPT_RESULT, detail=message)
 
 
 def judged_check(
@@ -140,12 +140,12 @@ def judged_calls(
     for name, motion, uv in maps:
         bits = hash_of(uv)
         if seen.setdefault(bits, motion) != motion and not promise.combinatorial:
-            told = (
+            message = (
                 f"{name} returned the identical map for a surface of another shape: the map was "
                 "kept from another call, or does not depend on the coordinates (then declare "
                 "combinatorial=True)"
             )
-            return JudgedCalls(kept=(Fault(kind=FaultKind.KEPT_RESULT, detail=told),))
+            return JudgedCalls(kept=(Fault(kind=FaultKind.KEPT_RESULT, detail=message),))
         if motion == UNMOVED and bits == checked.uv_hash:
             repeated = repeated is not False
             far = far or 0.0
@@ -168,8 +168,8 @@ def judged_calls(
             doubtful = doubtful or (None if near and motion != UNMOVED else motion)
             wrong = [] if motion != UNMOVED else wrong
         if wrong:
-            told = f"{name} returned a different map from the check"
-            return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=told), *wrong))
+            message = f"{name} returned a different map from the check"
+            return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=message), *wrong))
     return JudgedCalls(doubtful=doubtful, repeated=repeated, apart=far)
 
 
@@ -193,8 +193,8 @@ def _other_energy(
         energy = (dirichlet_energy(mesh, uv) - area) / area
     if abs(energy - checked.relative_energy) <= SAME_ENERGY:
         return []
-    told = f"E_C over the area is {energy:.9g}, not {checked.relative_energy:.9g}"
-    return [Fault(kind=FaultKind.OTHER_ENERGY, detail=told)]
+    message = f"E_C over the area is {energy:.9g}, not {checked.relative_energy:.9g}"
+    return [Fault(kind=FaultKind.OTHER_ENERGY, detail=message)]
 
 
 def _judged(
@@ -206,16 +206,16 @@ def _judged(
         metrics = _metrics(promise.target, mesh, uv)
         finite = {name: _finite(value) for name, value in metrics.items()}
         if promise.target == "atlas":
-            told = [] if problems else lost_in_rounding(metrics)
-            return {"metrics": finite, "notes": tuple(told)}, problems
-        told = [] if problems else [*remarks(promise, mesh, uv), *lost_in_rounding(metrics)]
+            notes = [] if problems else lost_in_rounding(metrics)
+            return {"metrics": finite, "notes": tuple(notes)}, problems
+        notes = [] if problems else [*remarks(promise, mesh, uv), *lost_in_rounding(metrics)]
         if not problems:
             error = float(metrics["angle_error_mean_deg"])
-            told += quality_notes(promise.target, mesh, uv, extras, error)
+            notes += quality_notes(promise.target, mesh, uv, extras, error)
         about = {
             "metrics": finite,
             "boundaries": _boundaries(mesh, uv),
-            "notes": tuple(told),
+            "notes": tuple(notes),
         }
     return about, problems
 
@@ -239,8 +239,8 @@ def _warnings_ignored() -> Iterator[None]:
 
 
 def _no_metrics(error: Exception) -> Fault:
-    told = f"its metrics cannot be computed: {describe_error(error)}"
-    return Fault(kind=FaultKind.NO_METRICS, detail=told)
+    message = f"its metrics cannot be computed: {describe_error(error)}"
+    return Fault(kind=FaultKind.NO_METRICS, detail=message)
 
 
 def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:

@@ -85,9 +85,9 @@ def faults(promised: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> li
         off = [fault for fault in placed if fault.kind is not FaultKind.WINDING]
         return [*off, _fault(FaultKind.REVERSED, "the map reverses the surface's orientation")]
     if flipped:
-        told = f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})"
-        told = "; ".join([told, *broken_premises(mesh)])
-        placed.append(_fault(FaultKind.FOLDED, told))
+        message = f"{flipped} of {mesh.m} triangles are folded ({flipped / mesh.m:.2%})"
+        message = "; ".join([message, *broken_premises(mesh)])
+        placed.append(_fault(FaultKind.FOLDED, message))
     return placed + order
 
 
@@ -102,11 +102,11 @@ def judged_atlas(mesh: TriangleMesh, corners: Complex) -> list[Fault]:
         return [_fault(FaultKind.REVERSED, "the map reverses the surface's orientation")]
     if not folded:
         return []
-    told = (
+    message = (
         f"{folded} of {mesh.m} triangles are folded ({folded / mesh.m:.2%}), in "
         f"{int((figures.folds > 0).sum())} of {figures.cut.islands} islands"
     )
-    return [_fault(FaultKind.FOLDED, told)]
+    return [_fault(FaultKind.FOLDED, message)]
 
 
 def broken_premises(mesh: TriangleMesh) -> list[str]:
@@ -124,10 +124,10 @@ def remarks(algorithm: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> 
     circles: their circularity is a metric like the energy, not a promise.
     """
     if algorithm.target == "free boundary":
-        found = _crossings(mesh, uv)
+        crossings = _crossings(mesh, uv)
         return [
             Notice(NoticeKind.IMAGE_OVERLAPS, f"the image overlaps itself: {fault.detail}")
-            for fault in found
+            for fault in crossings
         ]
     return _uncircular_holes(mesh, uv) if algorithm.target == "circular holes" else []
 
@@ -146,19 +146,21 @@ def _of_the_circle(
     """Return faults of position and winding on the unit circle, and faults of order."""
     z = uv[_outer(mesh, uv)]
     name = "boundary" if len(mesh.loops) == 1 else "outer boundary"
-    found, order = [], []
+    placed, order = [], []
     off = np.abs(np.abs(z) - 1).max()
     if off > tolerance:
-        told = f"the {name} lies off the unit circle by up to {off:.2g}"
-        found.append(_fault(FaultKind.OFF_CIRCLE, told))
+        message = f"the {name} lies off the unit circle by up to {off:.2g}"
+        placed.append(_fault(FaultKind.OFF_CIRCLE, message))
     around, winding, backward = turns(z)
     if around != 1 and winding not in (0, 1):  # 0: all points may be on one half of the circle
-        told = f"the {name} {winding_words(winding)}; it must go around it once, counter-clockwise"
-        found.append(_fault(FaultKind.WINDING, told))
+        message = (
+            f"the {name} {winding_words(winding)}; it must go around it once, counter-clockwise"
+        )
+        placed.append(_fault(FaultKind.WINDING, message))
     elif around != 1:
-        told = f"{backward} of {len(z)} arcs of the {name} go backward"
-        order.append(_fault(FaultKind.BOUNDARY_ORDER, told))
-    return found, order
+        message = f"{backward} of {len(z)} arcs of the {name} go backward"
+        order.append(_fault(FaultKind.BOUNDARY_ORDER, message))
+    return placed, order
 
 
 def _crossings(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
@@ -167,8 +169,8 @@ def _crossings(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
         return []
     one, other = (f"boundary {int(mesh.loops[k].min())}" for k in crossing)
     whom = "itself" if one == other else other
-    told = f"{one} crosses {whom} (a boundary is named by its smallest vertex)"
-    return [_fault(FaultKind.BOUNDARIES_CROSS, told)]
+    message = f"{one} crosses {whom} (a boundary is named by its smallest vertex)"
+    return [_fault(FaultKind.BOUNDARIES_CROSS, message)]
 
 
 def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
@@ -186,21 +188,21 @@ def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
 
 def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[Notice]:
     circles = boundary_circles(mesh, uv)[1:]
-    told = []
+    texts = []
     off = [circle.circularity for circle in circles if not circle.circularity <= CIRCULAR]
     if off:
-        told.append(
+        texts.append(
             f"{len(off)} of {len(circles)} holes are not circles: off by up to {max(off):.2g} of "
             "the radius"
         )
     # Three vertices are always on a circle, but not always on one inside the disk.
     out = [c for c in circles if c.circularity <= CIRCULAR < abs(c.centre) + c.radius - 1]
     if out:
-        told.append(f"the circles of {len(out)} of {len(circles)} holes reach outside the disk")
+        texts.append(f"the circles of {len(out)} of {len(circles)} holes reach outside the disk")
     if any(
         abs(one.centre - other.centre) < (one.radius + other.radius) * (1 - CIRCULAR)
         for one, other in combinations(circles, 2)
         if max(one.circularity, other.circularity) <= CIRCULAR
     ):
-        told.append("circles of holes overlap")
-    return [Notice(NoticeKind.HOLES_NOT_CIRCULAR, text) for text in told]
+        texts.append("circles of holes overlap")
+    return [Notice(NoticeKind.HOLES_NOT_CIRCULAR, text) for text in texts]

@@ -40,7 +40,7 @@ from cembench.results.records import (
     not_ok,
 )
 from cembench.running.external.call import ProgramCalls
-from cembench.running.external.present import library_version, missing
+from cembench.running.external.installed import library_version, missing
 from cembench.running.map_checks import judged_check
 from cembench.running.map_promises import Promise
 from cembench.running.memory import Memory, memory_of_call
@@ -183,7 +183,7 @@ def check_cell(
 
 @contextmanager
 def _raised_by_signals() -> Iterator[list[BaseException]]:
-    """Yield a list of what handlers of signals raise, which is no fault of the algorithm's."""
+    """Yield a list of the exceptions raised by signal handlers, not by the algorithm."""
     raised: list[BaseException] = []
     handlers: dict[int, Any] = {}
     if threading.current_thread() is threading.main_thread():  # where signals arrive
@@ -225,12 +225,12 @@ def call_cell(
         return called, uv
     other = cell.model_copy(update={"parameters": cell.parameters | suggested})
     try:
-        found = _called(algorithm, mesh, other, memory=memory)[1]
+        other_uv = _called(algorithm, mesh, other, memory=memory)[1]
     except ParameterError:  # these are no parameters of the algorithm
-        found = None
-    if found is None:
+        other_uv = None
+    if other_uv is None:
         return called, uv
-    better = better_parameters(algorithm.name, mesh, uv, found, suggested)
+    better = better_parameters(algorithm.name, mesh, uv, other_uv, suggested)
     return called.model_copy(update={"notes": (*called.notes, *better)}), uv
 
 
@@ -287,42 +287,42 @@ def timed_together(
     try:
         made = [_call(one.algorithm, mesh, one.cell) for one in cells]
         with linear_algebra(first.solves, first.backend):
-            told, everything = _timed(list(zip(cells, made, strict=True)), mesh)
+            by_cell, everything = _timed(list(zip(cells, made, strict=True)), mesh)
         rounds = [
-            _round_of(one, call, t, mesh) for one, call, t in zip(cells, made, told, strict=True)
+            _round_of(one, call, t, mesh) for one, call, t in zip(cells, made, by_cell, strict=True)
         ]
     except BaseException as error:
         return outcome_of_error(error, mesh)
-    found = []
-    for measured, calls in zip(rounds, told, strict=True):
+    results = []
+    for measured, calls in zip(rounds, by_cell, strict=True):
         if isinstance(measured, Outcome):
             return measured
-        found.append((measured, calls))
-    return found, everything
+        results.append((measured, calls))
+    return results, everything
 
 
-def _round_of(one: Timed, call: Call, told: TimedCalls, mesh: TriangleMesh) -> Round | Outcome:
+def _round_of(one: Timed, call: Call, timed: TimedCalls, mesh: TriangleMesh) -> Round | Outcome:
     """Return the figures of an algorithm's calls, or an outcome that says what is wrong."""
-    counted = told.counted
+    counted = timed.counted
     timings = [c.timing for c in counted]
     start = call.start_seconds(len(timings)) if isinstance(call, ProgramCalls) else None
     problems = [fault for t in timings if (fault := phases_fault(t))][:1]
-    for name, made in zip(told.names(), told.calls, strict=True):
+    for name, made in zip(timed.names(), timed.calls, strict=True):
         if isinstance(made.uv, Fault):
-            words = f"{name} returned a different map from the check"
-            problems += [Fault(kind=FaultKind.OTHER_MAP, detail=words), made.uv]
+            message = f"{name} returned a different map from the check"
+            problems += [Fault(kind=FaultKind.OTHER_MAP, detail=message), made.uv]
             break
-    problems += [_changed()] if told.changed else _changes(mesh, one.cell)
-    if not problems and min(c.timing.total for c in told.calls) <= 0:
-        words = "its times are impossible: a call took no time or negative time"
-        problems.append(Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=words))
+    problems += [_changed()] if timed.changed else _changes(mesh, one.cell)
+    if not problems and min(c.timing.total for c in timed.calls) <= 0:
+        message = "its times are impossible: a call took no time or negative time"
+        problems.append(Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=message))
     if problems:
         return not_ok("invalid", *problems)
     before, after = [c.before for c in counted], [c.after for c in counted]
-    found = _round(timings, before, after, isinstance(call, ProgramCalls))
-    cold = None if told.calls[0].counts else told.calls[0].timing.total
-    found = _program_round(found, call, len(timings), start)
-    return found.model_copy(update={"cold_seconds": cold})
+    result = _round(timings, before, after, isinstance(call, ProgramCalls))
+    cold = None if timed.calls[0].counts else timed.calls[0].timing.total
+    result = _program_round(result, call, len(timings), start)
+    return result.model_copy(update={"cold_seconds": cold})
 
 
 def _about_program(call: ProgramCalls) -> dict[str, Any]:
@@ -344,18 +344,18 @@ def _timed(
     cells: Sequence[tuple[Timed, Call]], mesh: TriangleMesh
 ) -> tuple[list[TimedCalls], TimedCalls]:
     """Make the calls; return those of each cell, and all of them in their order."""
-    told, everything = [TimedCalls() for _ in cells], TimedCalls()
+    by_cell, everything = [TimedCalls() for _ in cells], TimedCalls()
 
     def once(number: int, *, counts: bool) -> None:
-        (one, call), mine = cells[number], told[number]
+        (one, call), mine = cells[number], by_cell[number]
         motion = one.motions[len(mine.calls)] if one.motions else UNMOVED
         gc.collect()
         gc.disable()
         try:
             # Made after the collection, so that no finaliser or callback could see it.
-            given = moved(mesh, motion)
+            surface = moved(mesh, motion)
             before = before_call()
-            returned, timing = call(given)
+            returned, timing = call(surface)
             after = after_call()
         finally:
             gc.enable()
@@ -364,36 +364,36 @@ def _timed(
         made = TimedCall(motion, timing, uv, before, after, counts)
         mine.calls.append(made)
         everything.calls.append(replace(made, uv=_NOT_KEPT))
-        mine.changed |= not _is_as(given, moved(mesh, motion))
+        mine.changed |= not _is_as(surface, moved(mesh, motion))
 
     numbers = _shuffled(range(len(cells)))
     for number in numbers:
         once(number, counts=False)
-    short = [number for number in numbers if not told[number].counted]
+    short = [number for number in numbers if not by_cell[number].counted]
     if not short:
-        return told, everything
+        return by_cell, everything
     gc.collect()
     gc.freeze()  # a second collection scans only new objects; the others stay out of the caches
     for number in short:
-        while len(told[number].calls) < cells[number][0].untimed:
+        while len(by_cell[number].calls) < cells[number][0].untimed:
             once(number, counts=False)
     if len(cells) == 1:
-        while _wants_more(told[0]):
+        while _wants_more(by_cell[0]):
             once(0, counts=True)
     else:
-        for number in _shuffled([n for n in short for _ in range(_calls_expected(told[n]))]):
+        for number in _shuffled([n for n in short for _ in range(_calls_expected(by_cell[n]))]):
             once(number, counts=True)
     gc.unfreeze()
-    return told, everything
+    return by_cell, everything
 
 
-def _wants_more(told: TimedCalls) -> bool:
-    return len(told.counted) < ENOUGH_CALLS and told.seconds < ENOUGH_SECONDS
+def _wants_more(timed: TimedCalls) -> bool:
+    return len(timed.counted) < ENOUGH_CALLS and timed.seconds < ENOUGH_SECONDS
 
 
-def _calls_expected(told: TimedCalls) -> int:
+def _calls_expected(timed: TimedCalls) -> int:
     """Return how many calls there would be in a process of its own, by the last call so far."""
-    last = max(told.calls[-1].timing.total, ENOUGH_SECONDS / ENOUGH_CALLS)
+    last = max(timed.calls[-1].timing.total, ENOUGH_SECONDS / ENOUGH_CALLS)
     return math.ceil(ENOUGH_SECONDS / last)
 
 
@@ -410,8 +410,8 @@ def preparing_seconds(mesh: TriangleMesh) -> float:
     def once() -> float:
         before = after_call()
         gc.collect()
-        given = moved(mesh, "preparing")
-        _is_as(given, moved(mesh, "preparing"))
+        surface = moved(mesh, "preparing")
+        _is_as(surface, moved(mesh, "preparing"))
         return before_call().thread - before.thread
 
     return min(once(), once())  # the first one also loads what it needs
@@ -426,8 +426,8 @@ def _changes(mesh: TriangleMesh, cell: Cell) -> list[Fault]:
 
 
 def _changed() -> Fault:
-    told = "the algorithm changed the mesh it was given"
-    return Fault(kind=FaultKind.MESH_CHANGED, detail=told)
+    message = "the algorithm changed the mesh it was given"
+    return Fault(kind=FaultKind.MESH_CHANGED, detail=message)
 
 
 def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
@@ -436,11 +436,11 @@ def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
         return ProgramCalls(algorithm, mesh, arguments, cell.threads)
     lacking = missing(algorithm)
 
-    def call(given: TriangleMesh) -> tuple[Returned, Timing]:
+    def call(surface: TriangleMesh) -> tuple[Returned, Timing]:
         if lacking:
             raise NotThere(lacking)
         return measure(
-            lambda: Returned.of(algorithm.function(given, **arguments), given, algorithm.target)
+            lambda: Returned.of(algorithm.function(surface, **arguments), surface, algorithm.target)
         )
 
     return call
@@ -478,5 +478,5 @@ def _round(
 
 
 def _with_memory(outcome: Outcome, memory: Memory) -> Outcome:
-    found = {"peak_memory_bytes": memory.peak, "memory_increase_bytes": memory.increase}
-    return outcome.model_copy(update=found)
+    figures = {"peak_memory_bytes": memory.peak, "memory_increase_bytes": memory.increase}
+    return outcome.model_copy(update=figures)

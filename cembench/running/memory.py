@@ -33,10 +33,10 @@ def memory_of_call(call: Callable[[], T]) -> tuple[T, Memory]:
     gc.collect()
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
-    before, files = resident_bytes(), _told_by_linux("RssFile") or 0
+    before, files = resident_bytes(), _linux_status("RssFile") or 0
     result = call()
     peak = peak_memory_bytes()
-    came_in = max(0, (_told_by_linux("RssFile") or 0) - files)
+    came_in = max(0, (_linux_status("RssFile") or 0) - files)
     return result, Memory(peak, None if peak is None else max(0, peak - before - came_in))
 
 
@@ -50,7 +50,7 @@ def resident_bytes() -> int:
 
 def peak_memory_bytes() -> int | None:
     """Return the peak resident memory of this process; None if the system does not report it."""
-    peak = _told_by_linux("VmHWM")
+    peak = _linux_status("VmHWM")
     if peak is not None:
         return peak
     try:
@@ -61,8 +61,8 @@ def peak_memory_bytes() -> int | None:
     return peak if sys.platform == "darwin" else peak * 1024
 
 
-def _told_by_linux(field: str) -> int | None:
-    """Return a figure of this process in bytes, as Linux tells it; None elsewhere."""
+def _linux_status(field: str) -> int | None:
+    """Return a figure of this process in bytes, from Linux; None elsewhere."""
     status = Path("/proc/self/status")
     if status.exists():
         for line in status.read_text().splitlines():

@@ -32,10 +32,10 @@ class Options:
     reference: str = REFERENCE
     #: Rounds of a cell that is measured until it is precise, at most.
     most_rounds: int = USUAL_MOST_ROUNDS
-    #: Wall-clock seconds after which no cell goes on that has had a round; None: no limit.
-    #: Cells with a fixed number of rounds have all of them.
+    #: Time budget in wall-clock seconds, after which only first rounds are made; None: no limit.
+    #: It does not shorten a fixed number of rounds.
     budget: float | None = None
-    #: Whether a budget that does not bring all cells to their first look is spent surface by
+    #: Whether a budget that is not enough for the first look of all cells is spent surface by
     #: surface, so that the comparisons on the cheapest ones are complete; else cell by cell.
     whole_surfaces: bool = False
     #: Whether the cells that are compared on a surface also share a process in each round:
@@ -46,6 +46,6 @@ class Options:
     #: Number of checks that run in parallel, sharing the memory. Timed processes run alone.
     jobs: int = 1
 
-    def measures_again(self, kept: Record) -> bool:
+    def measures_again(self, record: Record) -> bool:
         """Whether a cell with this record is measured again."""
-        return self.fresh or (self.rerun_failed and kept.outcome.status != "ok")
+        return self.fresh or (self.rerun_failed and record.outcome.status != "ok")

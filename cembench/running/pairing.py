@@ -25,7 +25,7 @@ Pairing = Literal["auto", "separate", "process"]
 
 #: Number of processes that show the scatter, and the largest share of a run that they may take.
 PROCESSES, WORTH = 10, 0.05
-#: A round that has both kinds of processes costs so many times one with separate ones.
+#: Cost of a round with both kinds of processes, relative to one with separate processes.
 COST = 2.0
 #: Efficiency of the signed-rank interval for values that scatter normally.
 _EFFICIENCY = 3 / np.pi

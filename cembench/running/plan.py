@@ -107,8 +107,8 @@ def plan_cells(
         role = standing.get(mesh.name, PaperRole())
         facts = mesh_facts(mesh, role)
         model = role.paper_row if role.origin == "model" else ""
-        given = paper_of(model).as_printed(model, algorithms) | dict(parameters)
-        arguments = distribute_parameters(algorithms, given)
+        settings = paper_of(model).as_printed(model, algorithms) | dict(parameters)
+        arguments = distribute_parameters(algorithms, settings)
         for taker in takers:
             cell = Cell(
                 algorithm=taker.name,
@@ -127,11 +127,11 @@ def plan_cells(
 
 
 def distribute_parameters(
-    algorithms: Sequence[Algorithm], given: Mapping[str, Any]
+    algorithms: Sequence[Algorithm], parameters: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
     """Return the keyword arguments of each algorithm by its name; see :func:`plan_cells`."""
     chosen: dict[str, dict[str, Any]] = {a.name: {} for a in algorithms}
-    for key, value in given.items():
+    for key, value in parameters.items():
         only, _, name = key.rpartition(".")
         takers = [
             a
@@ -179,15 +179,15 @@ def mesh_files(folder: Path) -> list[Path]:
     """
     try:
         named = (path for path in folder.iterdir() if is_named_like_a_mesh(path))
-        found = sorted(path for path in named if path.suffix.lower() not in _OF_ANYTHING)
+        files = sorted(path for path in named if path.suffix.lower() not in _OF_ANYTHING)
     except (FileNotFoundError, NotADirectoryError):
         why = "is not a folder"
     except OSError as error:
         why = f"cannot be listed ({error.strerror or error})"
     else:
         why = f"holds no file of a mesh ({', '.join(k for k in READERS if k not in _OF_ANYTHING)})"
-        if found:
-            return found
+        if files:
+            return files
     raise MeshError.about(
         "{given} {why}; name another, or single files.",
         given=Setting("mesh_dir", repr(str(folder))),

@@ -48,14 +48,14 @@ def _try(plugin: str, seconds: float) -> None:
         said = answer.read_bytes() if answer.is_file() else None
     if said is None or ending.limit:
         raise RegistryError(
-            f"plug-in {plugin!r} cannot be imported: {_told(ending, seconds)}. Repair it: "
+            f"plug-in {plugin!r} cannot be imported: {_ending(ending, seconds)}. Repair it: "
             "importing a plug-in must only declare functions."
         )
     if said != _LOADED:
         raise RegistryError(said.decode(errors="replace"))
 
 
-def _told(ending: ProcessEnd, seconds: float) -> str:
+def _ending(ending: ProcessEnd, seconds: float) -> str:
     if ending.limit:
         return f"the import took more than {seconds:g} s"
     return f"the importing process {ending.how}"
@@ -65,14 +65,14 @@ def _main(plugin: str, answer: Path, parent: int) -> None:
     die_with_parent(parent)
     try:
         declared_by(plugin)
-        told = _LOADED
+        content = _LOADED
     except RegistryError as error:
-        told = str(error).encode(errors="replace")
+        content = str(error).encode(errors="replace")
     except BaseException as error:  # only the plug-in can interrupt this process
-        told = f"plug-in {plugin!r} cannot be imported: {describe_error(error)}.".encode(
+        content = f"plug-in {plugin!r} cannot be imported: {describe_error(error)}.".encode(
             errors="replace"
         )
-    answer.write_bytes(told)
+    answer.write_bytes(content)
     os._exit(0)
 
 

@@ -162,8 +162,8 @@ def run_limited(
         code, left = _end_all(process, tree, *(("", 0) if alone else (mark, inherited)))
     with suppress(OSError), log.open("rb") as file:  # the process may have removed it
         said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
-    words = said.decode(errors="replace").strip()
-    return ProcessEnd(code, limit, seen, words, left, tuple(running))
+    output = said.decode(errors="replace").strip()
+    return ProcessEnd(code, limit, seen, output, left, tuple(running))
 
 
 def _ended_within(process: StartedProcess, seconds: float) -> bool:
@@ -200,30 +200,16 @@ def _resident_bytes(process: psutil.Process) -> int:
 
 
 def _drain(log: Path, said: bytes) -> bytes:
-    """Free the space of a log that grows too large, except for its end; return the output kept.
+    """Empty a log that grows too large; return the output kept, with its end.
 
-    On Linux the beginning of the file is freed while the process keeps writing. Elsewhere the file
-    is emptied, and output written since the last look is lost.
+    The process writes in append mode, so it continues at the new end.
     """
     with suppress(OSError):  # the process may have removed it
-        state = log.stat()
-        if state.st_blocks * 512 > _LARGEST_LOG_BYTES:
-            with log.open("rb+") as file:
-                if _freed(file.fileno(), state.st_size - KEPT_OUTPUT_BYTES):
-                    return said
+        if log.stat().st_size > _LARGEST_LOG_BYTES:
+            with log.open("rb") as file:
                 said = _end_of(file)
             os.truncate(log, 0)
     return said
-
-
-def _freed(handle: int, size: int) -> bool:
-    """Free the first bytes of a file, which then read as zeros; return whether it worked."""
-    keep_size, punch_hole = 1, 2  # of <linux/falloc.h>
-    if sys.platform != "linux" or size <= 0:
-        return False
-    free = ctypes.CDLL(None).fallocate64
-    free.argtypes = (ctypes.c_int, ctypes.c_int, ctypes.c_int64, ctypes.c_int64)
-    return bool(free(handle, keep_size | punch_hole, 0, size) == 0)
 
 
 def _end_of(file: IO[bytes]) -> bytes:
@@ -269,14 +255,14 @@ def _is_running(process: psutil.Process) -> bool:
 
 def _marked(mark: str, inherited: int) -> list[psutil.Process]:
     """Return the processes with one of the marks, whatever their parent is now."""
-    found = []
+    processes = []
     for one in psutil.process_iter():
         with suppress(psutil.Error, OSError):
             if (inherited and one.rlimit(_LIMIT)[1] == inherited) or one.environ().get(
                 MARK
             ) == mark:
-                found.append(one)
-    return found
+                processes.append(one)
+    return processes
 
 
 def finds_all() -> bool:
@@ -304,8 +290,6 @@ def die_with_parent(parent: int) -> None:
     """
     if sys.platform != "linux":
         return
-    import ctypes
-
     set_parent_death_signal = 1
     ctypes.CDLL(None).prctl(set_parent_death_signal, signal.SIGKILL)
     if os.getppid() != parent:

@@ -36,11 +36,11 @@ Complex = NDArray[np.complex128]
 FAR = 2.0
 #: Below this mean angle error, in degrees, none is, so a large smooth surface needs no yardstick.
 CLOSE = 0.1
-#: So is a map above this share of the mean angle error of collapsed triangles, or above so many
-#: degrees; the yardstick may be as bad there.
+#: So is a map above this share of the mean angle error of collapsed triangles, or above this number
+#: of degrees; the yardstick may be as bad there.
 COLLAPSED, POOR = 0.25, 10.0
-#: Above so many degrees a map is also compared with a free boundary, and is far from conformal
-#: above this multiple of its mean angle error; not on larger surfaces, to spare their memory.
+#: Above this number of degrees a map is also compared with a free boundary, and is far from
+#: conformal above this multiple of its mean angle error; not on larger surfaces, to save memory.
 COMPARED, FAR_FROM_FREE, MOST_TRIANGLES = 5.0, 4.0, 1_000_000
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
@@ -58,11 +58,11 @@ def quality_notes(
     """
     notes = _last_resort(mesh, extras, error)
     if extras.get("stopped") == "crowded":
-        told = (
+        message = (
             "the iteration ended early because the boundary is too crowded: this is not the map "
             "of least energy"
         )
-        notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, told))
+        notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, message))
     if target not in ("disk", "circular holes") or error <= CLOSE:
         return notes
     known = yardstick(target, mesh, uv)
@@ -100,33 +100,35 @@ def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) ->
     own = f"failed ({failure})" if failure else f"has {folded:,} folds" if folded else "is crowded"
     before = extras.get("before_repair", {}).get("angle_error_mean_deg")
     cost = "" if before is None else f" instead of {before:.2f}"
-    told = (
+    message = (
         f"the method's own map {own}, so this one is its last resort: "
         f"{done['moved_boundary_vertices']:,} boundary vertices were moved, and mean value weights "
         f"placed {done['mean_value_vertices']:,} vertices; the mean angle error is {error:.2f} "
         f"degrees{cost}"
     )
     if done["mean_value_vertices"] == len(mesh.interior):
-        told += (
+        message += (
             ". The surface may be too long for one disk: a free boundary has room for it, "
             "e.g. -a abf-linear"
         )
-    return [Notice(NoticeKind.LAST_RESORT, told)]
+    return [Notice(NoticeKind.LAST_RESORT, message)]
 
 
 def better_parameters(
     name: str, mesh: TriangleMesh, uv: Complex, other: Complex, parameters: Mapping[str, Any]
 ) -> list[Notice]:
     """Return a remark if the map `other`, made with these parameters, has much better angles."""
-    here, there = (float(angle_errors(mesh, z).mean()) for z in (uv, other))
-    if there >= BETTER * here or flipped_triangles(mesh, other) > flipped_triangles(mesh, uv):
+    own_error, other_error = (float(angle_errors(mesh, z).mean()) for z in (uv, other))
+    if other_error >= BETTER * own_error or flipped_triangles(mesh, other) > flipped_triangles(
+        mesh, uv
+    ):
         return []
     named = " ".join(f"-p {name}.{key}={value}" for key, value in parameters.items())
-    told = (
-        f"the mean angle error is {here:.3g} degrees; with {named}, which the algorithm suggests "
-        f"for this surface, it is {there:.3g}"
+    message = (
+        f"the mean angle error is {own_error:.3g} degrees; with {named}, which the algorithm "
+        f"suggests for this surface, it is {other_error:.3g}"
     )
-    return [Notice(NoticeKind.BETTER_PARAMETERS, told)]
+    return [Notice(NoticeKind.BETTER_PARAMETERS, message)]
 
 
 def collapsed_error(mesh: TriangleMesh) -> float:

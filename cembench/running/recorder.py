@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cembench.results.records import Outcome, Record
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
-from cembench.running.external.present import external_of
+from cembench.running.external.installed import external_of
 from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.watcher import Watcher

@@ -33,7 +33,7 @@ from cembench.core.errors import (
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
-from cembench.running.external.faults import ProgramFault
+from cembench.running.external.exchange import ProgramFault
 from cembench.running.map_promises import broken_premises
 
 #: Maximum length of a stored traceback, in characters.
@@ -58,12 +58,12 @@ class Returned:
     result: Any
 
     @classmethod
-    def of(cls, found: Any, mesh: TriangleMesh, target: str = "disk") -> Returned:
+    def of(cls, result: Any, mesh: TriangleMesh, target: str = "disk") -> Returned:
         """Copy the map that a call on this mesh returned."""
-        return cls(_copied(found, mesh, target), found)
+        return cls(_copied(result, mesh, target), result)
 
 
-def _copied(found: Any, mesh: TriangleMesh, target: str) -> Complex | Fault:
+def _copied(result: Any, mesh: TriangleMesh, target: str) -> Complex | Fault:
     """Return the values of a map as a new plain array, or a fault: wrong type or shape.
 
     This is done while the clock runs, and the map is read once: whatever an object computes when it
@@ -71,16 +71,18 @@ def _copied(found: Any, mesh: TriangleMesh, target: str) -> Complex | Fault:
     atlas has an entry for each corner, (3 m,).
     """
     required, shape = (Atlas, (mesh.m, 3)) if target == "atlas" else (Parameterization, (mesh.n,))
-    if not issubclass(type(found), required):
+    if not issubclass(type(result), required):
         article = "an" if required is Atlas else "a"
-        told = f"it returned a {_type_of(found)}, not {article} {required.__name__}"
-        return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=told)
-    own = [name for name in _OF_OBJECT if any(name in vars(c) for c in type(found).__mro__[:-1])]
+        message = f"it returned a {_type_of(result)}, not {article} {required.__name__}"
+        return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=message)
+    own = [name for name in _OF_OBJECT if any(name in vars(c) for c in type(result).__mro__[:-1])]
     if own:
-        told = f"its class {_type_of(found)} defines {own[0]}; return a plain {required.__name__}"
-        return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=told)
+        message = (
+            f"its class {_type_of(result)} defines {own[0]}; return a plain {required.__name__}"
+        )
+        return Fault(kind=FaultKind.NOT_A_PARAMETERIZATION, detail=message)
     try:
-        uv = found.corners if required is Atlas else found.uv
+        uv = result.corners if required is Atlas else result.uv
     except BaseException as error:
         return Fault(
             kind=FaultKind.RAISED, detail=f"its uv cannot be read: {describe_error(error)}"
@@ -89,8 +91,8 @@ def _copied(found: Any, mesh: TriangleMesh, target: str) -> Complex | Fault:
     plain = np.asarray(uv) if issubclass(type(uv), np.ndarray) else None
     if plain is None or plain.shape != shape or plain.dtype != np.complex128:
         got = _type_of(uv) if plain is None else f"{plain.dtype} {plain.shape}"
-        told = f"uv is {got}; required is complex128 {shape}"
-        return Fault(kind=FaultKind.WRONG_SHAPE, detail=shortened(told))
+        message = f"uv is {got}; required is complex128 {shape}"
+        return Fault(kind=FaultKind.WRONG_SHAPE, detail=shortened(message))
     return np.array(plain, dtype=np.complex128, order="C").ravel()
 
 
@@ -102,8 +104,8 @@ def finite(uv: Complex | Fault, target: str = "disk") -> Complex | Fault:
     if not len(bad):
         return uv
     places = "corners" if target == "atlas" else "vertices"
-    told = f"uv is NaN or infinite at {len(bad)} {places}, the first being {bad[0]}"
-    return Fault(kind=FaultKind.NOT_FINITE, detail=told)
+    message = f"uv is NaN or infinite at {len(bad)} {places}, the first being {bad[0]}"
+    return Fault(kind=FaultKind.NOT_FINITE, detail=message)
 
 
 def hash_of(uv: Complex) -> str:
@@ -111,7 +113,7 @@ def hash_of(uv: Complex) -> str:
     return hashlib.sha256(uv.tobytes()).hexdigest()
 
 
-def report_of(found: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fault]]:
+def report_of(result: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fault]]:
     """Return iterations, energies and extras by the names of :class:`Outcome`, and the faults.
 
     Faulty values are left out.
@@ -119,28 +121,28 @@ def report_of(found: Parameterization | Atlas) -> tuple[dict[str, Any], list[Fau
     report: dict[str, Any] = {}
     wrong = []
     of_map = (("iterations", _iterations), ("energy_history", _energies))
-    for name, read in (*(() if isinstance(found, Atlas) else of_map), ("extras", _extras)):
+    for name, read in (*(() if isinstance(result, Atlas) else of_map), ("extras", _extras)):
         try:
-            report[name] = read(getattr(found, name))
+            report[name] = read(getattr(result, name))
         except BaseException as error:
-            told = str(error) if isinstance(error, _WrongReportError) else describe_error(error)
-            wrong.append(Fault(kind=FaultKind.WRONG_REPORT, detail=f"{name} {told}"))
+            message = str(error) if isinstance(error, _WrongReportError) else describe_error(error)
+            wrong.append(Fault(kind=FaultKind.WRONG_REPORT, detail=f"{name} {message}"))
     return report, wrong
 
 
 def phases_fault(timing: Timing) -> Fault | None:
     """Return the fault in the seconds and phases of a call, or None."""
     names, seconds = list(timing.phases), [timing.total, *timing.phases.values()]
-    told = ""
+    message = ""
     if len(names) > MOST_PHASES:
-        told = f"it reports {len(names)} phases; allowed are at most {MOST_PHASES}"
+        message = f"it reports {len(names)} phases; allowed are at most {MOST_PHASES}"
     elif not all(
         isinstance(name, str) and len(name) <= 100 and shortened(name) == name for name in names
     ):
-        told = "a phase's name is not a text of at most 100 characters"
+        message = "a phase's name is not a text of at most 100 characters"
     elif not all(math.isfinite(s) and s >= 0 for s in seconds):
-        told = "the seconds of a phase are negative or not finite"
-    return Fault(kind=FaultKind.WRONG_REPORT, detail=told) if told else None
+        message = "the seconds of a phase are negative or not finite"
+    return Fault(kind=FaultKind.WRONG_REPORT, detail=message) if message else None
 
 
 def outcome_of_error(error: BaseException, mesh: TriangleMesh) -> Outcome:
@@ -170,18 +172,18 @@ class _WrongReportError(Exception):
     """An error about a value; its message follows the name of the value."""
 
 
-def _iterations(given: Any) -> int:
+def _iterations(value: Any) -> int:
     try:
-        count = operator.index(given)
+        count = operator.index(value)
     except TypeError:
-        raise _WrongReportError(f"is {_shown(given)}; required is an integer") from None
+        raise _WrongReportError(f"is {_shown(value)}; required is an integer") from None
     if not 0 <= count <= MOST_ITERATIONS:
-        raise _WrongReportError(f"is {_shown(given)}; allowed is 0 to 2^53")
+        raise _WrongReportError(f"is {_shown(value)}; allowed is 0 to 2^53")
     return count
 
 
-def _energies(given: Any) -> tuple[float, ...]:
-    energies = list(islice(given, MOST_ENERGIES + 1))
+def _energies(values: Any) -> tuple[float, ...]:
+    energies = list(islice(values, MOST_ENERGIES + 1))
     if len(energies) > MOST_ENERGIES:
         raise _WrongReportError(f"holds more than {MOST_ENERGIES:,} energies")
     for k, energy in enumerate(energies):
@@ -192,13 +194,13 @@ def _energies(given: Any) -> tuple[float, ...]:
     return tuple(map(float, energies))
 
 
-def _extras(given: Any) -> dict[str, Any]:
-    if not isinstance(given, dict):
-        raise _WrongReportError(f"is a {_type_of(given)}; required is a dict")
-    if not all(isinstance(name, str) for name in given):
+def _extras(value: Any) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise _WrongReportError(f"is a {_type_of(value)}; required is a dict")
+    if not all(isinstance(name, str) for name in value):
         raise _WrongReportError("has names that are not strings")
     try:
-        text = to_json(given, inf_nan_mode="null")
+        text = to_json(value, inf_nan_mode="null")
     except Exception as error:
         raise _WrongReportError(f"cannot be written as JSON: {describe_error(error)}") from None
     if len(text) > MOST_EXTRAS_BYTES:
@@ -218,7 +220,7 @@ def _shown(value: Any) -> str:
 
 def _traceback_of(error: BaseException) -> str:
     try:
-        told = "".join(traceback.format_exception(error))
+        text = "".join(traceback.format_exception(error))
     except BaseException as another:
-        told = f"{describe_error(error)} (no traceback: {_type_of(another)})"
-    return shortened(told, LONGEST_TRACEBACK)
+        text = f"{describe_error(error)} (no traceback: {_type_of(another)})"
+    return shortened(text, LONGEST_TRACEBACK)

@@ -30,7 +30,7 @@ from cembench.running.plan import Task
 #: Overhead of a round in seconds: starting a process, reading the mesh and judging the maps.
 BESIDE_CALLS = 0.25
 #: Share of the budget by which a plan may exceed it after the first round: prices scatter, and a
-#: cell that is left out cannot come back.
+#: cell that is dropped is not resumed.
 _TOLERATED = 0.1
 
 Rounds = Sequence[Round]
@@ -137,10 +137,10 @@ def partners_of(cells: Sequence[Cell], reference: str) -> dict[str, str]:
 def look(
     cells: Sequence[CellState], number: int, options: Options, seconds_left: float
 ) -> tuple[list[tuple[CellState, Ended]], list[CellState]]:
-    """Return the cells that end after this many rounds, each with the reason, and those that go on.
+    """Return the cells that end after `number` rounds, with the reason, and those that continue.
 
-    A cell ends if it is precise, or cannot go on; references end last. A cell that has more rounds,
-    from before a kill, went on when this was asked before.
+    A cell ends if it is precise, or cannot continue; references end last. A cell with more rounds,
+    from before a kill, was continued at this look before.
     """
     last = number >= options.most_rounds
     states = _until_precise(cells, None if last else number)
@@ -165,9 +165,9 @@ def look(
 def over_budget(
     cells: Sequence[CellState], number: int, options: Options, seconds_left: float
 ) -> list[CellState]:
-    """Return the cells that the budget does not bring to their first look, by label.
+    """Return the cells that cannot reach their first look within the budget, by label.
 
-    The cheapest ones are kept; a cell that is left out cannot come back.
+    The cheapest ones are kept; a cell that is dropped is not resumed.
     """
     if seconds_left == inf or number >= next_look(0, options.most_rounds):
         return []
@@ -188,7 +188,7 @@ def over_budget(
 def _until_precise(cells: Sequence[CellState], number: int | None) -> dict[str, CellState]:
     """Return the unfinished cells without a fixed number of rounds, by label.
 
-    With `number`, only those that have so many rounds.
+    With `number`, only those with this number of rounds.
     """
     return {
         state.label: state

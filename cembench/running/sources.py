@@ -22,7 +22,7 @@ from pathlib import Path
 
 from cembench.core.errors import RegistryError
 from cembench.registry import Algorithm
-from cembench.running.external.present import program_sources
+from cembench.running.external.installed import program_sources
 
 #: Functions that import a module by name.
 _IMPORTERS = ("import_module", "__import__")
@@ -50,13 +50,13 @@ def sources_of(algorithm: Algorithm) -> dict[str, str]:
     alone = algorithm.module in _own_modules() or (not top and root in _shared_folders())
     files = [file] if alone else _closure(file, root, top)
     try:
-        found = {
+        digests = {
             path.relative_to(root).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
             for path in files
         }
     except OSError as error:
         raise RegistryError(f"algorithm {algorithm.name!r}: {error}.") from error
-    return dict(sorted((more | found).items()))
+    return dict(sorted((more | digests).items()))
 
 
 def hash_of(sources: Mapping[str, str]) -> str:
@@ -84,8 +84,8 @@ def _root(file: Path, module: str) -> tuple[Path, str]:
 @cache
 def _own_modules() -> frozenset[str]:
     """Return the modules of cembench's own algorithms."""
-    found = distribution("cembench").entry_points.select(group="cembench.algorithms")
-    return frozenset(entry.module for entry in found)
+    entries = distribution("cembench").entry_points.select(group="cembench.algorithms")
+    return frozenset(entry.module for entry in entries)
 
 
 @cache
@@ -96,18 +96,18 @@ def _shared_folders() -> frozenset[Path]:
 
 def _closure(file: Path, root: Path, top: str) -> list[Path]:
     """Return a file and all files that it imports, directly or not, from within the root."""
-    found: dict[Path, None] = {}
+    files: dict[Path, None] = {}
     waiting = [file]
     while waiting:
         path = waiting.pop()
-        if path in found:
+        if path in files:
             continue
-        found[path] = None
+        files[path] = None
         folder = path.parent.relative_to(root).parts
         for name in _imported(path, folder):
             if not top or name[:1] == (top,):
                 waiting += _files_of(root, name)
-    return list(found)
+    return list(files)
 
 
 def _imported(file: Path, package: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

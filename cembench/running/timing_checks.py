@@ -59,54 +59,54 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     of the process and its children that were running or waiting for a processor: on a busy machine,
     CPU time alone does not show them.
     """
-    found = []
+    reasons = []
     grain = GRAIN + (GRAIN_OF_OTHERS if used.others else 0.0)
     spent = used.own + used.others
     if spent > threads * (1 + MORE) * used.wall + grain:
-        told = (
+        message = (
             f"the timed calls used {spent:.3g} s of CPU time in {used.wall:.3g} s: "
             f"{spent / used.wall:.1f} cores, but {threads} may be used. Allow more threads, or "
             "make the algorithm start none"
         )
-        found.append(Fault(kind=FaultKind.MORE_CORES, detail=told))
+        reasons.append(Fault(kind=FaultKind.MORE_CORES, detail=message))
     crowded = [count for count in running if count > threads]
-    if not found and len(crowded) >= MOST_CROWDED and len(crowded) > CROWDED * len(running):
-        told = (
+    if not reasons and len(crowded) >= MOST_CROWDED and len(crowded) > CROWDED * len(running):
+        message = (
             f"{max(crowded)} threads or processes were running at the same time, in "
             f"{len(crowded)} of {len(running)} samples, but {threads} may be used. Allow more "
             "threads, or make the algorithm start none"
         )
-        found.append(Fault(kind=FaultKind.MORE_CORES, detail=told))
+        reasons.append(Fault(kind=FaultKind.MORE_CORES, detail=message))
     # With several threads, a library's idle thread pool may spin.
     much = used.beside > BESIDE * used.wall + LITTLE + grain - GRAIN
     often = used.disturbed > 1 and 2 * used.disturbed > used.looked
     late = used.between > LEFT * (used.cold + used.wall) + PREPARING * used.preparing + LITTLE
     if late:
-        told = (
+        message = (
             f"work went on between the timed calls: {used.between:.3g} s of CPU time in the "
             f"calling thread, of which preparing the calls explains {used.preparing:.3g} s. All "
             "work on a map must be done within the call, and none by a finaliser, a callback of "
             "the garbage collector or a signal handler; if the call leaves much garbage, end it "
             "with gc.collect()"
         )
-        found.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=told))
+        reasons.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=message))
     elif threads == 1 and (much or often):
-        told = (
+        message = (
             f"work went on between the timed calls: {used.beside:.3g} s of CPU time "
             f"besides {used.wall:.3g} s of calls, before {used.disturbed} of {used.looked} calls. "
             "All work on a map must be done within the call"
         )
-        found.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=told))
-    return found
+        reasons.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=message))
+    return reasons
 
 
-def impossible(used: Used, found: Round, began: float, ended: float) -> list[Fault]:
+def impossible(used: Used, measured: Round, began: float, ended: float) -> list[Fault]:
     """Return a fault if a process's times contradict its parent's clock."""
-    told = used.cold + used.wall
-    if min(found.calls) <= 0 or used.cold < 0 or min(used.own, used.others) < 0:
+    reported = used.cold + used.wall
+    if min(measured.calls) <= 0 or used.cold < 0 or min(used.own, used.others) < 0:
         why = "a call took no time or negative time"
-    elif told > used.ended - used.began + CLOCKS_APART:
-        why = f"calls of {told:.3g} s in a process of {used.ended - used.began:.3g} s"
+    elif reported > used.ended - used.began + CLOCKS_APART:
+        why = f"calls of {reported:.3g} s in a process of {used.ended - used.began:.3g} s"
     elif used.began < began - CLOCKS_APART or used.ended > ended + CLOCKS_APART:
         why = "it reports times when it was not running"
     else:

@@ -55,8 +55,8 @@ class Watcher:
     def machines(self, names: Sequence[str]) -> None:
         """These machines of a cluster take part now, one name per worker."""
 
-    def says(self, words: str) -> None:
+    def says(self, message: str) -> None:
         """Before the first round: what precision this machine and the budget allow."""
 
-    def shows(self, words: str) -> None:
+    def shows(self, message: str) -> None:
         """Something happened to a machine of the cluster, or to a unit that it measured."""

@@ -149,9 +149,9 @@ def _check(job: Job) -> Answer:
 
 
 def _again(job: Job) -> Answer:
-    given = moved(_mesh(job), job.motions[0])
-    cell = job.cell.model_copy(update={"mesh_hash": given.hash})
-    outcome, uv = call_cell(load_algorithm(cell.algorithm, job.plugins), given, cell)
+    surface = moved(_mesh(job), job.motions[0])
+    cell = job.cell.model_copy(update={"mesh_hash": surface.hash})
+    outcome, uv = call_cell(load_algorithm(cell.algorithm, job.plugins), surface, cell)
     if uv is not None:
         np.save(job.uv_file, uv)
     return Answer(outcome=outcome)
@@ -170,24 +170,24 @@ def _time(job: Job) -> Answer:
         )
         for part in job.parts
     ]
-    found = timed_together(mesh, cells)
-    if isinstance(found, Outcome):
-        return Answer(outcome=found)
-    each, everything = found
+    result = timed_together(mesh, cells)
+    if isinstance(result, Outcome):
+        return Answer(outcome=result)
+    each, everything = result
     used = everything.used(preparing)
     used.began = began
     if any(one.algorithm.program is not None for one in cells):
         used.own = 0.0  # writing and reading the files is not part of the program's wall-clock time
     parts = []
-    for part, (measured, told) in zip(job.parts, each, strict=True):
-        np.save(part.uv_file, _maps(told))
-        motions = tuple(call.motion for call in told.calls)
-        parts.append(TimedPart(round=measured, names=tuple(told.names()), motions=motions))
+    for part, (measured, timed) in zip(job.parts, each, strict=True):
+        np.save(part.uv_file, _maps(timed))
+        motions = tuple(call.motion for call in timed.calls)
+        parts.append(TimedPart(round=measured, names=tuple(timed.names()), motions=motions))
     return Answer(parts=tuple(parts), used=used)
 
 
-def _maps(told: TimedCalls) -> NDArray[np.complex128]:
-    return np.stack([call.uv for call in told.calls if not isinstance(call.uv, Fault)])
+def _maps(timed: TimedCalls) -> NDArray[np.complex128]:
+    return np.stack([call.uv for call in timed.calls if not isinstance(call.uv, Fault)])
 
 
 def _judge_check(job: Job) -> Answer:

@@ -22,14 +22,14 @@ def closest_moebius(z: Complex, w: Complex) -> Moebius:
     """
     columns = np.stack([z, np.ones_like(z), -w * z, -w], axis=1)
     weight = np.ones(len(z))
-    found = np.zeros(4, dtype=np.complex128)
+    parameters = np.zeros(4, dtype=np.complex128)
     for _ in range(_STEPS):
-        before = found
-        found = np.linalg.svd(columns / weight[:, None], full_matrices=False)[2][-1].conj()
-        weight = np.abs(found[2] * z + found[3])
-        if abs(np.vdot(before, found)) > 1 - 1e-14 or not weight.min() > 0:
+        before = parameters
+        parameters = np.linalg.svd(columns / weight[:, None], full_matrices=False)[2][-1].conj()
+        weight = np.abs(parameters[2] * z + parameters[3])
+        if abs(np.vdot(before, parameters)) > 1 - 1e-14 or not weight.min() > 0:
             break
-    return Moebius(*found.tolist())
+    return Moebius(*parameters.tolist())
 
 
 def closest_similarity(z: Complex, w: Complex) -> Moebius:

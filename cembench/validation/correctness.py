@@ -206,7 +206,7 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
 def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
     """Check the modulus of four boundary points against the surface's error certificate."""
     pairs = [(certify(_disk(m.mesh)), _uv(m)) for m in series.maps]
-    off = [found.off(uv[found.corners]) for found, uv in pairs]
+    off = [exact.off(uv[exact.corners]) for exact, uv in pairs]
     finest, uv = pairs[-1]
     return ValidationFinding(
         stage="correctness",

@@ -118,21 +118,21 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
 
 def _found(finding: ValidationFinding) -> Value:
     if finding.undecided:
-        return words("cannot be told", "doubtful")
+        return words("inconclusive", "doubtful")
     return words("ok", "good") if finding.ok else words("fault", "bad")
 
 
 def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
     rows: list[list[Plain]] = []
     for against in compared:
-        for name, found in (
+        for name, pairs in (
             (against.energy_name, against.energy),
             ("mean angle error", against.angle),
             ("seconds", against.speed),
         ):
-            if found is not None:
-                ends = (found.ratio, found.low, found.high)
-                rows.append([f"{name} / {against.title}", *_counts(found), *ends])
+            if pairs is not None:
+                ends = (pairs.ratio, pairs.low, pairs.high)
+                rows.append([f"{name} / {against.title}", *_counts(pairs), *ends])
     whole = "of the rounds, not of the surfaces"
     timed = any(against.speed is not None for against in compared)
     return Table.of(
@@ -151,10 +151,10 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
     )
 
 
-def _counts(found: PairedComparison | Speed) -> tuple[int | None, ...]:
-    if isinstance(found, Speed):
+def _counts(compared: PairedComparison | Speed) -> tuple[int | None, ...]:
+    if isinstance(compared, Speed):
         return (None, None, None)
-    return (found.lower, found.equal, found.higher)
+    return (compared.lower, compared.equal, compared.higher)
 
 
 def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, Record]) -> Table:
@@ -211,8 +211,8 @@ def quotient(ours: float | None, theirs: float | None) -> float | None:
     return None if ours is None or theirs is None or theirs <= 0 else ours / theirs
 
 
-def _growth_table(found: GrowthComparison) -> Table:
-    growths = (found.ours, *found.others)
+def _growth_table(compared: GrowthComparison) -> Table:
+    growths = (compared.ours, *compared.others)
     sizes = dict.fromkeys(faces for growth in growths for faces in growth.faces)
     rows: list[list[Plain]] = []
     for growth in growths:
@@ -229,12 +229,12 @@ def _growth_table(found: GrowthComparison) -> Table:
         ],
         rows,
         caption="Exponent: of the seconds between the two largest sizes, the median over the "
-        f"rounds. {_CLOCKS[found.clock]}",
+        f"rounds. {_CLOCKS[compared.clock]}",
     )
 
 
-def _growth_plot(found: GrowthComparison) -> Plot:
-    growths: Sequence[Growth] = (found.ours, *found.others)
+def _growth_plot(compared: GrowthComparison) -> Plot:
+    growths: Sequence[Growth] = (compared.ours, *compared.others)
     styles = series_styles([growth.what for growth in growths])
     series = tuple(
         PlotSeries(growth.what, growth.faces, growth.seconds, "both", styles[growth.what])

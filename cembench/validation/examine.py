@@ -121,8 +121,8 @@ def examine(
             skipped[stage] = f"not examined, because of a fault in {fault}"
         else:
             work.hooks.stage(stage)
-            found, figures = examined(work)
-            findings += found
+            checked, figures = examined(work)
+            findings += checked
             parts |= figures
     validation = Validation(
         algorithm=algorithm.name,
@@ -175,10 +175,10 @@ class _Work:
     ) -> list[Record]:
         """Measure the algorithms side by side in one sitting; earlier records are not used."""
         chosen = [self.solver.algorithm, *(self.registry.algorithm(name) for name in beside)]
-        given = {f"{self.name}.{key}": value for key, value in self.solver.parameters.items()}
+        parameters = {f"{self.name}.{key}": value for key, value in self.solver.parameters.items()}
         how = MeasurementSettings(repeats=rounds)
         plan = (how, self.solver.plugins, self.asked.standing)
-        tasks = plan_cells(chosen, meshes, given, *plan)
+        tasks = plan_cells(chosen, meshes, parameters, *plan)
         options = replace(self.asked.options, fresh=True)
         with self.hooks.watcher(len(tasks)) as watcher:
             return run_tasks(tasks, Store(self.folder / stage), options, watcher)
@@ -216,15 +216,15 @@ def _scaling(work: _Work) -> _Found:
     started = monotonic()
     sittings = [work.measured("scaling", meshes, beside, FIRST_ROUNDS)]
     while True:
-        found = growth_of(sittings, work.name, beside[0] if beside else None)
-        if found is None:
+        growth = growth_of(sittings, work.name, beside[0] if beside else None)
+        if growth is None:
             return [scales(None)], {}
-        kept = set(largest_two(sittings[0], work.name))
-        again = [record for record in sittings[-1] if record.cell.mesh in kept]
-        more = more_rounds(found, monotonic() - started, seconds_a_round(again))
+        two_largest = set(largest_two(sittings[0], work.name))
+        again = [record for record in sittings[-1] if record.cell.mesh in two_largest]
+        more = more_rounds(growth, monotonic() - started, seconds_a_round(again))
         if not more:
-            return [scales(found)], {"growth": found}
-        largest = [mesh for mesh in meshes if mesh.name in kept]
+            return [scales(growth)], {"growth": growth}
+        largest = [mesh for mesh in meshes if mesh.name in two_largest]
         sittings.append(work.measured("scaling", largest, beside, more))
 
 

@@ -169,8 +169,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
 
 def together(against: Sequence[BaselineComparison]) -> tuple[BaselineComparison, ...]:
     """Return the comparisons with verdicts on speed corrected for their number (Holm)."""
-    told = iter(corrected([_comparison(a.speed) for a in against if a.speed is not None]))
-    return tuple(a if a.speed is None else _with_verdict(a, next(told).verdict) for a in against)
+    verdicts = iter(corrected([_comparison(a.speed) for a in against if a.speed is not None]))
+    return tuple(
+        a if a.speed is None else _with_verdict(a, next(verdicts).verdict) for a in against
+    )
 
 
 def _with_verdict(against: BaselineComparison, verdict: SpeedVerdict) -> BaselineComparison:
@@ -189,9 +191,9 @@ def _comparison(speed: Speed) -> Comparison:
 
 def _verdicts(pairs: Sequence[tuple[Record, Record]]) -> list[SpeedVerdict | None]:
     """Return the corrected verdict on speed for each surface; None without times."""
-    found = [compare(ours, theirs) for ours, theirs in pairs]
-    told = iter(corrected([one for one in found if one is not None]))
-    return [None if one is None else next(told).verdict for one in found]
+    comparisons = [compare(ours, theirs) for ours, theirs in pairs]
+    verdicts = iter(corrected([one for one in comparisons if one is not None]))
+    return [None if one is None else next(verdicts).verdict for one in comparisons]
 
 
 def sides(ratios: Sequence[float]) -> PairedComparison:
@@ -213,15 +215,17 @@ def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
     if not by_round:
         return None
     measured = _by_round([measured_ratios(ours, theirs) for ours, theirs in pairs])
-    found = confirmed(compare_ratios(by_round), measured)
-    low, high = (found.interval.low, found.interval.high) if found.interval else (None, None)
+    comparison = confirmed(compare_ratios(by_round), measured)
+    low, high = (
+        (comparison.interval.low, comparison.interval.high) if comparison.interval else (None, None)
+    )
     return Speed(
-        ratio=found.ratio,
+        ratio=comparison.ratio,
         low=low,
         high=high,
-        verdict=found.verdict,
+        verdict=comparison.verdict,
         rounds=len(by_round),
-        p=found.p,
+        p=comparison.p,
     )
 
 
@@ -281,7 +285,7 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
 def _pair(
     ours: Record, theirs: Record, verdict: SpeedVerdict | None, *, relative: bool, gauge: bool
 ) -> Pair:
-    found = compare(ours, theirs)
+    comparison = compare(ours, theirs)
     return Pair(
         surface=ours.cell.mesh,
         faces=ours.mesh.faces,
@@ -291,7 +295,7 @@ def _pair(
         baseline_angle=_valid(theirs).get("angle_error_mean_deg"),
         seconds=ours.outcome.median_seconds if ours.outcome.status == "ok" else None,
         baseline_seconds=theirs.outcome.median_seconds if theirs.outcome.status == "ok" else None,
-        seconds_ratio=found.ratio if found else None,
+        seconds_ratio=comparison.ratio if comparison else None,
         speed=verdict,
         start_seconds=ours.outcome.start_seconds,
         solve_seconds=ours.outcome.solve_seconds if ours.is_program else None,
@@ -305,8 +309,8 @@ def _valid(record: Record) -> Mapping[str, float | int | None]:
 
 def _has_gauge(record: Record) -> bool:
     """Whether a map has an energy in the common gauge; an invalid map has none."""
-    found = _valid(record)
-    return record.target == "disk" and (not found or found.get(_GAUGE) is not None)
+    valid = _valid(record)
+    return record.target == "disk" and (not valid or valid.get(_GAUGE) is not None)
 
 
 def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:

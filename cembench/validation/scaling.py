@@ -54,7 +54,7 @@ class GrowthAnswer(StrEnum):
     fine = "fine"
     too_steep = "too_steep"
     #: The intervals contain the limits, or there are none yet.
-    cannot_tell = "cannot_tell"
+    inconclusive = "inconclusive"
 
 
 class Growth(BaseModel):
@@ -119,13 +119,13 @@ def answer_of(exponents: Sequence[float], above: Sequence[float] | None) -> Grow
     """
     own = _interval(exponents)
     if own is None:
-        return GrowthAnswer.cannot_tell
+        return GrowthAnswer.inconclusive
     beside = None if above is None else _interval(above)
     if own.low > MOST_EXPONENT and (beside is None or beside.low > MOST_ABOVE_REFERENCE):
         return GrowthAnswer.too_steep
     if own.high <= MOST_EXPONENT or (beside and beside.high <= MOST_ABOVE_REFERENCE):
         return GrowthAnswer.fine
-    return GrowthAnswer.cannot_tell
+    return GrowthAnswer.inconclusive
 
 
 def growth_of(
@@ -164,20 +164,20 @@ def growth_of(
 
 
 def more_rounds(
-    found: GrowthComparison, spent: float, seconds_a_round: float, most: float = MOST_SECONDS
+    growth: GrowthComparison, spent: float, seconds_a_round: float, most: float = MOST_SECONDS
 ) -> int:
     """Return how many rounds are to be added; 0 if the answer is clear or time is used up.
 
     What looks too steep after the first rounds is not left there: it gets its interval.
     """
-    rounds = found.ours.rounds
-    if rounds >= MOST_ROUNDS or found.answer is not GrowthAnswer.cannot_tell:
+    rounds = growth.ours.rounds
+    if rounds >= MOST_ROUNDS or growth.answer is not GrowthAnswer.inconclusive:
         return 0
     more = next_look(rounds, MOST_ROUNDS) - rounds
-    first = found.ours.low is None
+    first = growth.ours.low is None
     if more * seconds_a_round + (0 if first else spent) <= most:
         return more
-    return more if first and found.ours.exponent > MOST_EXPONENT else 0
+    return more if first and growth.ours.exponent > MOST_EXPONENT else 0
 
 
 def seconds_a_round(records: Sequence[Record]) -> float:
@@ -190,16 +190,16 @@ def largest_two(records: Sequence[Record], ours: str) -> list[str]:
     return [r.cell.mesh for r in _timed_on(records, ours)[-2:]]
 
 
-def scales(found: GrowthComparison | None) -> ValidationFinding:
-    """Check our growth; None for too few sizes. What cannot be told is no fault."""
+def scales(growth: GrowthComparison | None) -> ValidationFinding:
+    """Check our growth; None for too few sizes. An inconclusive answer is not a fault."""
     measured = "it could not be timed on two sizes"
-    if found is not None:
-        measured = _words(found)
+    if growth is not None:
+        measured = _words(growth)
     return ValidationFinding(
         stage="scaling",
         name="growth of the seconds",
-        ok=found is not None and found.answer is not GrowthAnswer.too_steep,
-        undecided=found is not None and found.answer is GrowthAnswer.cannot_tell,
+        ok=growth is not None and growth.answer is not GrowthAnswer.too_steep,
+        undecided=growth is not None and growth.answer is GrowthAnswer.inconclusive,
         measured=measured,
         allowed=f"an exponent of {MOST_EXPONENT:g} at most, or {MOST_ABOVE_REFERENCE:g} more than "
         "the reference's in the same rounds; factoring a planar Laplacian has 1.5",
@@ -208,18 +208,18 @@ def scales(found: GrowthComparison | None) -> ValidationFinding:
     )
 
 
-def _words(found: GrowthComparison) -> str:
-    ours = found.ours
-    told = f"seconds grow like faces^{ours.exponent:.2f}{_range(ours.low, ours.high)}"
-    told += f" from {ours.faces[-2]:,} to {ours.faces[-1]:,} triangles"
-    if found.above is not None:
-        told += f", {found.above:.2f}{_range(found.above_low, found.above_high)} above "
-        told += ", ".join(f"{other.what} {other.exponent:.2f}" for other in found.others[:1])
-    if found.answer is GrowthAnswer.cannot_tell:
+def _words(growth: GrowthComparison) -> str:
+    ours = growth.ours
+    text = f"seconds grow like faces^{ours.exponent:.2f}{_range(ours.low, ours.high)}"
+    text += f" from {ours.faces[-2]:,} to {ours.faces[-1]:,} triangles"
+    if growth.above is not None:
+        text += f", {growth.above:.2f}{_range(growth.above_low, growth.above_high)} above "
+        text += ", ".join(f"{other.what} {other.exponent:.2f}" for other in growth.others[:1])
+    if growth.answer is GrowthAnswer.inconclusive:
         few = ours.low is None
         why = f"{ours.rounds} rounds are too few" if few else f"not after {ours.rounds} rounds"
-        told += f"; whether that is too steep cannot be told ({why})"
-    return told
+        text += f"; inconclusive ({why})"
+    return text
 
 
 def _range(low: float | None, high: float | None) -> str:
@@ -253,15 +253,15 @@ class _Timed(NamedTuple):
     def growth(self, what: str, clock: Clock) -> Growth:
         """Return the growth with its interval."""
         exponents = self.exponents(clock)
-        found = _interval(exponents)
+        interval = _interval(exponents)
         by_size = (*self.sizes[:-2], *self.largest)
         return Growth(
             what=what,
             faces=self.faces,
             seconds=tuple(lower_median([_seconds(r, clock) for r in size]) for size in by_size),
             exponent=median(exponents),
-            low=found.low if found else None,
-            high=found.high if found else None,
+            low=interval.low if interval else None,
+            high=interval.high if interval else None,
             rounds=len(exponents),
         )
 

@@ -79,12 +79,12 @@ def sentence(validation: Validation) -> str:
     for against in validation.against:
         parts.append(_energy_words(against))
         if against.speed is not None:
-            told = _speed_words(against.speed, against.title, named=several)
+            text = _speed_words(against.speed, against.title, named=several)
             if against.solve_time:
-                told += f", in the solve time of the external program ({against.solve_time})"
-            parts.append(told)
-    if validation.growth is not None and validation.growth.answer is GrowthAnswer.cannot_tell:
-        parts.append("whether its seconds grow too steeply cannot be told")
+                text += f", in the solve time of the external program ({against.solve_time})"
+            parts.append(text)
+    if validation.growth is not None and validation.growth.answer is GrowthAnswer.inconclusive:
+        parts.append("the growth of its seconds is inconclusive")
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
     if validation.no_map_on:
@@ -96,43 +96,43 @@ def sentence(validation: Validation) -> str:
 
 def _invalid(faults: Sequence[ValidationFinding]) -> str:
     first, *others = faults
-    words = f"invalid: {first.name}: {first.measured}"
+    text = f"invalid: {first.name}: {first.measured}"
     if others:
         names = ", ".join(dict.fromkeys(fault.name for fault in others))
-        words += f"; also: {names}"
-    return words
+        text += f"; also: {names}"
+    return text
 
 
 def _energy_words(against: BaselineComparison) -> str:
-    found, title = against.energy, against.title
+    compared, title = against.energy, against.title
     energy = against.energy_name
-    if not found.surfaces:
+    if not compared.surfaces:
         return f"{energy} not compared with {title}: no surface that both map"
-    if found.equal == found.surfaces:
-        words = f"{energy} equal to {title}'s within 1 % on {_all(found.surfaces)}"
-    elif found.lower >= found.higher:
-        words = f"{energy} lower than {title} on {found.lower} of {_count(found.surfaces)}"
+    if compared.equal == compared.surfaces:
+        text = f"{energy} equal to {title}'s within 1 % on {_all(compared.surfaces)}"
+    elif compared.lower >= compared.higher:
+        text = f"{energy} lower than {title} on {compared.lower} of {_count(compared.surfaces)}"
     else:
-        words = f"{energy} higher than {title} on {found.higher} of {_count(found.surfaces)}"
-    if 0 < found.equal < found.surfaces:
-        other = min(found.lower, found.higher)
-        side = "higher" if found.lower >= found.higher else "lower"
-        words += f", equal within 1 % on {found.equal}"
-        words += f", {side} on {other}" if other else ""
-    return f"{words} ({_ratio_words(found)})"
+        text = f"{energy} higher than {title} on {compared.higher} of {_count(compared.surfaces)}"
+    if 0 < compared.equal < compared.surfaces:
+        other = min(compared.lower, compared.higher)
+        side = "higher" if compared.lower >= compared.higher else "lower"
+        text += f", equal within 1 % on {compared.equal}"
+        text += f", {side} on {other}" if other else ""
+    return f"{text} ({_ratio_words(compared)})"
 
 
-def _ratio_words(found: PairedComparison) -> str:
-    words = f"median ratio {found.ratio:.2f}"
-    if found.low is not None:
-        return f"{words}, 95 % interval {found.low:.2f}-{found.high:.2f}"
-    return f"{words}, too few surfaces for an interval"
+def _ratio_words(compared: PairedComparison) -> str:
+    text = f"median ratio {compared.ratio:.2f}"
+    if compared.low is not None:
+        return f"{text}, 95 % interval {compared.low:.2f}-{compared.high:.2f}"
+    return f"{text}, too few surfaces for an interval"
 
 
-def _times(ratio: float, low: float, high: float, words: str) -> str:
+def _times(ratio: float, low: float, high: float, unit: str) -> str:
     """Return factors with one decimal digit, or two if one would print 1.0."""
     digits = 1 if ratio >= 1.15 else 2
-    return f"{ratio:.{digits}f} times {words} ({low:.{digits}f}-{high:.{digits}f})"
+    return f"{ratio:.{digits}f} times {unit} ({low:.{digits}f}-{high:.{digits}f})"
 
 
 def _speed_words(speed: Speed, title: str, *, named: bool) -> str:

@@ -8,7 +8,7 @@ from cembench import DiskMesh, parameterize
 from cembench.mesh.uvs import read_flat
 from cembench.registry import load_registry
 from cembench.running.external.exchange import read_output
-from cembench.running.external.present import missing
+from cembench.running.external.installed import missing
 from cembench.running.measure import check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
 from tests.real_meshes import real_mesh

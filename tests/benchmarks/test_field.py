@@ -34,7 +34,7 @@ def test_tables_have_a_row_a_surface_and_a_column_an_algorithm(tmp_path):
     assert np.array_equal(found.F, mesh.F)
     known = [ALGORITHMS["bff"], ALGORITHMS["scp"]]
     kept = {name: {"triangles": mesh.m, "maps": {a.name: figures(a, mesh) for a in known}}}
-    text = "\n".join(map(str, tables(kept, known)))
+    text = "\n".join(str(table) for _, _, table in tables(kept, known))
     assert text.count("| one.obj |") == 8
     assert "| surface | triangles | bff |" in text
     assert "| surface | triangles | scp |" in text

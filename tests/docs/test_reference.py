@@ -13,7 +13,7 @@ from cembench.core.notices import NoticeKind
 from cembench.mesh.defects import Defect, UnusableMeshError
 from cembench.mesh.uvs import OtherSurfaceError
 from cembench.results.records import FaultKind
-from cembench.running.external.faults import ProgramFault
+from cembench.running.external.exchange import ProgramFault
 
 DOCS = Path(__file__).parents[2] / "docs"
 CLASSES = {

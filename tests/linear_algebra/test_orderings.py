@@ -8,8 +8,7 @@ import cembench
 from cembench.conformal.laplacian import laplacian
 from cembench.linear_algebra import cholmod, orderings
 from cembench.linear_algebra.cholesky import Cholesky, linear_algebra
-from cembench.linear_algebra.cholmod_options import set_options
-from cembench.linear_algebra.orderings import minimum_degree, nested_dissection
+from cembench.linear_algebra.orderings import minimum_degree, nested_dissection, set_options
 from cembench.linear_algebra.work import counting
 
 pytest.importorskip("pymetis", reason="the extra metis is not installed: nothing of it is tested")

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import cembench
-from cembench.mesh.fans import vertices_of_several_fans
+from cembench.mesh.gluing import vertices_of_several_fans
 from tests import gallery
 
 

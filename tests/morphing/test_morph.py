@@ -3,7 +3,7 @@ import pytest
 
 from cembench.conformal.metrics import flipped_triangles
 from cembench.morphing.landmarks import Landmarks
-from cembench.morphing.metrics import _to_surface, mean_edge
+from cembench.morphing.metrics import distances_to, mean_edge
 from cembench.morphing.morph import morph
 from tests.morphing.reliefs import relief, three
 
@@ -25,7 +25,7 @@ def figures(found):
 
 def test_carried_vertices_lie_on_the_target(found):
     for mesh, carried in zip(found.meshes[1:], found.carried[1:], strict=True):
-        assert _to_surface(carried, mesh.V, mesh.F).max() < 1e-9
+        assert distances_to(carried, mesh.V, mesh.F).max() < 1e-9
 
 
 def test_the_boundary_is_carried_to_the_boundary(found):

@@ -46,7 +46,8 @@ def test_what_ended_other_cells_is_said_too(record, why):
 
 def test_without_any_interval_nothing_is_called_stable():
     assert stability_words([timed(FEW, precision=None)] * 3) == (
-        "No time has an interval, with too few rounds for one: their number of rounds was fixed."
+        "Each cell was timed at most 2 times, so no intervals are given: their number of rounds "
+        "was fixed."
     )
 
 

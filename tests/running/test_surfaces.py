@@ -9,8 +9,9 @@ from cembench.surfaces.flat_disk import flat_disk
 
 import cembench
 from cembench import DiskMesh, HoledMesh, MeshError, TriangleMesh
+from cembench.mesh.defects import Defect, UnusableMeshError
 from cembench.registry import load_registry
-from cembench.running.surfaces import load_surface
+from cembench.running.surfaces import KINDS, load_surface
 from tests import gallery
 
 DISK = flat_disk(60)
@@ -75,10 +76,13 @@ def test_holes_are_allowed_or_not():
     ring = gallery.tube()
     assert isinstance(load_surface(ring), HoledMesh)
     assert type(load_surface(ring, (TriangleMesh, HoledMesh))) is HoledMesh
-    with pytest.raises(MeshError, match="hole"):
-        load_surface(ring, holes=False)
-    with pytest.raises(MeshError, match="hole"):
-        load_surface(TriangleMesh.from_arrays(*ring), (DiskMesh,))
+    for surface, kinds, holes in (
+        (ring, KINDS, False),
+        (TriangleMesh.from_arrays(*ring), (DiskMesh,), True),
+    ):
+        with pytest.raises(UnusableMeshError) as refused:
+            load_surface(surface, kinds, holes=holes)
+        assert [problem.defect for problem in refused.value.problems] == [Defect.holes]
 
 
 def test_a_surface_is_repaired_and_cut():

@@ -98,7 +98,7 @@ def test_what_a_busy_machine_does_to_the_wall_clock_is_no_fault():
     one = growth_of([mixed], "ours", None)
     assert (one.clock, one.answer) == ("cpu", "fine")
     wall = growth_of([slowed], "ours", None)
-    assert (wall.answer, wall.ours.high > 2) == ("cannot_tell", True)
+    assert (wall.answer, wall.ours.high > 2) == ("inconclusive", True)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.05])
@@ -113,7 +113,7 @@ def test_cpu_seconds_are_not_taken_where_there_are_none_or_the_solver_waits(shar
 def test_what_cannot_be_told_is_no_fault_and_is_said():
     finding = scales(found(1.75, slower=[0.8, 1.2, 0.9, 1.1, 1.0, 0.7, 1.3]))
     assert (finding.ok, finding.undecided) == (True, True)
-    assert finding.measured.endswith("cannot be told (not after 7 rounds)")
+    assert finding.measured.endswith("inconclusive (not after 7 rounds)")
     assert scales(found(2.0, slower=[1.0, 1.0])).measured.endswith("(2 rounds are too few)")
 
 
@@ -150,7 +150,7 @@ def test_rounds_are_added_until_the_answer_is_clear_or_time_is_used_up():
     assert more_rounds(two, 0, 60.0) == 0
     assert more_rounds(found(2.0, slower=[1.0, 1.0]), inf, 60.0) == 5
     last = found(1.75, slower=[0.8, 1.2] * (MOST_ROUNDS // 2))
-    assert (last.answer, more_rounds(last, 0, 0.0)) == ("cannot_tell", 0)
+    assert (last.answer, more_rounds(last, 0, 0.0)) == ("inconclusive", 0)
     assert seconds_a_round(power("ours", 1.0)) > 0
 
 
@@ -186,4 +186,4 @@ def test_without_noise_there_is_no_doubt():
     assert answer_of([1.7] * 7, None) == "fine"
     assert answer_of([1.9] * 7, None) == "too_steep"
     assert answer_of([1.9] * 7, [0.7] * 7) == "fine"
-    assert answer_of([1.9] * 6, None) == "cannot_tell"
+    assert answer_of([1.9] * 6, None) == "inconclusive"

@@ -17,7 +17,6 @@ from queue import Empty, SimpleQueue
 from time import monotonic
 from typing import Any
 
-import numpy as np
 from distributed import Client, Future, KilledWorker, LocalCluster
 from pydantic import ValidationError
 
@@ -36,7 +35,7 @@ from cembench.running.plan import Task
 from cembench.running.recorder import Recorder, now, record_of, recording
 from cembench.running.watcher import Step, Watcher
 
-#: A unit that ended so many workers is recorded as failed.
+#: Number of lost workers after which a unit is recorded as failed.
 MOST_LOST = 2
 #: Seconds between two looks at the connected workers.
 LOOK_EVERY = 1.0
@@ -57,14 +56,13 @@ def run_on_cluster(
     options: Options | None = None,
     watcher: Watcher | None = None,
     *,
-    faces: int | None = None,
     same_environment: bool = False,
 ) -> list[Record]:
     """Measure the cells that the store does not hold on a cluster; return records in order.
 
     Like :func:`cembench.running.local.run_tasks`, which each worker calls. The budget is that of
-    each machine, and a unit gets its share. `faces` is the size that registered surfaces were
-    generated with; with `same_environment`, machines with other software measure nothing.
+    each machine, and a unit gets its share. With `same_environment`, machines with other software
+    measure nothing.
 
     Raises
     ------
@@ -73,7 +71,7 @@ def run_on_cluster(
 
     """
     with recording(tasks, store, options, watcher) as recorder:
-        run = _ClusterRun(recorder, client, faces, same_environment)
+        run = _ClusterRun(recorder, client, same_environment)
         try:
             run.measure(recorder.pending(tasks))
         finally:
@@ -87,7 +85,6 @@ class _Assignment:
 
     parcel: Parcel
     future: Future | None = None
-    sends_surface: bool = False
     #: Addresses of the workers that took it, and what the last one does.
     workers: list[str] = field(default_factory=list)
     activity: str = ""
@@ -106,7 +103,6 @@ class _ClusterRun:
 
     recorder: Recorder
     client: Client
-    faces: int | None
     same_environment: bool
     topic: str = field(default_factory=lambda: f"cembench-{uuid.uuid4().hex[:12]}")
     #: Events of workers, and assignments whose futures are done.
@@ -186,28 +182,22 @@ class _ClusterRun:
         parcels = []
         for group, seconds in zip(groups, costs, strict=True):
             own = replace(options, budget=None if share is None else share * seconds)
-            parcels.append(parcel(group, token, own, self.faces, seconds))
+            parcels.append(parcel(group, token, own, seconds))
         return sorted(parcels, key=lambda one: -one.seconds)
 
     def _usable(self) -> list[str]:
         return [worker for worker in self.workers if worker not in self.refused]
 
-    def _submit(self, assignment: _Assignment, worker: str | None = None) -> None:
+    def _submit(self, assignment: _Assignment) -> None:
         one = assignment.parcel
-        mesh = one.surface
-        arrays = (np.asarray(mesh.V), np.asarray(mesh.F)) if assignment.sends_surface else None
-        where: dict[str, Any] = {}
-        if worker is not None:
-            where = {"workers": [worker], "allow_other_workers": not self.refused}
-        elif self.refused:
-            where = {"workers": self._usable()}
+        where = {"workers": self._usable()} if self.refused else {}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that the arrays are large
             future = self.client.submit(
                 measure_unit,
                 one.unit.model_dump_json(),
                 one.plugin_files,
-                arrays,
+                (one.surface.V, one.surface.F),
                 self.topic,
                 key=f"cembench-unit-{one.unit.key}-{uuid.uuid4().hex[:6]}",
                 pure=False,
@@ -219,7 +209,6 @@ class _ClusterRun:
 
     def _submit_again(self, assignment: _Assignment) -> None:
         del self.sent[assignment.parcel.unit.key]
-        assignment.sends_surface = False
         self.waiting.appendleft(assignment)
 
     def _handle_next(self) -> None:
@@ -374,11 +363,7 @@ class _ClusterRun:
             raise ClusterError(f"{mesh} cannot be measured{where}: {error}") from error
 
     def _handle_answer(self, assignment: _Assignment, answer: Answer) -> None:
-        """Save the records of a unit, or send it again with its surface."""
-        if answer.lacks_surface:
-            assignment.sends_surface = True
-            self._submit(assignment, answer.worker)
-            return
+        """Save the records of a unit."""
         if answer.worker not in self.machines:
             self._look()
         machine = self._machine_of(answer.worker)

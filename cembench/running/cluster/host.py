@@ -2,30 +2,24 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from time import time
 
-import numpy as np
 from filelock import FileLock, Timeout
-from numpy.typing import NDArray
 
-from cembench.core.atomic import write
-from cembench.core.errors import ClusterError, RecordError
-from cembench.core.loading import is_there, read_arrays
+from cembench.core.errors import ClusterError
 from cembench.core.names import file_name
 from cembench.mesh.datasets import cache_directory
 from cembench.running.environment import machine_name
 
 #: Days after which unused files are deleted from a machine.
 KEPT_DAYS = 14.0
-_CLEARED = ("units", "surfaces", "plugins", "slurm")
+_CLEARED = ("units", "plugins", "slurm")
 #: Seconds between two attempts to take the lock of a machine.
 LOOK_EVERY = 1.0
-Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 @contextmanager
@@ -67,7 +61,7 @@ def machine_lock(waiting: Callable[[], None]) -> Iterator[None]:
 
 
 def place() -> Path:
-    """Return the folder for surfaces, plug-ins and unfinished units on this machine."""
+    """Return the folder for plug-ins and unfinished units on this machine."""
     return cache_directory() / "cluster"
 
 
@@ -81,32 +75,8 @@ def forget_unit(key: str) -> None:
     shutil.rmtree(unit_folder(key), ignore_errors=True)
 
 
-def stored_surface(mesh_hash: str) -> Arrays | None:
-    """Return V and F of a surface stored by :func:`store_surface`; None if there is none."""
-    path = _surface_file(mesh_hash)
-    if not is_there(path):
-        return None
-    try:
-        data = read_arrays(path, ("V", "F"))
-    except RecordError:
-        path.unlink(missing_ok=True)  # it is sent again
-        return None
-    os.utime(path)
-    return data["V"], data["F"]
-
-
-def store_surface(mesh_hash: str, arrays: Arrays) -> None:
-    """Store a surface for the next unit that uses it."""
-    V, F = arrays
-    write(_surface_file(mesh_hash), lambda file: np.savez(file, V=V, F=F))
-
-
-def _surface_file(mesh_hash: str) -> Path:
-    return place() / "surfaces" / f"{mesh_hash[:32]}.npz"
-
-
 def clear_old(days: float = KEPT_DAYS) -> None:
-    """Delete surfaces and units that have not been used for a number of days."""
+    """Delete units and plug-ins that have not been used for a number of days."""
     since = time() - 86400 * days
     for old in (old for name in _CLEARED for old in place().glob(f"{name}/*")):
         with suppress(OSError):

@@ -39,8 +39,6 @@ class Unit(BaseModel):
     mesh_type: str
     notices: tuple[Notice, ...]
     facts: MeshFacts
-    #: Requested number of triangles of a registered surface; None: its default.
-    faces: int | None = None
     plugins: tuple[str, ...] = ()
     options: dict[str, Any] = {}
 
@@ -48,7 +46,7 @@ class Unit(BaseModel):
     def key(self) -> str:
         """Hash of the measured content and the run; settings such as the budget are excluded.
 
-        So a worker resumes an unfinished unit of a run that goes on with another budget, or with
+        So a worker resumes an unfinished unit if the run continues with another budget, or with
         more machines to share it.
         """
         content = self.model_dump_json(include={"token", "cells", "mesh_type"})
@@ -97,13 +95,7 @@ def grouped(tasks: Sequence[Task]) -> list[list[Task]]:
     return list(groups.values())
 
 
-def parcel(
-    tasks: Sequence[Task],
-    token: str,
-    options: Options,
-    faces: int | None = None,
-    seconds: float = 0.0,
-) -> Parcel:
+def parcel(tasks: Sequence[Task], token: str, options: Options, seconds: float = 0.0) -> Parcel:
     """Pack the tasks of one unit."""
     plugins, files = _plugins(tasks)
     first = tasks[0]
@@ -113,7 +105,6 @@ def parcel(
         mesh_type=type(first.mesh).__name__,
         notices=first.mesh.notices,
         facts=first.facts,
-        faces=faces,
         plugins=plugins,
         # The worker's folder is empty unless the unit is resumed.
         options=asdict(replace(options, fresh=False, rerun_failed=False)),

@@ -29,7 +29,7 @@ from cembench.core.atomic import write_bytes
 from cembench.core.errors import CembenchError, ClusterError
 from cembench.core.loading import is_there, read_bytes
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Algorithm, load_algorithm, load_registry
+from cembench.registry import Algorithm, load_algorithm
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster import host
@@ -39,7 +39,6 @@ from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.sources import hash_of, sources_of
-from cembench.running.surfaces import generate_surface
 from cembench.running.timing import CellTimer
 from cembench.running.watcher import Step, Watcher
 from cembench.running.worker import MESH_TYPES
@@ -47,13 +46,14 @@ from cembench.running.worker import MESH_TYPES
 LOOK_EVERY = 1.0
 #: The folder of the unit's own run, in the unit's folder.
 RUN = "run"
+Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
 #: Sends an event to the client.
 Send = Callable[[Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The records of a unit, or that the worker needs its surface."""
+    """The records of a unit."""
 
     #: The address of the worker.
     worker: str
@@ -61,8 +61,6 @@ class Answer:
     records: Sequence[tuple[bytes, NDArray[np.complex128] | None]] = ()
     #: By their ids.
     environments: Mapping[str, dict[str, Any]] = field(default_factory=dict)
-    #: The worker cannot generate the surface; send the unit again, with it.
-    lacks_surface: bool = False
 
 
 def dask_setup(worker: Any) -> None:
@@ -70,10 +68,10 @@ def dask_setup(worker: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def measure_unit(
-    text: str, plugins: PluginFiles, surface: host.Arrays | None, topic: str
-) -> Answer:
+def measure_unit(text: str, plugins: PluginFiles, surface: Arrays, topic: str) -> Answer:
     """Measure a unit, given as JSON, and send events to the topic; run by a dask worker.
+
+    `surface` is V and F of the unit's surface.
 
     Raises
     ------
@@ -96,8 +94,6 @@ def measure_unit(
         host.clear_old()
         try:
             mesh = surface_of(unit, surface)
-            if mesh is None:
-                return Answer(worker.address, lacks_surface=True)
             forwarder.send({"what": "takes"})
             placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
             store = Store(host.unit_folder(unit.key) / RUN)
@@ -130,30 +126,29 @@ class Forwarder(Watcher):
 
     def waits(self) -> None:
         """Forward that another worker of the machine measures; called every second."""
-        self._forward({"what": "queues"})
+        self._forward("queues")
 
     def adds_rounds(self, task: Task, rounds: int) -> None:
         """Forward the event to the client."""
-        self._forward({"what": "adds_rounds", "cell": task.cell.label, "rounds": rounds})
+        self._forward("adds_rounds", cell=task.cell.label, rounds=rounds)
 
     def starts(self, task: Task, step: Step) -> None:
         """Forward the event to the client."""
-        self._forward({"what": "starts", "cell": task.cell.label, "step": vars(step)})
+        self._forward("starts", cell=task.cell.label, step=vars(step))
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Forward the event; of a cancelled unit nothing is saved that was stopped."""
-        about = {"cell": task.cell.label, "step": vars(step), "seconds": seconds}
-        self._forward({"what": "ends", **about})
+        self._forward("ends", cell=task.cell.label, step=vars(step), seconds=seconds)
 
-    def _forward(self, event: Mapping[str, Any]) -> None:
+    def _forward(self, what: str, **about: Any) -> None:
         if self.cancelled.is_set():
             raise ClusterError("the unit was cancelled: its client does not wait for it any more.")
-        self.send(event)
+        self.send({"what": what, **about})
 
 
 @contextmanager
 def _cancelling(cancelled: threading.Event, is_wanted: Callable[[], bool]) -> Iterator[None]:
-    """Set the event as soon as nobody waits for the unit that is measured in this block."""
+    """Set the event as soon as the client cancels the unit that is measured in this block."""
     ended = threading.Event()
 
     def look() -> None:
@@ -212,46 +207,21 @@ def _options(unit: Unit) -> Options:
     return replace(options, memory_bytes=options.memory_bytes or free, jobs=jobs)
 
 
-def surface_of(unit: Unit, sent: host.Arrays | None) -> TriangleMesh | None:
-    """Return the surface of a unit: stored on this machine, sent, or generated; None if it is not.
+def surface_of(unit: Unit, arrays: Arrays) -> TriangleMesh:
+    """Return the surface of a unit from V and F as they arrived.
 
     Raises
     ------
     ClusterError
-        What was sent is not the surface of the unit.
+        They are not those of the unit's surface, to the last bit.
 
     """
-    mesh = _checked(unit, host.stored_surface(unit.mesh_hash))
-    if mesh is None:
-        mesh = _checked(unit, sent or _generated(unit))
-        if mesh is not None:
-            host.store_surface(unit.mesh_hash, (mesh.V, mesh.F))
-        elif sent is not None:
-            raise ClusterError(f"the surface {unit.mesh} arrived damaged; run again.")
-    return mesh
-
-
-def _checked(unit: Unit, arrays: host.Arrays | None) -> TriangleMesh | None:
-    """Return the mesh of these arrays if it is the surface of the unit, to the last bit."""
-    if arrays is None:
-        return None
     mesh = MESH_TYPES[unit.mesh_type].trusted(*arrays, unit.mesh, unit.notices)
+    if mesh.hash != unit.mesh_hash:
+        raise ClusterError(f"the surface {unit.mesh} arrived damaged; run again.")
     mesh.V.setflags(write=False)
     mesh.F.setflags(write=False)
-    return mesh if mesh.hash == unit.mesh_hash else None
-
-
-def _generated(unit: Unit) -> host.Arrays | None:
-    """Generate a registered surface; None if that takes longer than sending it."""
-    registry = load_registry()
-    family = registry.surfaces.get(unit.mesh)
-    if family is None or family.kept is not None:
-        return None
-    try:
-        mesh: TriangleMesh = generate_surface(registry, unit.mesh, unit.faces)
-    except CembenchError:  # its data, or a library, are not on this machine
-        return None
-    return mesh.V, mesh.F
+    return mesh
 
 
 def _placed(plugins: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:

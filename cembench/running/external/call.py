@@ -29,9 +29,13 @@ from cembench.core.program import UNITS
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm
 from cembench.results.records import FaultKind, ProgramRun, lower_median
-from cembench.running.external.exchange import largest_output, read_output, write_input
-from cembench.running.external.faults import ProgramFault
-from cembench.running.external.present import missing
+from cembench.running.external.exchange import (
+    ProgramFault,
+    largest_output,
+    read_output,
+    write_input,
+)
+from cembench.running.external.installed import missing
 from cembench.running.sanitized_result import Returned
 
 #: Phase name for the wall clock of a program.
@@ -93,28 +97,28 @@ class ProgramCalls:
             The program crashed, or wrote no map.
 
         """
-        found, ended = self._run(mesh, watched=watched)
+        result, ended = self._run(mesh, watched=watched)
         self.own.append(self._own_seconds(ended.printed))
         self.walls.append(ended.seconds)
         self.peak = ended.peak
         timing = Timing(total=ended.seconds, phases={PHASE: ended.seconds})
-        return Returned.of(found, mesh, self.algorithm.target), timing
+        return Returned.of(result, mesh, self.algorithm.target), timing
 
     def own_seconds(self, last: int) -> tuple[float, ...]:
         """Return the solve times that the last calls printed; empty if one printed none."""
-        found = self.own[-last:]
-        return tuple(one for one in found if one is not None) if None not in found else ()
+        seconds = self.own[-last:]
+        return tuple(one for one in seconds if one is not None) if None not in seconds else ()
 
     def start_seconds(self, times: int) -> float | None:
         """Return the median wall-clock seconds on a small mesh; None if the program fails on it."""
         small = small_mesh(self.mesh)
         try:
             sizes = self.bytes
-            found = [self._run(small)[1].seconds for _ in range(min(times, STARTS) + 1)][1:]
+            seconds = [self._run(small)[1].seconds for _ in range(min(times, STARTS) + 1)][1:]
             self.bytes = sizes
         except (ProgramFault, NotThere):
             return None
-        return lower_median(found)
+        return lower_median(seconds)
 
     def facts(self) -> ProgramRun:
         """Return the version, and the file sizes of the last call."""
@@ -124,21 +128,21 @@ class ProgramCalls:
 
     def notices(self, start: float | None) -> list[Notice]:
         """Return remarks on the seconds of the last call."""
-        told = []
+        texts = []
         program = self.algorithm.program
         if start is None:
-            told.append(
+            texts.append(
                 "it failed on a small mesh, so its start-up time is unknown and stays part of "
                 "its wall-clock time"
             )
         if program is not None and program.seconds and self.own[-1] is None:
-            told.append(f"it printed no solve time that matches {program.seconds!r}")
+            texts.append(f"it printed no solve time that matches {program.seconds!r}")
         if self.own[-1] is not None and self.own[-1] > self.walls[-1]:
-            told.append(
+            texts.append(
                 f"it reports a solve time of {self.own[-1]:.3g} s, but its process took "
                 f"{self.walls[-1]:.3g} s in all"
             )
-        return [Notice(NoticeKind.PROGRAM_SECONDS, one) for one in told]
+        return [Notice(NoticeKind.PROGRAM_SECONDS, one) for one in texts]
 
     def _run(
         self, mesh: TriangleMesh, *, watched: bool = False
@@ -149,18 +153,23 @@ class ProgramCalls:
         if lacking:
             raise NotThere(lacking)
         with _own_folder() as folder:
-            given = folder / f"mesh{program.input}"
-            left = folder / program.output_name
-            write_input(given, mesh)
-            places = {"input": given, "output": left, "folder": folder, "threads": self.threads}
-            words = program.words({**self.arguments, **places})
-            before = given.stat().st_size
-            ended = _ended(words, folder, LARGEST_FILE * largest_output(mesh), watched=watched)
+            input_file = folder / f"mesh{program.input}"
+            output_file = folder / program.output_name
+            write_input(input_file, mesh)
+            places = {
+                "input": input_file,
+                "output": output_file,
+                "folder": folder,
+                "threads": self.threads,
+            }
+            command = program.words({**self.arguments, **places})
+            before = input_file.stat().st_size
+            ended = _ended(command, folder, LARGEST_FILE * largest_output(mesh), watched=watched)
             if ended.code:
                 raise _fault(ended)
-            found = read_output(left, self.algorithm, mesh)
-            self.bytes = before, left.stat().st_size
-        return found, ended
+            result = read_output(output_file, self.algorithm, mesh)
+            self.bytes = before, output_file.stat().st_size
+        return result, ended
 
     def _own_seconds(self, printed: str) -> float | None:
         program = self.algorithm.program
@@ -233,7 +242,7 @@ def _own_folder() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def _ended(words: Sequence[str], folder: Path, largest_file: int, *, watched: bool) -> Ended:
+def _ended(command: Sequence[str], folder: Path, largest_file: int, *, watched: bool) -> Ended:
     """Run a command to its end, with its output to a file, so that no pipe can block it."""
     log = folder.with_name(f"{folder.name}.log")
     try:
@@ -241,15 +250,15 @@ def _ended(words: Sequence[str], folder: Path, largest_file: int, *, watched: bo
             started = perf_counter()
             try:
                 process = subprocess.Popen(
-                    words,
+                    command,
                     cwd=folder,
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=subprocess.STDOUT,
                 )
             except OSError as error:
-                told = f"{words[0]} cannot be started: {error.strerror or error}"
-                raise ProgramFault(FaultKind.PROGRAM_ENDED, told) from None
+                message = f"{command[0]} cannot be started: {error.strerror or error}"
+                raise ProgramFault(FaultKind.PROGRAM_ENDED, message) from None
             peak = _watched(process) if watched else None
             code = process.wait()
             seconds = perf_counter() - started
@@ -303,12 +312,12 @@ def _fault(ended: Ended) -> ProgramFault:
     said = ended.printed[-KEPT:].strip()
     last = f": {shortened(said.splitlines()[-1], 500)}" if said else ""
     if ended.code > 0:
-        told = f"the program ended with code {ended.code}{last}"
-        return ProgramFault(FaultKind.GAVE_UP, told, said=said)
+        message = f"the program ended with code {ended.code}{last}"
+        return ProgramFault(FaultKind.GAVE_UP, message, said=said)
     number = -ended.code
     if sys.platform != "win32" and number == signal.SIGXFSZ:
-        told = "the program was ended because a file that it wrote grew too large"
-        return ProgramFault(FaultKind.OUTPUT_TOO_LARGE, told, said=said)
+        message = "the program was ended because a file that it wrote grew too large"
+        return ProgramFault(FaultKind.OUTPUT_TOO_LARGE, message, said=said)
     known = {int(one): one.name for one in signal.Signals}
-    told = f"the program was ended by signal {known.get(number, number)}{last}"
-    return ProgramFault(FaultKind.PROGRAM_ENDED, told, said=said)
+    message = f"the program was ended by signal {known.get(number, number)}{last}"
+    return ProgramFault(FaultKind.PROGRAM_ENDED, message, said=said)

@@ -1,4 +1,4 @@
-"""Files exchanged with a program: the mesh it reads, and the UVs it writes."""
+"""Files exchanged with a program, the mesh it reads and the UVs it writes, and its faults."""
 
 from __future__ import annotations
 
@@ -9,17 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.planar import fitted_circle, polygon_area
-from cembench.core.errors import MeshError
+from cembench.core.errors import CembenchError, MeshError
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.uvs import OtherSurfaceError, read_flat, read_uv, uv_of_corners
 from cembench.registry import Algorithm
-from cembench.results.records import FaultKind
-from cembench.running.external.faults import ProgramFault
+from cembench.results.records import FaultKind, Status
 
 #: Size limit of a file with UVs: bytes, and bytes per vertex and triangle.
 LARGEST_OUTPUT, LARGEST_SHARE = 2**24, 4096
+
+
+class ProgramFault(CembenchError):  # noqa: N818 - it is a result's status, not a mistake
+    """An external program did not do what was expected; the message is the cause."""
+
+    def __init__(
+        self, kind: FaultKind, detail: str, *, status: Status = "failed", said: str = ""
+    ) -> None:
+        super().__init__(detail)
+        self.kind, self.status, self.said = kind, status, said
+
+    @property
+    def gave_up(self) -> bool:
+        """Whether the program ended with a nonzero code, which counts as giving up."""
+        return self.kind is FaultKind.GAVE_UP
 
 
 def write_input(path: Path, mesh: TriangleMesh) -> None:
@@ -57,11 +71,11 @@ def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Paramet
         read = read_flat if program is not None and program.flat else read_uv
         corners = uv_of_corners(read(path), mesh.V, mesh.F)
     except OtherSurfaceError as error:
-        told = f"{path.name} is not a map of the surface that it was given: {error}"
-        raise ProgramFault(FaultKind.OTHER_SURFACE, told, status="invalid") from None
+        message = f"{path.name} is not a map of the surface that it was given: {error}"
+        raise ProgramFault(FaultKind.OTHER_SURFACE, message, status="invalid") from None
     except MeshError as error:
-        told = f"{path.name}: {error}"
-        raise ProgramFault(FaultKind.UNREADABLE_OUTPUT, told) from None
+        message = f"{path.name}: {error}"
+        raise ProgramFault(FaultKind.UNREADABLE_OUTPUT, message) from None
     if algorithm.target == "atlas":
         return Atlas(corners)
     uv = _of_vertices(corners, mesh)
@@ -75,18 +89,20 @@ def _check_output(path: Path, mesh: TriangleMesh) -> None:
         about = path.stat()
     except OSError:
         beside = sorted(p.name for p in path.parent.iterdir())
-        told = f"it wrote no file {path.name}; its folder holds: {', '.join(beside[:8]) or 'none'}"
-        raise ProgramFault(FaultKind.NO_OUTPUT, told) from None
+        message = (
+            f"it wrote no file {path.name}; its folder holds: {', '.join(beside[:8]) or 'none'}"
+        )
+        raise ProgramFault(FaultKind.NO_OUTPUT, message) from None
     if not stat.S_ISREG(about.st_mode):
         raise ProgramFault(FaultKind.NO_OUTPUT, f"{path.name} is not a regular file")
     if not about.st_size:
         raise ProgramFault(FaultKind.UNREADABLE_OUTPUT, f"{path.name} is empty (0 bytes)")
     if about.st_size > largest_output(mesh):
-        told = (
+        message = (
             f"{path.name} has {about.st_size:,} bytes; for {mesh.n:,} vertices and {mesh.m:,} "
             f"triangles at most {largest_output(mesh):,} are read"
         )
-        raise ProgramFault(FaultKind.OUTPUT_TOO_LARGE, told)
+        raise ProgramFault(FaultKind.OUTPUT_TOO_LARGE, message)
 
 
 def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
@@ -96,11 +112,11 @@ def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray
     finite = np.isfinite(corners)
     apart = np.unique(mesh.F[finite & (uv[mesh.F] != corners)])
     if len(apart):
-        told = (
+        message = (
             f"{len(apart)} vertices have several UVs, the first being {apart[0]}: the surface was "
             'cut. Declare the target "atlas" for such a program'
         )
-        raise ProgramFault(FaultKind.CUT_SURFACE, told, status="invalid")
+        raise ProgramFault(FaultKind.CUT_SURFACE, message, status="invalid")
     return uv
 
 

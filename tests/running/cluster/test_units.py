@@ -167,27 +167,11 @@ def test_a_lock_that_cannot_be_opened_is_an_error_with_its_remedy():
         pass
 
 
-def test_a_surface_is_kept_by_its_hash_and_a_damaged_one_is_not():
-    mesh = flat_disk(100)
-    assert host.stored_surface(mesh.hash) is None
-    host.store_surface(mesh.hash, (mesh.V, mesh.F))
-    V, F = host.stored_surface(mesh.hash)
-    assert (V == mesh.V).all()
-    assert (F == mesh.F).all()
-    (file,) = (host.place() / "surfaces").iterdir()
-    file.write_bytes(b"no archive")
-    assert host.stored_surface(mesh.hash) is None
-    assert not file.exists()
-
-
 def test_what_nobody_came_back_for_is_deleted():
-    mesh = flat_disk(100)
-    host.store_surface(mesh.hash, (mesh.V, mesh.F))
     (host.unit_folder("a") / "run").mkdir(parents=True)
     host.clear_old()
-    assert host.stored_surface(mesh.hash) is not None
+    assert host.unit_folder("a").exists()
     host.clear_old(days=-1)
-    assert host.stored_surface(mesh.hash) is None
     assert not host.unit_folder("a").exists()
 
 
@@ -216,18 +200,15 @@ def test_other_code_under_the_same_name_is_refused(tmp_path):
         measure(unit, tasks[0].mesh, Store(tmp_path), Forwarder(lambda event: None))
 
 
-def test_a_surface_is_stored_once_it_was_sent_and_another_one_is_refused():
+def test_a_surface_that_arrives_damaged_is_refused():
     (task,) = tasks_of("good")
     unit = parcel([task], NO_TOKEN, Options()).unit
     V, F = task.mesh.V, task.mesh.F
-    assert surface_of(unit, None) is None
     with pytest.raises(ClusterError, match="arrived damaged"):
         surface_of(unit, (V + 1, F))
-    assert surface_of(unit, (V, F)).hash == task.mesh.hash
-    assert surface_of(unit, None).hash == task.mesh.hash
-    host.store_surface(unit.mesh_hash, (V + 1, F))
-    assert surface_of(unit, None) is None
-    assert surface_of(unit, (V, F)).hash == task.mesh.hash
+    mesh = surface_of(unit, (V, F))
+    assert mesh.hash == task.mesh.hash
+    assert not mesh.V.flags.writeable
 
 
 def test_differences_of_software_name_library_and_versions():

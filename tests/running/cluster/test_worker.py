@@ -1,4 +1,4 @@
-"""What a worker does with a unit that nobody waits for, and with a surface that it lacks."""
+"""A unit that nobody waits for, and what its processes inherit."""
 
 import os
 import threading
@@ -7,13 +7,13 @@ import dask
 import pytest
 
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
-from cembench.core.errors import ClusterError, MeshError
+from cembench.core.errors import ClusterError
 from cembench.results.store import Store
 from cembench.running.cluster import worker
 from cembench.running.cluster.units import parcel
 from cembench.running.cluster.worker import Forwarder, measure
 from cembench.running.options import Options
-from tests.running.cluster.test_units import NO_TOKEN, two_surfaces
+from tests.running.cluster.test_units import NO_TOKEN
 from tests.running.test_local import tasks_of
 
 
@@ -57,19 +57,3 @@ def test_settings_that_dask_made_for_a_worker_are_not_inherited_by_what_it_measu
         worker._unset_dask_variables()
     assert "MALLOC_TRIM_THRESHOLD_" not in os.environ
     assert os.environ["OMP_NUM_THREADS"] == "4"  # the user's own
-
-
-def test_a_surface_whose_data_are_not_on_the_machine_is_sent(monkeypatch):
-    (task,) = two_surfaces("reuse")[:1]
-    flat = task.mesh.renamed("flat-disk")
-    there = parcel([task], NO_TOKEN, Options(), 100).unit
-    cell = there.cells[0].model_copy(update={"mesh": flat.name})
-    named = there.model_copy(update={"cells": (cell,)})
-    V, _ = worker._generated(named)
-    assert (V == flat.V).all()
-
-    def not_there(*_):
-        raise MeshError("its file is not there")
-
-    monkeypatch.setattr(worker, "generate_surface", not_there)
-    assert worker._generated(named) is None

@@ -41,8 +41,8 @@ def missing(algorithm: Algorithm) -> str | None:
 
 def executable(program: Program) -> Path | None:
     """Return the executable file of a program's command."""
-    found = shutil.which(program.command[0])
-    return None if found is None else Path(found)
+    path = shutil.which(program.command[0])
+    return None if path is None else Path(path)
 
 
 def library_version(library: Library) -> str | None:
@@ -67,13 +67,13 @@ def program_sources(program: Program) -> dict[str, str]:
     included.
     """
     declared = json.dumps(asdict(program), sort_keys=True).encode()
-    found = {"declaration": hashlib.sha256(declared).hexdigest()}
+    digests = {"declaration": hashlib.sha256(declared).hexdigest()}
     named = [executable(program), *(Path(word) for word in program.command[1:])]
     for path in named:
         try:
             if path is not None and path.is_absolute() and path.is_file():
                 about = path.stat()
-                found[path.name] = _digest(path, about.st_size, about.st_mtime_ns)
+                digests[path.name] = _digest(path, about.st_size, about.st_mtime_ns)
         except OSError:  # it may be executable but not readable
             continue
-    return found
+    return digests

@@ -13,7 +13,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 import cembench
 from cembench.registry import load_registry
-from cembench.running import here
+from cembench.running import in_this_process
 from cembench.running.local import map_once
 from cembench.running.plan import MeasurementSettings, plan_cells
 
@@ -31,8 +31,8 @@ def parameterized(task):
 @pytest.mark.parametrize("name", ["direct-cem", "lscm", "circle-packing"])
 def test_the_map_and_its_figures_are_those_of_a_process_of_its_own(name):
     task = task_of(load_registry().algorithm(name))
-    assert here.may_run_here(task)
-    (record, uv), (apart, own) = here.map_here(task), map_once(task)
+    assert in_this_process.may_run_here(task)
+    (record, uv), (apart, own) = in_this_process.map_here(task), map_once(task)
     np.testing.assert_allclose(uv, own, rtol=0, atol=1e-14)
     assert record.outcome.status == apart.outcome.status == "ok"
     assert record.outcome.metrics == pytest.approx(apart.outcome.metrics, rel=1e-9, abs=1e-12)
@@ -42,12 +42,12 @@ def test_the_map_and_its_figures_are_those_of_a_process_of_its_own(name):
 def test_what_is_not_ours_large_or_of_several_threads_has_its_own_process(monkeypatch):
     ours = load_registry().algorithm("cem")
     task = task_of(ours)
-    assert here.may_run_here(task)
-    assert not here.may_run_here(replace(task, algorithm=replace(ours, module=__name__)))
-    assert not here.may_run_here(task_of(ours, threads=2))
-    little = SimpleNamespace(available=here.ROUGH_BYTES_A_FACE * task.mesh.m)
-    monkeypatch.setattr(here.psutil, "virtual_memory", lambda: little)
-    assert not here.may_run_here(task)
+    assert in_this_process.may_run_here(task)
+    assert not in_this_process.may_run_here(replace(task, algorithm=replace(ours, module=__name__)))
+    assert not in_this_process.may_run_here(task_of(ours, threads=2))
+    little = SimpleNamespace(available=in_this_process.ROUGH_BYTES_A_FACE * task.mesh.m)
+    monkeypatch.setattr(in_this_process.psutil, "virtual_memory", lambda: little)
+    assert not in_this_process.may_run_here(task)
 
 
 def end(number, frame):
@@ -63,7 +63,7 @@ def end(number, frame):
         (signal.SIGTERM, end, SystemExit),
     ],
 )
-@pytest.mark.parametrize("call", [here.map_here, parameterized])
+@pytest.mark.parametrize("call", [in_this_process.map_here, parameterized])
 def test_a_signal_is_no_fault_of_the_algorithm(call, number, handler, raised, monkeypatch):
     spec = load_registry().algorithm("harmonic-circle")
     inside = threading.Event()
