@@ -89,6 +89,8 @@ def from_api(
         for name, argument in arguments.items():
             named = positional[name].kind is _KEYWORD or name in names
             kind, default = _option_of(argument, spelled.get(name, ""), words, named=named)
+            if not named:
+                names[name] = spelled.get(name, name.upper())
             parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=kind))
 
         def command(**given: Any) -> None:

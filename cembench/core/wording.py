@@ -20,9 +20,14 @@ class Setting:
         return f"{self.name}={self.value}" if self.value else f"`{self.name}`"
 
     def in_shell(self, options: Mapping[str, str]) -> str:
-        """Return it as an option; `options` names those that do not follow from the argument."""
+        """Return it as an option; `options` names those that do not follow from the argument.
+
+        A name without a dash is that of a word at its place, not of an option.
+        """
         option = options.get(self.name, f"--{self.name.replace('_', '-')}")
         value = self.value.strip("'\"")
+        if not option.startswith("-"):
+            return value or option
         return option if value in ("", "True") else f"{option} {value}".strip()
 
 
