@@ -12,13 +12,12 @@ from numpy.typing import NDArray
 from cembench.conformal.laplacian import corner_products
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
-from cembench.mesh.files import read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
-from cembench.running.surfaces import SurfaceFile, kinds_of, load_file, prepared
+from cembench.running.surfaces import SurfaceFile, kinds_of, prepared
 
 Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
@@ -95,23 +94,27 @@ def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
 
 
 def read_shells(
-    path: Path, algorithms: Sequence[Algorithm], *, mend: bool = False, cut: bool = False
+    path: Path,
+    soup: Soup,
+    algorithms: Sequence[Algorithm],
+    *,
+    mend: bool = False,
+    cut: bool = False,
 ) -> Shells:
-    """Read the surfaces of a file, each as a kind that the algorithms take.
+    """Part the polygons of a file into its surfaces, each of a kind that the algorithms take.
 
     Triangles that are connected, even at a single vertex, are one surface. With `mend`, only the
-    largest surface is read.
+    largest surface is kept.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or one of its surfaces is not of such a kind.
+        One of the surfaces is not of such a kind.
 
     """
     kinds = kinds_of(algorithms)
     if mend:
-        return _alone(load_file(path, kinds, repair=True, cut=cut))
-    soup = read_soup(path)
+        return _alone(prepared(soup, kinds, path, repair=True, cut=cut))
     try:
         return _alone(prepared(soup, kinds, path, cut=cut))
     except UnusableMeshError as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
+from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm
@@ -121,8 +123,12 @@ def check_shells(surfaces: int, path: Path, file_options: FileOptions, extras: E
     if extras.files:
         raise ParameterError.about(
             "{path} holds {surfaces} surfaces; {geometry_image}, {remesh} and {html} take one. "
-            "`cembench repair --components all` writes each to its own file.",
+            "{each} gives each alone.",
             path=path,
+            each=Advice(
+                f"`cembench.repair({str(path)!r}, components='all').meshes`",
+                f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
+            ),
             surfaces=surfaces,
         )
     if file_options.place != "unit":
@@ -138,8 +144,9 @@ def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
     if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
         raise ParameterError.about(
             "{cut} makes a disk, which {name} does not take; name an algorithm for disks (see "
-            "`cembench list algorithms`).",
+            "{listed}).",
             name=candidates[0].name,
+            listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
         )
 
 

@@ -29,13 +29,20 @@ from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
 from cembench.mesh import datasets
+from cembench.mesh.files import read_soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.here import map_here, may_run_here
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
-from cembench.running.surfaces import SurfaceFile
+from cembench.running.surfaces import (
+    SurfaceFile,
+    file_named,
+    generate_surface,
+    is_generated,
+    soup_of,
+)
 
 Complex = NDArray[np.complex128]
 #: Notices, each with the file it is about.
@@ -96,7 +103,16 @@ class Mapped:
 def local_files(
     meshes: Sequence[Path], registry: Registry, reporter: Reporter = SILENT
 ) -> list[Path]:
-    """Return the file of each path or name of a public surface, which is fetched if necessary."""
+    """Return the file of each path or name of a public surface, which is fetched if necessary.
+
+    A generated surface keeps its name.
+
+    Raises
+    ------
+    MeshError
+        A name is that of no surface.
+
+    """
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {}
     for path in known:
@@ -104,7 +120,11 @@ def local_files(
         with reporter.downloads([dataset]) as progress:
             datasets.fetch(dataset, progress=progress(dataset))
         fetched[path] = datasets.surface_file(dataset)
-    return [fetched.get(path, path) for path in meshes]
+    return [
+        fetched.get(path)
+        or (path if is_generated(str(path), registry) else file_named(path, registry))
+        for path in meshes
+    ]
 
 
 def jobs_of(
@@ -119,7 +139,9 @@ def jobs_of(
     cut: bool,
 ) -> tuple[Shells, tuple[Job, ...]]:
     """Return the surfaces of a file, and a job for each with the first algorithm that takes it."""
-    shells = read_shells(source, candidates, mend=repair, cut=cut)
+    generated = is_generated(str(source), registry)
+    soup = soup_of(generate_surface(registry, str(source))) if generated else read_soup(source)
+    shells = read_shells(source, soup, candidates, mend=repair, cut=cut)
     jobs = []
     for surface in shells.parts:
         mesh = surface.mesh

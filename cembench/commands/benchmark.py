@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @from_api(
     benchmark,
-    without=("watcher", "reporter", "out"),
+    without=("watcher", "reporter"),
     sets="--set",
     limit="--limit N",
     precision="--precision SHARE",
@@ -53,7 +53,7 @@ def run(
         surfaces=[*mesh, *split(dataset), *split(surfaces)],
         algorithms=[*(given["algorithms"] or ["usual"]), *named],
         plugins=[*given["plugins"], *declared],
-        out=output,
+        output=output,
         reporter=SHOWN,
     )
     if given["dry_run"]:

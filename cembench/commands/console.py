@@ -173,9 +173,9 @@ class Shown(Reporter):
 
     def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
         """Show a bar for each download on a terminal."""
-        from cembench.commands.fetch import bars
+        from cembench.commands.progress import download_bars
 
-        return bars(list(datasets))
+        return download_bars(err, datasets)
 
     @contextmanager
     def watching(

@@ -32,7 +32,7 @@ EXAMPLES = (
 )
 
 
-@from_api(map_files, without=("reporter",), meshes="MESH...")
+@from_api(map_files, without=("reporter",), meshes="MESH")
 def map_(
     call: Call,
     *,

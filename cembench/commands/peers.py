@@ -97,7 +97,7 @@ def peers(
         timeout=timeout,
         pairing="separate",
         budget=None,
-        out=output,
+        output=output,
         reporter=SHOWN,
     )
     records = measured.asked

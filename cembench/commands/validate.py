@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 @from_api(
     validate_solver,
     without=("reporter",),
-    out="-o --output",
     require="--require WHAT",
 )
 def validate(
@@ -49,7 +48,7 @@ def validate(
             "with --command COMMAND."
         )
     found = call(plugin or declared[0], surfaces=[*mesh, *split(surfaces)], reporter=SHOWN)
-    folder = call.keywords["out"]
+    folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
     if as_json:
         print_json(_as_json(found, written))
