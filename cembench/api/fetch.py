@@ -35,7 +35,7 @@ class PublicSurfaces(dict[str, Path]):
     >>> import cembench
     >>> surfaces = cembench.fetch()
     >>> next(row["licence"] for row in surfaces.rows if row["name"] == "left-hand")
-    'none stated'
+    'Apache-2.0'
 
     """
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import typer
-
 from cembench.api.fetch import fetch as fetch_surfaces
-from cembench.commands.console import SHOWN, Json, complain, out, print_json
+from cembench.commands.app import app
+from cembench.commands.console import SHOWN, Json, fail, out, print_json
 from cembench.commands.from_api import Call, from_api
 
 
+@app.command(
+    epilog="Examples:  cembench fetch  ·  cembench fetch --group disks  ·  cembench fetch left-hand"
+)
 @from_api(fetch_surfaces, without=("reporter",), names="NAME")
 def fetch(call: Call, *, as_json: Json = False) -> None:
     """Print the paths, or all surfaces if none was asked for; exit with 1 if one failed."""
@@ -22,10 +24,7 @@ def fetch(call: Call, *, as_json: Json = False) -> None:
             only = " (no licence stated: do not redistribute)" if row["fetch_only"] else ""
             if "error" not in row:
                 out.print(f"{row['name']}: {row['path']}{only}", soft_wrap=True)
-    for error in found.failed.values():
-        complain(str(error))
-    if found.failed:
-        raise typer.Exit(1)
+    fail(map(str, found.failed.values()))
 
 
 def _list(rows: list[dict[str, object]]) -> None:
@@ -37,12 +36,3 @@ def _list(rows: list[dict[str, object]]) -> None:
     models = {p.group: len(registry.group(p.group)) for p in registry.parts.values()}
     for name, count in models.items():
         out.print(f"{name}: {count} files of a model, fetched with --group {name}")
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        fetch,
-        "Examples:  cembench fetch  ·  cembench fetch --group disks  ·  cembench fetch left-hand",
-    ),
-)

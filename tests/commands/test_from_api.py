@@ -15,7 +15,7 @@ from cembench.core.arguments import arguments_of
 VERBS = {
     (one.name or one.callback.__name__).rstrip("_"): one.callback
     for one in app.registered_commands
-    if hasattr(one.callback, "function")
+    if hasattr(one.callback, "arguments")
 }
 GROUP = typer.main.get_command(app)
 
@@ -29,7 +29,7 @@ def test_options_have_the_defaults_of_the_function(verb):
     command = VERBS[verb]
     own = inspect.signature(command.body).parameters
     options = {option.name: option for option in GROUP.commands[verb].params}
-    shared = [a for a in arguments_of(command.function).values() if a.name in options]
+    shared = [a for a in command.arguments.values() if a.name in options]
     assert shared or verb == "cut"
     for argument in shared:
         if argument.name in own or argument.default is inspect.Parameter.empty:
