@@ -13,6 +13,7 @@ Names are loaded when they are first used, so that importing the package costs l
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         surface,
     )
     from cembench.api.cut import cut
+    from cembench.api.fetch import PublicSurfaces, fetch
     from cembench.api.holes import HoledMaps, holes
     from cembench.api.map_files import map_files
     from cembench.api.morph_surfaces import morph
@@ -80,6 +82,7 @@ _PLACES = {
         "surface",
     ),
     "cembench.api.cut": ("cut",),
+    "cembench.api.fetch": ("PublicSurfaces", "fetch"),
     "cembench.api.holes": ("HoledMaps", "holes"),
     "cembench.api.map_files": ("map_files",),
     "cembench.api.morph_surfaces": ("morph",),
@@ -107,6 +110,7 @@ __all__ = [
     "NotPositiveDefinite",
     "ParameterError",
     "Parameterization",
+    "PublicSurfaces",
     "RecordError",
     "RegistryError",
     "RenderError",
@@ -121,6 +125,7 @@ __all__ = [
     "catalogue",
     "cut",
     "external_program",
+    "fetch",
     "holes",
     "list_algorithms",
     "list_surfaces",
@@ -146,7 +151,8 @@ def __getattr__(name: str) -> Any:
 
         return installed_version()
     if name not in _PLACE_OF:
-        raise AttributeError(f"module 'cembench' has no attribute {name!r}")
+        module = sys.modules[__name__]  # by which Python suggests what was meant
+        raise AttributeError(f"module 'cembench' has no attribute {name!r}", name=name, obj=module)
     value = getattr(importlib.import_module(_PLACE_OF[name]), name)
     globals()[name] = value
     return value

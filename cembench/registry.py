@@ -32,9 +32,10 @@ from numpy.typing import NDArray
 from pydantic import TypeAdapter, ValidationError
 
 from cembench.core.errors import ParameterError, RegistryError, describe_error
-from cembench.core.names import unknown
+from cembench.core.names import did_you_mean, unknown
 from cembench.core.parameterization import MapStep
 from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
+from cembench.core.wording import Advice
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
@@ -122,6 +123,7 @@ class _Registered:
                 allowed = ", ".join(known) or "none"
                 raise ParameterError(
                     f"{self.name} has no parameter {name!r}; its parameters are: {allowed}."
+                    + did_you_mean(name, known)
                 )
         return {
             name: p.parse(values[name], self.name) if name in values else p.default
@@ -595,10 +597,15 @@ class Registry:
         if name in self.datasets and name not in self.surfaces:
             row = self.datasets[name].paper_row
             standing = [s.name for s in self.surfaces.values() if row and s.paper_row == row]
-            raise RegistryError(
-                f"{name!r} is a public surface, which is read from a file and not generated: "
-                f"`cembench fetch {name}`, then `--dataset {name}`."
-                + (f" Its stand-in is {standing[0]}." if standing else "")
+            raise RegistryError.about(
+                "{name!r} is a public surface, which is read from a file and not generated: "
+                "{read}.{more}",
+                name=name,
+                read=Advice(
+                    f"`cembench.load_surface({name!r})` after `cembench.fetch({name!r})`",
+                    f"`cembench fetch {name}`, then `--dataset {name}`",
+                ),
+                more=f" Its stand-in is {standing[0]}." if standing else "",
             )
         return _look_up("surface", self.surfaces, name)
 
@@ -618,8 +625,7 @@ class Registry:
     def group(self, name: str) -> list[Dataset]:
         """Return the datasets of this group; :class:`RegistryError` lists the known groups."""
         if name not in self.groups:
-            known = ", ".join(self.groups) or "none"
-            raise RegistryError(f"unknown group of datasets {name!r}; known: {known}.")
+            raise RegistryError(unknown("group of datasets", name, self.groups))
         return self.groups[name]
 
 

@@ -27,6 +27,7 @@ from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
+from cembench.core.wording import Advice
 from cembench.results.sequential_checks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
 
 if TYPE_CHECKING:
@@ -288,7 +289,7 @@ def benchmark(
     reference: str | None = None,
     cluster: Client | str | None = None,
     same_environment: bool = False,
-    out: AnyPath | None = None,
+    output: AnyPath | None = None,
     fresh: bool = False,
     rerun_failed: bool = False,
     dry_run: bool = False,
@@ -369,7 +370,7 @@ def benchmark(
         ``distributed.Client``.
     same_environment : bool
         Of a cluster, leave out machines with other software.
-    out : path, optional
+    output : path, optional
         The run's folder; an existing run is resumed. Default in Python: a new temporary folder.
     fresh : bool
         Measure again what is already recorded.
@@ -434,8 +435,8 @@ def benchmark(
     from cembench.running.plan import MeasurementSettings, plan_cells
 
     given, models = list(surfaces), Profile(profile) if profile else None
-    if out is not None:
-        run_folder.check(Path(out))
+    if output is not None:
+        run_folder.check(Path(output))
     check_cluster(cluster, pairing, reporter)
     if same_environment and cluster is None:
         raise ParameterError.about("{same_environment} is of {cluster}: name one, or leave it out.")
@@ -476,14 +477,18 @@ def benchmark(
     if not given and not mesh_dir and not sets:
         raise ParameterError.about(
             "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
-            "{sets}; `cembench list surfaces` and `cembench fetch` list names."
+            "{sets}; {listed} have names.",
+            listed=Advice(
+                "`cembench.list_surfaces()` and `cembench.fetch()`",
+                "`cembench list surfaces` and `cembench fetch`",
+            ),
         )
     if limit is not None and not sets:
         raise ParameterError.about("{limit} needs {sets}: add one, or leave {limit} out.")
     if repair and sets:
         raise ParameterError.about(
-            "{repair} works with single files and with {mesh_dir}: repair the files of a set with "
-            "`cembench repair`, or leave it out."
+            "{repair} works with single files and with {mesh_dir}: repair the files of a set one "
+            "by one, or leave it out."
         )
     with reporter.busy("reading surfaces"):
         meshes, roles = read_surfaces(
@@ -496,7 +501,7 @@ def benchmark(
     for policy in dict.fromkeys(solves):
         settings = MeasurementSettings(policy, library, threads, rounds or 0, share)
         tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
-    folder = Path(out) if out is not None else Path(tempfile.mkdtemp(prefix="cembench-run-"))
+    folder = Path(output or tempfile.mkdtemp(prefix="cembench-run-"))
     plan = Plan(tasks, Store(folder), options, cluster)
     if dry_run:
         return Run(folder, plan=plan)

@@ -137,7 +137,7 @@ def catalogue(
     """
     if measure and kind != "surfaces":
         raise ParameterError.about(
-            "{measure} is only for surfaces: leave it out, or list surfaces alone."
+            "{measure} is only for surfaces: leave it out, or add {kind:'surfaces'}."
         )
     registry = registry_with(plugins, reporter)
     facts: dict[str, SurfaceFacts | None] = {}

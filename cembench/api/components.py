@@ -12,13 +12,10 @@ from numpy.typing import NDArray
 from cembench.conformal.laplacian import corner_products
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
-from cembench.mesh.files import read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
-from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
-from cembench.running.surfaces import SurfaceFile, kinds_of, load_file, prepared
+from cembench.running.surfaces import SurfaceFile, kinds_of, prepared
 
 Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
@@ -52,20 +49,11 @@ class Shells:
     V: NDArray[np.float64]
     F: Ints
     parts: tuple[SurfaceFile, ...]
-    vertices: tuple[Ints, ...] = ()
-    faces: tuple[Ints, ...] = ()
+    vertices: tuple[Ints, ...]
+    faces: tuple[Ints, ...]
 
-    @property
-    def whole(self) -> TriangleMesh:
-        """The whole file as one mesh, for writers and pictures only."""
-        return TriangleMesh.trusted(self.V, self.F, self.path.stem)
-
-    def packed(self, maps: Sequence[Complex], *, equal: bool) -> list[Complex]:
-        """Place the maps side by side in the unit square, in parts by area or in equal ones."""
-        return packed(maps, areas_of(self.parts), equal=equal)
-
-    def together(self, maps: Sequence[Complex], *, equal: bool) -> tuple[Complex, Ints | None]:
-        """Place the maps as :meth:`packed` does, per corner where surfaces were cut.
+    def joined(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
+        """Return the images of all surfaces as one array, per corner where surfaces were cut.
 
         Returns
         -------
@@ -77,9 +65,7 @@ class Shells:
         """
         uv, copies = np.zeros(len(self.V), np.complex128), []
         corners, size = self.F.copy(), len(self.V)
-        for part, z, own, faces in zip(
-            self.parts, self.packed(maps, equal=equal), self.vertices, self.faces, strict=True
-        ):
+        for part, z, own, faces in zip(self.parts, maps, self.vertices, self.faces, strict=True):
             uv[own] = z[: len(own)]
             copies.append(z[len(own) :])
             number = np.concatenate([own, size + np.arange(len(copies[-1]))])
@@ -95,23 +81,27 @@ def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
 
 
 def read_shells(
-    path: Path, algorithms: Sequence[Algorithm], *, mend: bool = False, cut: bool = False
+    path: Path,
+    soup: Soup,
+    algorithms: Sequence[Algorithm],
+    *,
+    mend: bool = False,
+    cut: bool = False,
 ) -> Shells:
-    """Read the surfaces of a file, each as a kind that the algorithms take.
+    """Part the polygons of a file into its surfaces, each of a kind that the algorithms take.
 
     Triangles that are connected, even at a single vertex, are one surface. With `mend`, only the
-    largest surface is read.
+    largest surface is kept.
 
     Raises
     ------
     MeshError
-        The file cannot be read, or one of its surfaces is not of such a kind.
+        One of the surfaces is not of such a kind.
 
     """
     kinds = kinds_of(algorithms)
     if mend:
-        return _alone(load_file(path, kinds, repair=True, cut=cut))
-    soup = read_soup(path)
+        return _alone(prepared(soup, kinds, path, repair=True, cut=cut))
     try:
         return _alone(prepared(soup, kinds, path, cut=cut))
     except UnusableMeshError as error:
@@ -144,7 +134,8 @@ def read_shells(
 
 def _alone(file: SurfaceFile) -> Shells:
     mesh = file.uncut or file.mesh
-    return Shells(file.path, mesh.V, mesh.F, (file,))
+    every = (np.arange(mesh.n),), (np.arange(mesh.m),)
+    return Shells(file.path, mesh.V, mesh.F, (file,), *every)
 
 
 def _split(soup: Soup) -> list[tuple[Ints, Ints]]:

@@ -74,7 +74,7 @@ def map_files(
     Parameters
     ----------
     meshes : sequence of paths or names
-        Mesh files (OBJ, OFF, PLY, STL, MAT), or names of public surfaces, which are fetched.
+        Mesh files (OBJ, OFF, PLY, STL, MAT), or names of surfaces; public ones are fetched.
     algorithm : str, optional
         Name of an algorithm, see :func:`cembench.list_algorithms`; default: direct-cem, or
         direct-cem-holes for surfaces with holes. best tries several and keeps the best map.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,15 +10,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.api.components import Shells
+from cembench.api.components import Shells, areas_of
 from cembench.api.settings import Placement
 from cembench.api.write_maps import FileOptions, check_file_options, save_map
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
+from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
 from cembench.results.records import Record
 
@@ -77,8 +80,7 @@ def write_extras(
         from cembench.api.view import map_page
         from cembench.report.render.view_page import write_view_page
 
-        notes = [*map(str, mesh.notices), *map(str, record.outcome.notes)]
-        write_view_page(extras.page, map_page(mesh, z, record.outcome, record.title, notes))
+        write_view_page(extras.page, map_page(mesh, z, record.outcome, record.title))
     return told
 
 
@@ -121,8 +123,12 @@ def check_shells(surfaces: int, path: Path, file_options: FileOptions, extras: E
     if extras.files:
         raise ParameterError.about(
             "{path} holds {surfaces} surfaces; {geometry_image}, {remesh} and {html} take one. "
-            "`cembench repair --components all` writes each to its own file.",
+            "{each} gives each alone.",
             path=path,
+            each=Advice(
+                f"`cembench.repair({str(path)!r}, components='all').meshes`",
+                f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
+            ),
             surfaces=surfaces,
         )
     if file_options.place != "unit":
@@ -138,8 +144,9 @@ def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
     if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
         raise ParameterError.about(
             "{cut} makes a disk, which {name} does not take; name an algorithm for disks (see "
-            "`cembench list algorithms`).",
+            "{listed}).",
             name=candidates[0].name,
+            listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
         )
 
 
@@ -206,24 +213,26 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
     return list(files)
 
 
-def draw_map(mesh: TriangleMesh, uv: NDArray[np.complex128], picture: Path, record: Record) -> None:
-    """Draw a surface and its map as a PNG, with the recorded figures."""
-    from cembench.drawing.preview import write_preview
-
-    title = f"{record.cell.mesh}: {record.title}"
-    write_preview(mesh, uv, picture, title=title, caption=caption(record.outcome.metrics))
-
-
-def draw_shells(
-    shells: Shells, maps: Sequence[NDArray[np.complex128]], picture: Path, *, equal: bool
+def draw_maps(
+    shells: Shells,
+    maps: Sequence[NDArray[np.complex128]],
+    picture: Path,
+    record: Record,
+    *,
+    equal: bool,
 ) -> None:
-    """Draw the surfaces of a file and their maps, placed as in its UVs, as a PNG."""
+    """Draw the surfaces of a file and their maps as a PNG: one with its recorded figures."""
     from cembench.drawing.preview import write_preview
 
+    if len(maps) == 1:
+        title = f"{record.cell.mesh}: {record.title}"
+        words = caption(record.outcome.metrics)
+        write_preview(shells.parts[0].mesh, maps[0], picture, title=title, caption=words)
+        return
     starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
     V = np.concatenate([part.mesh.V for part in shells.parts])
     F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])
     mesh = TriangleMesh.trusted(V, F, shells.path.stem)
     title = f"{shells.path.stem}: {len(maps)} surfaces"
-    uv = np.concatenate(shells.packed(maps, equal=equal))
+    uv = np.concatenate(packed(maps, areas_of(shells.parts), equal=equal))
     write_preview(mesh, uv, picture, title=title, turned=False)

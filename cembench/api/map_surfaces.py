@@ -11,31 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.api.components import Shells, read_shells
-from cembench.api.map_outputs import (
-    Extras,
-    draw_map,
-    draw_shells,
-    picture_files,
-    write_extras,
-)
-from cembench.api.write_maps import (
-    FileOptions,
-    write_atlas,
-    write_corner_map,
-    write_map,
-    write_shells,
-)
+from cembench.api.map_outputs import Extras, draw_maps, picture_files, write_extras
+from cembench.api.write_maps import FileOptions, write_shells, write_together
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
 from cembench.mesh import datasets
+from cembench.mesh.files import read_soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.in_this_process import map_here, may_run_here
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
-from cembench.running.surfaces import SurfaceFile
+from cembench.running.surfaces import (
+    SurfaceFile,
+    file_named,
+    generate_surface,
+    is_generated,
+    soup_of,
+)
 
 Complex = NDArray[np.complex128]
 #: Notices, each with the file it is about.
@@ -96,7 +91,16 @@ class Mapped:
 def local_files(
     meshes: Sequence[Path], registry: Registry, reporter: Reporter = SILENT
 ) -> list[Path]:
-    """Return the file of each path or name of a public surface, which is fetched if necessary."""
+    """Return the file of each path or name of a public surface, which is fetched if necessary.
+
+    A generated surface keeps its name.
+
+    Raises
+    ------
+    MeshError
+        A name is that of no surface.
+
+    """
     known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
     fetched = {}
     for path in known:
@@ -104,7 +108,11 @@ def local_files(
         with reporter.downloads([dataset]) as progress:
             datasets.fetch(dataset, progress=progress(dataset))
         fetched[path] = datasets.surface_file(dataset)
-    return [fetched.get(path, path) for path in meshes]
+    return [
+        fetched.get(path)
+        or (path if is_generated(str(path), registry) else file_named(path, registry))
+        for path in meshes
+    ]
 
 
 def jobs_of(
@@ -119,7 +127,9 @@ def jobs_of(
     cut: bool,
 ) -> tuple[Shells, tuple[Job, ...]]:
     """Return the surfaces of a file, and a job for each with the first algorithm that takes it."""
-    shells = read_shells(source, candidates, mend=repair, cut=cut)
+    generated = is_generated(str(source), registry)
+    soup = soup_of(generate_surface(registry, str(source))) if generated else read_soup(source)
+    shells = read_shells(source, soup, candidates, mend=repair, cut=cut)
     jobs = []
     for surface in shells.parts:
         mesh = surface.mesh
@@ -190,12 +200,14 @@ class Maps:
             for job in file.jobs:
                 mapped = self._mapped(file, job)
                 own.append(mapped)
-                if len(own) == len(file.jobs) > 1:
-                    mapped = replace(mapped, told=self._write_shells(file, own))
+                if len(own) == len(file.jobs):
+                    mapped = replace(mapped, told=(*mapped.told, *self._write(file, own)))
                 self.done.append(mapped)
                 yield mapped
-        if self.output is not None:
-            self._write_together(self.output)
+        if self.output is not None and (maps := self._maps(self.done, self.output)):
+            surfaces = [mapped.surface for mapped in self.done]
+            for notice in write_together(self.output, surfaces, maps, self.file_options):
+                self.reporter.note(f"{self.output}: {notice}")
 
     def writes(self, mapped: Mapped) -> bool:
         """Whether a map is written."""
@@ -205,24 +217,19 @@ class Maps:
         """Return the maps that are written to one file; none if one is missing."""
         if all(map(self.writes, mapped)):
             return [one.uv for one in mapped if one.uv is not None]
-        if output is not None:
+        if output is not None and len(mapped) > 1:
             self.missing.append(output)
         return []
 
-    def _write_together(self, output: Path) -> None:
-        if maps := self._maps(self.done, output):
-            surfaces = [mapped.surface for mapped in self.done]
-            for notice in write_atlas(output, surfaces, maps, self.file_options):
-                self.reporter.note(f"{output}: {notice}")
-
-    def _write_shells(self, file: FileJobs, own: Sequence[Mapped]) -> Told:
+    def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Told:
         told: tuple[Notice, ...] = ()
         maps = self._maps(own, file.output)
         if maps and file.output is not None:
             told = write_shells(file.output, file.shells, maps, self.file_options)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
-                draw_shells(file.shells, maps, file.picture, equal=self.file_options.equal)
+                equal = self.file_options.equal
+                draw_maps(file.shells, maps, file.picture, own[0].record, equal=equal)
         return tuple((file.output or file.shells.path, notice) for notice in told)
 
     def _mapped(self, file: FileJobs, job: Job) -> Mapped:
@@ -238,27 +245,14 @@ class Maps:
         mapped = Mapped(job.surface, record, uv, {}, certificate=proof)
         if uv is None or not self.writes(mapped):
             return mapped
-        is_atlas = algorithm.target == "atlas"
-        written: dict[str, str] = {}
-        told: list[tuple[Path, Notice]] = []
-        alone = len(file.jobs) == 1
-        if file.output is not None:
-            written["output"] = str(file.output)
-            if alone:
-                write: Any = write_corner_map if is_atlas else write_map
-                notices = write(file.output, job.surface, uv, self.file_options)
-                told += [(file.output, notice) for notice in notices]
+        told: Told = ()
+        files = {"output": file.output, **self.extras.named, "preview": file.picture}
         if self.extras.files:
             with self.reporter.busy("writing"):
                 notices = write_extras(self.extras, mesh, uv, record)
-            told += [(self.extras.remeshed or job.surface.path, notice) for notice in notices]
-            written |= {what: str(path) for what, path in self.extras.named.items()}
-        if file.picture is not None and not is_atlas:
-            written["preview"] = str(file.picture)
-            if alone:
-                with self.reporter.busy("drawing"):
-                    draw_map(mesh, uv, file.picture, record)
-        return replace(mapped, written=written, told=tuple(told))
+            told = tuple((self.extras.remeshed or job.surface.path, one) for one in notices)
+        written = {kind: str(path) for kind, path in files.items() if path is not None}
+        return replace(mapped, written=written, told=told)
 
 
 def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:

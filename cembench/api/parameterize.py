@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 from cembench.api.map_files import algorithms_named
 from cembench.api.notebook import html_table, is_notebook, show_page
 from cembench.api.settings import Placement
-from cembench.conformal.texel_density import ISLANDS, needs_islands
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
@@ -94,8 +93,9 @@ class Result:
     @property
     def notices(self) -> tuple[str, ...]:
         """Remarks on the surface and the map, e.g. a broken premise of the paper."""
-        islands = (ISLANDS,) if self.ok and needs_islands(self.outcome.metrics) else ()
-        return (*map(str, self.mesh.notices), *map(str, self.outcome.notes), *islands)
+        from cembench.api.view import notices_of
+
+        return notices_of(self.mesh, self.outcome)
 
     @property
     def phases(self) -> Mapping[str, float]:
@@ -262,7 +262,6 @@ class Result:
         import io
 
         from matplotlib import pyplot
-        from matplotlib.figure import Figure
         from matplotlib.image import imread
 
         png = self._png()
@@ -272,9 +271,9 @@ class Result:
             write(Path(path), lambda file: file.write(png))
         pixels = imread(io.BytesIO(png), format="png")
         size = (pixels.shape[1] / 100, pixels.shape[0] / 100)
-        # A notebook would display a figure of pyplot twice: as such, and as the cell's result.
-        make = Figure if is_notebook() else pyplot.figure
-        figure = make(figsize=size, dpi=100)
+        figure = pyplot.figure(figsize=size, dpi=100)
+        if is_notebook():  # it would display it twice: as the cell's result, and at the cell's end
+            pyplot.close(figure)
         axes = figure.add_axes((0, 0, 1, 1))
         axes.imshow(pixels, aspect="auto")
         axes.set_axis_off()
@@ -308,7 +307,7 @@ class Result:
         from cembench.api.view import map_page
         from cembench.report.render.view_page import write_view_page
 
-        page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title, self.notices)
+        page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title)
         if path is not None:
             write_view_page(Path(path), page)
             return Path(path)

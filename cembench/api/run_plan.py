@@ -14,7 +14,7 @@ from cembench.api.surface_collections import Provided
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import Reporter
-from cembench.core.wording import Setting
+from cembench.core.wording import Advice, Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
@@ -228,7 +228,8 @@ def gather_sets(
     if not found.surfaces:
         raise ParameterError.about(
             "{given} gives no surface that the chosen algorithms take; "
-            "`cembench fetch --group disks` shows whether files can be fetched.",
+            "{fetch} shows whether files can be fetched.",
+            fetch=Advice("`cembench.fetch(group=['disks'])`", "`cembench fetch --group disks`"),
             given=", ".join(sets),
         )
     return found

@@ -34,7 +34,7 @@ def validate(
     require: Sequence[Literal["faster", "not-slower", "better", "not-worse", "no-folds"]] = (),
     checks_only: bool = False,
     timeout: Timeout = 120.0,
-    out: AnyPath | None = None,
+    output: AnyPath | None = None,
     reporter: Reporter = SILENT,
 ) -> Validation:
     """Check whether a solver is correct, and compare its quality and speed with baselines.
@@ -69,7 +69,7 @@ def validate(
         Check contract and correctness only, without timing.
     timeout : float
         Time limit of a call, in seconds.
-    out : path, optional
+    output : path, optional
         Write JSON, HTML and the runs to this folder.
     reporter : Reporter
         Receives what is being done.
@@ -105,9 +105,9 @@ def validate(
     from cembench.validation.requirement import Requirement
     from cembench.validation.solver import Solver, in_a_process, load_solver
 
-    if out is not None:
-        extras.require(extras.Extra.REPORT, f"the page in {out}")
-        folders.check(Path(out), "validation")
+    if output is not None:
+        extras.require(extras.Extra.REPORT, f"the page in {output}")
+        folders.check(Path(output), "validation")
     with reporter.busy(f"importing {os.fspath(plugin)}"):
         algorithm, registry, plugins = load_solver(os.fspath(plugin))
     arguments = distribute_parameters([algorithm], parameters or {})[algorithm.name]
@@ -134,21 +134,21 @@ def validate(
     )
     hooks = ValidationHooks(reporter.step, lambda cells: reporter.watching(cells, resumes=False))
     solver = Solver(algorithm, plugins, arguments, in_a_process(options))
-    with _folder(out) as folder:
+    with _folder(output) as folder:
         found = examine(solver, registry, folder, asked, hooks)
-        if out is not None:
+        if output is not None:
             write_validation(found, folder)
     return found
 
 
 @contextmanager
-def _folder(out: AnyPath | None) -> Iterator[Path]:
+def _folder(output: AnyPath | None) -> Iterator[Path]:
     """Yield the folder for the runs: the user's, or a temporary one."""
     from cembench.core import folders
 
-    if out is not None:
-        folders.claim(Path(out), "validation")
-        yield Path(out)
+    if output is not None:
+        folders.claim(Path(output), "validation")
+        yield Path(output)
         return
     with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
         yield Path(folder)

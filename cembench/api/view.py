@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.metrics import METRICS, caption
+from cembench.conformal.texel_density import ISLANDS, needs_islands
 from cembench.drawing.preview import preview_png
 from cembench.drawing.view_scene import ViewedMap, view_scene
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -20,7 +19,6 @@ def map_page(
     z: NDArray[np.complex128],
     outcome: Outcome,
     algorithm: str,
-    notices: Sequence[str] = (),
 ) -> str:
     """Return the page of a map: a 3-D view, a picture for browsers without WebGL, the figures.
 
@@ -34,8 +32,6 @@ def map_page(
         Result of the check.
     algorithm : str
         Title of the algorithm.
-    notices : sequence of str
-        Remarks for the reader.
 
     Returns
     -------
@@ -50,8 +46,14 @@ def map_page(
     facts = [("surface", f"{mesh.n:,} vertices, {mesh.m:,} triangles")]
     status = outcome.status + (f": {outcome.cause}" if outcome.cause else "")
     facts += [("status", status), *metric_facts(outcome)]
-    facts += [("note", notice) for notice in notices]
+    facts += [("note", notice) for notice in notices_of(mesh, outcome)]
     return view_page(title, scene, preview_png(mesh, z, title=title, caption=about), facts)
+
+
+def notices_of(mesh: TriangleMesh, outcome: Outcome) -> tuple[str, ...]:
+    """Return the remarks on a surface and its map."""
+    islands = (ISLANDS,) if outcome.status == "ok" and needs_islands(outcome.metrics) else ()
+    return (*map(str, mesh.notices), *map(str, outcome.notes), *islands)
 
 
 def metric_facts(outcome: Outcome) -> list[tuple[str, str]]:

@@ -102,20 +102,17 @@ def check_file_options(meshes: Sequence[Path], file_options: FileOptions) -> Non
     read_texture(file_options.bake)
 
 
-def write_map(
-    output: Path, surface: SurfaceFile, z: Complex, file_options: FileOptions | None = None
+def save_map(
+    output: Path, mesh: TriangleMesh, z: Complex, file_options: FileOptions | None = None
 ) -> tuple[Notice, ...]:
     """Write a surface with its map as texture coordinates.
-
-    An OBJ file that was not repaired keeps its content and gets the coordinates. A surface that was
-    cut is written uncut, with coordinates per corner, if the format supports that.
 
     Parameters
     ----------
     output : Path
         OBJ, PLY, GLB, VTP or NPZ file.
-    surface : SurfaceFile
-        The surface and the file it was read from.
+    mesh : TriangleMesh
+        The surface.
     z : complex128 (n,)
         The map.
     file_options : FileOptions, optional
@@ -129,104 +126,54 @@ def write_map(
     Raises
     ------
     MeshError, ParameterError, RenderError
-        A file cannot be written, or the texture cannot be read or does not fit.
+        A file cannot be written.
 
     """
-    file_options = file_options or FileOptions()
-    moved = placed(z, file_options.place)
-    textured = _textured(surface, moved)
-    texture = _texture(surface, textured, file_options, output)
-    original = None
-    suffix = output.suffix.lower()
-    if suffix == ".obj" == surface.path.suffix.lower() and not surface.repaired:
-        text = surface.path.read_text(encoding="latin-1")  # any bytes, as they are
-        corners = (surface.uncut.F, surface.cut.mesh.F) if surface.uncut and surface.cut else ()
-        original = obj.with_uv(text, moved, *corners)
-    _write(output, textured, texture, file_options, original)
-    return _folded_by_rounding(output, z, moved, surface.mesh.F)
+    options = file_options or FileOptions()
+    soup = Soup.of_triangles(mesh.V, mesh.F, placed(z, options.place), name=mesh.name)
+    return _save(output, [soup], z, options)
 
 
 def write_shells(
-    output: Path, shells: Shells, maps: Sequence[Complex], file_options: FileOptions
+    output: Path, shells: Shells, maps: Sequence[Complex], options: FileOptions
 ) -> tuple[Notice, ...]:
-    """Write a file of several surfaces, with their maps side by side in the unit square.
+    """Write the surfaces of a file with their maps, as :func:`save_map` does.
 
-    Otherwise like :func:`write_map`: an OBJ file keeps its content.
+    The maps of several surfaces lie side by side in the unit square. An OBJ file that was not
+    repaired keeps its content and gets the coordinates. A surface that was cut is written uncut,
+    with coordinates per corner, as an atlas is.
     """
-    uv, corners = shells.together(maps, equal=file_options.equal)
-    mesh = shells.whole
-    whole = SurfaceFile(shells.path, mesh)
-    textured = Soup.of_triangles(mesh.V, mesh.F, uv, corners, name=mesh.name)
-    texture = _texture(whole, textured, file_options, output)
-    original = None
-    if output.suffix.lower() == ".obj" == shells.path.suffix.lower():
-        text = shells.path.read_text(encoding="latin-1")  # any bytes, as they are
-        original = obj.with_uv(text, uv, *(() if corners is None else (mesh.F, corners)))
-    _write(output, textured, texture, file_options, original)
-    before = np.zeros(len(uv), dtype=np.complex128)
-    F = mesh.F if corners is None else corners
-    for part, z, faces in zip(shells.parts, maps, shells.faces, strict=True):
-        before[F[faces]] = z[part.mesh.F]
-    return _folded_by_rounding(output, before, uv, F)
+    if len(maps) > 1:
+        moved = packed(maps, areas_of(shells.parts), equal=options.equal)
+    elif len(maps[0]) == 3 * len(shells.F):
+        mesh = shells.parts[0].mesh
+        atlas = cut_map(mesh, maps[0].reshape(-1, 3))
+        uv = placed(atlas.uv, options.place)
+        soup = Soup.of_triangles(mesh.V, mesh.F, uv, atlas.surface.F, name=mesh.name)
+        return _save(output, [soup], atlas.uv, options)
+    else:
+        moved = [placed(maps[0], options.place)]
+    uv, corners = shells.joined(moved)
+    name = shells.parts[0].mesh.name if len(maps) == 1 else shells.path.stem
+    soup = Soup.of_triangles(shells.V, shells.F, uv, corners, name=name)
+    return _save(output, [soup], shells.joined(maps)[0], options, shells)
 
 
-def write_corner_map(
-    output: Path, surface: SurfaceFile, corners: Complex, file_options: FileOptions
+def write_together(
+    output: Path, files: Sequence[SurfaceFile], maps: Sequence[Complex], options: FileOptions
 ) -> tuple[Notice, ...]:
-    """Write a surface with one UV per corner (3 m,), as an atlas has.
-
-    Raises
-    ------
-    MeshError, ParameterError, RenderError
-        As for :func:`write_map`; a texture cannot be baked for an atlas.
-
-    """
-    if file_options.bake is not None:
-        raise ParameterError.about("{bake} needs a map with one UV per vertex; this is an atlas.")
-    mesh = surface.mesh
-    found = cut_map(mesh, corners.reshape(-1, 3))
-    moved = placed(found.uv, file_options.place)
-    textured = Soup.of_triangles(mesh.V, mesh.F, moved, found.surface.F, name=mesh.name)
-    _write(output, textured, _checker(file_options, output), file_options, None)
-    return _folded_by_rounding(output, found.uv, moved, found.surface.F)
-
-
-def save_map(
-    output: Path, mesh: TriangleMesh, z: Complex, file_options: FileOptions | None = None
-) -> tuple[Notice, ...]:
-    """Write a surface that was not read from a file; like :func:`write_map`."""
-    file_options = file_options or FileOptions()
-    if file_options.bake is not None:
-        raise ParameterError.about("{bake} needs a surface read from an OBJ file.")
-    moved = placed(z, file_options.place)
-    surface = Soup.of_triangles(mesh.V, mesh.F, moved, name=mesh.name)
-    _write(output, surface, _checker(file_options, output), file_options, None)
-    return _folded_by_rounding(output, z, moved, mesh.F)
-
-
-def write_atlas(
-    output: Path,
-    surfaces: Sequence[SurfaceFile],
-    maps: Sequence[Complex],
-    file_options: FileOptions,
-) -> tuple[Notice, ...]:
-    """Write several surfaces to one file, with their maps side by side in the unit square.
+    """Write the surfaces of several files to one, as :func:`write_shells` does those of a file.
 
     A GLB file gets a node for each surface; other formats get one mesh.
     """
-    moved = packed(maps, areas_of(surfaces), equal=file_options.equal)
-    parts = [_textured(file, z) for file, z in zip(surfaces, moved, strict=True)]
-    texture = _checker(file_options, output)
-    if output.suffix.lower() == ".glb":
-        whole = gltf.write(*parts, texture=Texture(texture) if texture else None)
-        write_bytes(output, whole, error=MeshError, parents=False)
-    else:
-        _write(output, _joined(parts), texture, file_options, None)
-    told = [
-        _folded_by_rounding(output, z, after, file.mesh.F)
-        for file, z, after in zip(surfaces, maps, moved, strict=True)
-    ]
-    return tuple(notice for notices in told for notice in notices)
+    moved = packed(maps, areas_of(files), equal=options.equal)
+    soups = []
+    for file, z in zip(files, moved, strict=True):
+        mesh, corners = file.uncut or file.mesh, file.mesh.F if file.uncut else None
+        soups.append(Soup.of_triangles(mesh.V, mesh.F, z, corners, name=file.mesh.name))
+    if output.suffix.lower() != ".glb":
+        soups = [_joined(soups)]
+    return _save(output, soups, np.concatenate(maps), options)
 
 
 def placed(z: Complex, place: Placement) -> Complex:
@@ -234,49 +181,24 @@ def placed(z: Complex, place: Placement) -> Complex:
     return to_unit_square(z) if place == "unit" else z
 
 
-def _textured(surface: SurfaceFile, moved: Complex) -> Soup:
-    mesh, corners = surface.mesh, None
-    if surface.uncut and surface.cut:
-        mesh, corners = surface.uncut, surface.cut.mesh.F
-    return Soup.of_triangles(mesh.V, mesh.F, moved, corners, name=surface.mesh.name)
-
-
-def _texture(
-    surface: SurfaceFile, textured: Soup, file_options: FileOptions, output: Path
-) -> bytes | None:
-    if file_options.bake is None:
-        return _checker(file_options, output)
-    from cembench.drawing.texture import baked_png, read_texture
-
-    if surface.repaired:
-        raise ParameterError.about(
-            "{bake} needs the faces of the original file, but the surface was repaired; run "
-            "`cembench repair` to see what it changes, and fix the file so that it keeps its UVs."
-        )
-    old = uv_of_faces(surface.path, textured.triangles)
-    assert textured.uv is not None
-    new = columns(textured.uv)[textured.uv_triangles]
-    return baked_png(read_texture(file_options.bake), old, new)
-
-
-def _checker(file_options: FileOptions, output: Path) -> bytes | None:
-    if not file_options.checker and output.suffix.lower() != ".glb":
-        return None
-    from cembench.drawing.texture import checker_png
-
-    return checker_png()
-
-
-def _write(
+def _save(
     output: Path,
-    surface: Soup,
-    texture: bytes | None,
-    file_options: FileOptions,
-    original: str | None,
-) -> None:
-    """Write the files of a surface, the texture first, so that no file names a missing one."""
-    image = Texture(texture) if texture else None
-    for path in beside(output, file_options):
+    soups: Sequence[Soup],
+    maps: Complex,
+    options: FileOptions,
+    source: Shells | None = None,
+) -> tuple[Notice, ...]:
+    """Write surfaces with their coordinates; return a notice if rounding folds triangles.
+
+    `maps` are the images before they were moved, one for each coordinate. `source` is the file
+    whose content an OBJ keeps, and whose own texture is baked. The texture is written first, so
+    that no file names a missing one.
+    """
+    texture, image = _texture(output, soups[0], options, source), None
+    if texture is not None:
+        image = Texture(texture)
+    suffix = output.suffix.lower()
+    for path in beside(output, options):
         if path.suffix == ".png":
             assert texture is not None
             write_bytes(path, texture, error=RenderError, parents=False)
@@ -284,36 +206,71 @@ def _write(
         else:
             assert image is not None
             write_bytes(path, obj.mtl_bytes(image.file), error=MeshError, parents=False)
-    if output.suffix.lower() != ".obj":
-        write_soup(output, surface, image)
-        return
-    text = original or obj.write(surface).decode()
-    if file_options.textured:
-        library = output.with_suffix(".mtl").name.encode("utf-8", "surrogateescape")
-        text = obj.with_material(text, library.decode("latin-1"))
-    write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
+    if suffix == ".glb":
+        content = gltf.write(*soups, texture=image)
+        write_bytes(output, content, error=MeshError, parents=False)
+    elif suffix == ".obj":
+        text = _obj_text(soups[0], source)
+        if options.textured:
+            library = output.with_suffix(".mtl").name.encode("utf-8", "surrogateescape")
+            text = obj.with_material(text, library.decode("latin-1"))
+        write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
+    else:
+        write_soup(output, soups[0], image)
+    return _folded_by_rounding(output, maps, _joined(soups))
+
+
+def _obj_text(soup: Soup, source: Shells | None) -> str:
+    """Return an OBJ file: that of the source with other coordinates, or a new one."""
+    if source is None or source.path.suffix.lower() != ".obj" or source.parts[0].repaired:
+        return obj.write(soup).decode()
+    text = source.path.read_text(encoding="latin-1")  # any bytes, as they are
+    per_corner = any(part.cut for part in source.parts)
+    assert soup.uv is not None
+    return obj.with_uv(text, soup.uv, *((soup.triangles, soup.uv_triangles) if per_corner else ()))
+
+
+def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells | None) -> bytes | None:
+    """Return the texture as PNG; None if there is none."""
+    if options.bake is None:
+        if not options.checker and output.suffix.lower() != ".glb":
+            return None
+        from cembench.drawing.texture import checker_png
+
+        return checker_png()
+    from cembench.drawing.texture import baked_png, read_texture
+
+    if source is None or source.parts[0].repaired:
+        raise ParameterError.about(
+            "{bake} needs the faces of the original file, but the surface was repaired, or is not "
+            "of a file; run `cembench repair` to see what it changes, and fix the file so that it "
+            "keeps its UVs."
+        )
+    old = uv_of_faces(source.path, soup.triangles)
+    assert soup.uv is not None
+    return baked_png(read_texture(options.bake), old, columns(soup.uv)[soup.uv_triangles])
 
 
 def _joined(parts: Sequence[Soup]) -> Soup:
     """Return several surfaces joined into one mesh."""
+    if len(parts) == 1:
+        return parts[0]
     starts = np.cumsum([0, *(len(part.V) for part in parts)])
     coordinates = [part.uv for part in parts if part.uv is not None]
-    uv_starts = np.cumsum([0, *(len(uv) for uv in coordinates)])
-    indices = zip(parts, uv_starts, strict=False)
+    uv_starts = np.cumsum([0, *map(len, coordinates)])
     return Soup.of_triangles(
         np.concatenate([part.V for part in parts]),
-        np.concatenate([part.triangles + k for part, k in zip(parts, starts, strict=False)]),
+        np.concatenate([p.triangles + k for p, k in zip(parts, starts, strict=False)]),
         np.concatenate(coordinates),
-        np.concatenate([part.uv_triangles + k for part, k in indices]),
+        np.concatenate([p.uv_triangles + k for p, k in zip(parts, uv_starts, strict=False)]),
     )
 
 
-def _folded_by_rounding(
-    output: Path, z: Complex, moved: Complex, F: NDArray[np.int64]
-) -> tuple[Notice, ...]:
+def _folded_by_rounding(output: Path, z: Complex, soup: Soup) -> tuple[Notice, ...]:
     """Return a notice of how many triangles rounding folds in the file."""
-    single = output.suffix.lower() in SINGLE
-    written = moved.astype(np.complex64).astype(np.complex128) if single else moved
+    single, F = output.suffix.lower() in SINGLE, soup.uv_triangles
+    assert soup.uv is not None
+    written = soup.uv.astype(np.complex64).astype(np.complex128) if single else soup.uv
     after = orientations(written, F)
     count = int(((orientations(z, F) > 0) & (after <= 0)).sum())
     if not count:

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
 
 from cembench.api.benchmark import benchmark
+from cembench.commands.app import app
 from cembench.commands.cluster import hours, show_hours
 from cembench.commands.console import SHOWN, Json, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import DEFAULT_RUN, Meshes, OutputRun, Surfaces
 
 if TYPE_CHECKING:
     from cembench.api.benchmark import Run
     from cembench.api.run_plan import Plan
 
 
+@app.command(
+    epilog="Examples:  cembench run --profile quick --dry-run  ·  "
+    "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
+    "cembench run --surfaces spherical-cap -o results/cap --json  ·  "
+    "cembench run --set real-disks -a all --limit 20"
+)
 @from_api(
     benchmark,
-    without=("watcher", "reporter", "out"),
+    without=("watcher", "reporter"),
     sets="--set",
     limit="--limit N",
     precision="--precision SHARE",
@@ -32,18 +39,14 @@ if TYPE_CHECKING:
 def run(
     call: Call,
     *,
-    mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
+    mesh: Meshes = [],  # noqa: B006
     dataset: Annotated[
         list[str], typer.Option("--dataset", help="Public surfaces (see `fetch`), comma-separated.")
     ] = [],  # noqa: B006
-    surfaces: Annotated[
-        list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
-    ] = [],  # noqa: B006
+    surfaces: Surfaces = [],  # noqa: B006
     command: Command = None,
     program: Settings = [],  # noqa: B006
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
-    ] = Path("results/run"),
+    output: OutputRun = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
     """Print the figures of the cells that were asked for; exit with 1 if one did not end ok."""
@@ -53,7 +56,7 @@ def run(
         surfaces=[*mesh, *split(dataset), *split(surfaces)],
         algorithms=[*(given["algorithms"] or ["usual"]), *named],
         plugins=[*given["plugins"], *declared],
-        out=output,
+        output=output,
         reporter=SHOWN,
     )
     if given["dry_run"]:
@@ -124,15 +127,3 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
     )
     if on_cluster:
         show_hours(on_cluster)
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        run,
-        "Examples:  cembench run --profile quick --dry-run  ·  "
-        "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
-        "cembench run --surfaces spherical-cap -o results/cap --json  ·  "
-        "cembench run --set real-disks -a all --limit 20",
-    ),
-)

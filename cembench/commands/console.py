@@ -27,6 +27,7 @@ from cembench.core.reporter import Reporter
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.registry import Registry
+    from cembench.results.records import Record
 
 #: Control codes are replaced by visible symbols; tabs and line ends are kept.
 _VISIBLE = {code: 0x2400 + code for code in range(32) if chr(code) not in "\t\n"}
@@ -86,6 +87,23 @@ def print_pair(name: str, value: object) -> None:
 def complain(message: str) -> None:
     """Print an error on standard error."""
     err.print(f"error: {message}", style="bold red", soft_wrap=True)
+
+
+def fail(messages: Iterable[str]) -> None:
+    """Print errors on standard error; if there is one, end with exit code 1."""
+    for message in (messages := list(messages)):
+        complain(message)
+    if messages:
+        raise typer.Exit(1)
+
+
+def failures(records: Iterable[Record]) -> list[str]:
+    """Return what went wrong with each cell that did not end ok."""
+    return [
+        f"{r.cell.mesh} / {r.cell.algorithm}: {r.outcome.status}: {r.outcome.cause}"
+        for r in records
+        if r.outcome.status != "ok"
+    ]
 
 
 def warn(message: str) -> None:
@@ -173,9 +191,9 @@ class Shown(Reporter):
 
     def downloads(self, datasets: Sequence[Any]) -> AbstractContextManager[Callable[[Any], Any]]:
         """Show a bar for each download on a terminal."""
-        from cembench.commands.fetch import bars
+        from cembench.commands.progress import download_bars
 
-        return bars(list(datasets))
+        return download_bars(err, datasets)
 
     @contextmanager
     def watching(

@@ -8,12 +8,18 @@ from typing import Annotated
 import typer
 
 from cembench.api.cut import cut as cut_surface
+from cembench.commands.app import app
 from cembench.commands.console import Json, err, note, out, print_json
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.repair import print_steps
 from cembench.core.errors import MeshError
 
 
+@app.command(
+    epilog="Examples:  cembench cut head.obj -o disk.obj  ·  "
+    "cembench cut sphere.ply -o disk.ply --between 0 812  ·  "
+    "cembench map torus.obj --cut -o torus_uv.obj"
+)
 @from_api(cut_surface, without=("surface", "through"))
 def cut(
     call: Call,
@@ -88,14 +94,3 @@ def cut(
     )
     for path in (output, seam):
         out.print(str(path), soft_wrap=True)
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        cut,
-        "Examples:  cembench cut head.obj -o disk.obj  ·  "
-        "cembench cut sphere.ply -o disk.ply --between 0 812  ·  "
-        "cembench map torus.obj --cut -o torus_uv.obj",
-    ),
-)

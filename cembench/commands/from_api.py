@@ -11,8 +11,10 @@ import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, Literal, get_origin
 
 import typer
@@ -40,6 +42,9 @@ USUAL = {
 PATHS = ("plugins", "sets")
 #: The options that messages name.
 NAMES = {name: spelling.split()[0] for name, spelling in USUAL.items()}
+NONE: Mapping[str, Any] = MappingProxyType({})
+#: What the values of options are called in the help.
+_METAVARS = {Path: "PATH", str: "NAME", int: "N", float: "N"}
 #: A call of the function with the arguments of the command line; `call(x=1)` makes it.
 Call = partial[Any]
 
@@ -49,6 +54,7 @@ def from_api(
     *,
     without: Sequence[str] = (),
     only: Sequence[str] | None = None,
+    defaults: Mapping[str, Any] = NONE,
     **options: str,
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that makes a command of a function of the API.
@@ -62,6 +68,8 @@ def from_api(
     only : sequence of str, optional
         The arguments that are options of a command that does more than the function, and so has a
         text of its own; default: all others.
+    defaults : mapping
+        Defaults that this command has instead of the function's.
     **options
         For an argument, its options where they do not follow from its name, and what its value is
         called in the help: ``output="-o --output FILE"``.
@@ -77,7 +85,7 @@ def from_api(
     def decorate(body: Callable[..., None]) -> Callable[..., None]:
         own = inspect.signature(body, eval_str=True).parameters
         arguments = {
-            name: argument
+            name: replace(argument, default=defaults.get(name, argument.default))
             for name, argument in arguments_of(function).items()
             if name not in {*without, *own} and (only is None or name in only)
         }
@@ -89,6 +97,8 @@ def from_api(
         for name, argument in arguments.items():
             named = positional[name].kind is _KEYWORD or name in names
             kind, default = _option_of(argument, spelled.get(name, ""), words, named=named)
+            if not named:
+                names[name] = spelled.get(name, name.upper())
             parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=kind))
 
         def command(**given: Any) -> None:
@@ -108,7 +118,7 @@ def from_api(
         command.__signature__ = inspect.Signature(arguments_first)  # type: ignore[attr-defined]
         command.__name__, command.__module__ = body.__name__, body.__module__
         command.__doc__ = words(summary_of(function)) if only is None else body.__doc__
-        command.body, command.function = body, function  # type: ignore[attr-defined]
+        command.body, command.arguments = body, arguments  # type: ignore[attr-defined]
         return command
 
     return decorate
@@ -139,7 +149,7 @@ def _option_of(
     spelled = spelling.split()
     flags = [word for word in spelled if word.startswith("-")]
     kind = _kind(argument)
-    usual = {Path: "PATH", str: "NAME"}.get(kind) if argument.many else None
+    usual = _METAVARS.get(kind)
     metavar = next((word for word in spelled if not word.startswith("-")), usual)
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
     if _is_split(argument):

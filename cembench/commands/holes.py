@@ -9,14 +9,19 @@ import typer
 
 from cembench.api.holes import holes as examine
 from cembench.api.holes import holes_command
-from cembench.commands.console import SHOWN, Json, complain, out, print_json
+from cembench.commands.app import app
+from cembench.commands.console import SHOWN, Json, fail, out, print_json
 from cembench.commands.from_api import Call, from_api
-from cembench.commands.run import DEFAULT_RUN
+from cembench.commands.options import DEFAULT_RUN, AddTo
 
 #: The surface that is mapped where none is named.
 STAND_IN = "ho-face-with-holes"
 
 
+@app.command(
+    epilog="Examples:  cembench holes face_with_holes.obj --sweeps 4 --run results/mine  ·  "
+    "cembench holes ho-face-with-holes --faces 20000 --json"
+)
 @from_api(examine, without=("surface", "reporter"))
 def holes(
     call: Call,
@@ -27,9 +32,7 @@ def holes(
         ),
     ] = [STAND_IN],  # noqa: B006 - typer copies defaults
     *,
-    run: Annotated[
-        Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
-    ] = DEFAULT_RUN,
+    run: AddTo = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
     """Print a table of all surfaces, and add it to the run."""
@@ -52,17 +55,4 @@ def holes(
         out.print(tables_shown(exhibit))
         out.print(f"\nExhibits: {(run / 'exhibits').resolve()}", soft_wrap=True, markup=False)
     bad = [row for row in rows if row["status"] != "ok"]
-    for row in bad:
-        complain(f"{row['mesh']} / {row['algorithm']}: {row['status']}: {row['cause']}")
-    if bad:
-        raise typer.Exit(1)
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        holes,
-        "Examples:  cembench holes face_with_holes.obj --sweeps 4 --run results/mine  ·  "
-        "cembench holes ho-face-with-holes --faces 20000 --json",
-    ),
-)
+    fail(f"{row['mesh']} / {row['algorithm']}: {row['status']}: {row['cause']}" for row in bad)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.api.map_files import map_files
+from cembench.commands.app import app
 from cembench.commands.console import (
     SHOWN,
     Json,
-    complain,
+    fail,
     note,
     out,
     print_json,
@@ -24,15 +25,15 @@ from cembench.core.errors import ParameterError
 if TYPE_CHECKING:
     from cembench.api.map_surfaces import Mapped, Maps
 
-EXAMPLES = (
-    "Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
+
+@app.command(
+    "map",
+    epilog="Examples:  cembench map face.obj -o face_uv.obj --preview  ·  "
     "cembench map face.ply -a cem -p max_iterations=13 --json  ·  cembench map left-hand  ·  "
     "cembench map scan.obj --repair -o scan_uv.obj  ·  cembench map head.obj --cut -o uv.obj  ·  "
-    "cembench map a.obj b.obj -o maps/"
+    "cembench map a.obj b.obj -o maps/",
 )
-
-
-@from_api(map_files, without=("reporter",), meshes="MESH...")
+@from_api(map_files, without=("reporter",), meshes="MESH")
 def map_(
     call: Call,
     *,
@@ -72,13 +73,9 @@ def _print_end(maps: Maps, *, as_json: bool) -> None:
         print_json(rows if len(rows) > 1 else rows[0])
     elif more:
         print_pair("output", maps.output)
-    for mapped in maps.done:
-        if not mapped.ok:
-            complain(_failure(mapped, named=len(maps) > 1))
-    for path in maps.missing:
-        complain(f"{path} was not written, because one of its surfaces has no map")
-    if maps.missing or not all(mapped.ok for mapped in maps.done):
-        raise typer.Exit(1)
+    bad = [_failure(mapped, named=len(maps) > 1) for mapped in maps.done if not mapped.ok]
+    missing = "{} was not written, because one of its surfaces has no map"
+    fail([*bad, *(missing.format(path) for path in maps.missing)])
 
 
 def _failure(mapped: Mapped, *, named: bool) -> str:

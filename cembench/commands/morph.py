@@ -11,11 +11,17 @@ from typing import Annotated, Any
 import typer
 
 from cembench.api.morph_surfaces import morph as morph_surfaces
+from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, complain, out, print_json, print_pair, split
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import AlgorithmFailed
 
 
+@app.command(
+    epilog="Examples:  cembench morph a.obj b.obj --landmarks ab.csv -o ab.gif  ·  "
+    "cembench morph liu-wry-face-stand-in liu-smile-face-stand-in --faces 8000 -o liu.mp4  ·  "
+    "cembench morph a.ply b.ply -o frames/ab.obj -o ab.npz --json"
+)
 @from_api(morph_surfaces, without=("reporter",), lam="--lambda")
 def morph(
     call: Call,
@@ -127,14 +133,3 @@ def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")
     for table in morph_tables(figures):
         out.print(exhibit_table(table, "", "surface"))
-
-
-#: The command with the examples in its help.
-VERBS = (
-    (
-        morph,
-        "Examples:  cembench morph a.obj b.obj --landmarks ab.csv -o ab.gif  ·  "
-        "cembench morph liu-wry-face-stand-in liu-smile-face-stand-in --faces 8000 -o liu.mp4  ·  "
-        "cembench morph a.ply b.ply -o frames/ab.obj -o ab.npz --json",
-    ),
-)

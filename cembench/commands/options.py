@@ -1,19 +1,27 @@
-"""Options that several commands share and no function of the API has."""
+"""Arguments and options that several commands share and no function of the API has."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cembench.api.settings import MOST_FACES
-
-#: Each surface has its own, narrower bounds.
-Faces = Annotated[
-    int | None,
-    typer.Option(min=1, max=MOST_FACES, help="Number of triangles of generated surfaces."),
+DEFAULT_RUN = Path("results/run")
+Run = Annotated[Path, typer.Argument(help="A run's folder.")]
+AddTo = Annotated[
+    Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
 ]
-Fresh = Annotated[bool, typer.Option("--fresh", help="Measure again what is already recorded.")]
+OutputRun = Annotated[
+    Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
+]
+Meshes = Annotated[
+    list[Path], typer.Option("--mesh", metavar="PATH", help="A mesh file. Repeatable.")
+]
+Surfaces = Annotated[
+    list[str],
+    typer.Option("--surfaces", metavar="NAME", help="Generated surfaces, comma-separated."),
+]
 Verify = Annotated[
     bool,
     typer.Option("--verify", help="Recompute the figures of all maps, not just of a sample."),

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from cembench.api.benchmark import benchmark
-from cembench.api.settings import LONGEST, MOST_FACES
-from cembench.commands.console import SHOWN, Json, complain, out, print_json, registry_with, split
+from cembench.commands.app import app
+from cembench.commands.console import (
+    SHOWN,
+    Json,
+    fail,
+    failures,
+    out,
+    print_json,
+    registry_with,
+    split,
+)
 from cembench.commands.external import Command, Settings, declared_command
-from cembench.commands.from_api import Call, finite, from_api
+from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Meshes, OutputRun, Surfaces
 
 if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry
     from cembench.results.records import Record
 
-#: Default surfaces, and their number of triangles.
+#: Default surfaces.
 USUAL = (
     "hemi-ellipsoid",
     "catenoid-sheet",
@@ -27,42 +35,27 @@ USUAL = (
     "cowboy-hat-stand-in",
     "nefertiti-stand-in",
 )
-FACES = 5000
 #: Our algorithms for disks in the comparison; of other targets, all are included.
 DISKS = ("cem", "direct-cem", "harmonic-circle")
 
 
-@from_api(benchmark, only=("algorithms", "mesh_dir", "plugins", "memory_bytes"))
+@app.command(
+    epilog="Examples:  cembench peers  ·  cembench peers --mesh face.obj -o results/peers  ·  "
+    "cembench peers --command './mine {input} {output}' --program target=atlas"
+)
+@from_api(
+    benchmark,
+    only=("algorithms", "mesh_dir", "faces", "plugins", "rounds", "timeout", "memory_bytes"),
+    defaults={"faces": 5000, "rounds": 1, "timeout": 120.0},
+)
 def peers(
     call: Call,
     *,
-    surfaces: Annotated[
-        list[str], typer.Option("--surfaces", help="Generated surfaces, comma-separated.")
-    ] = [],  # noqa: B006 - typer copies defaults
-    mesh: Annotated[list[Path], typer.Option("--mesh", help="A mesh file. Repeatable.")] = [],  # noqa: B006
-    faces: Annotated[
-        int, typer.Option(min=24, max=MOST_FACES, help="Number of triangles of generated surfaces.")
-    ] = FACES,
+    surfaces: Surfaces = [],  # noqa: B006 - typer copies defaults
+    mesh: Meshes = [],  # noqa: B006
     command: Command = None,
     program: Settings = [],  # noqa: B006
-    rounds: Annotated[
-        int,
-        typer.Option(
-            *("--rounds", "--repeats"),
-            min=1,
-            max=10_000,
-            help="Number of rounds; fewer than 6 give no interval.",
-        ),
-    ] = 1,
-    timeout: Annotated[
-        float,
-        typer.Option(
-            min=0.1, max=LONGEST, callback=finite, help="Time limit of a call, in seconds."
-        ),
-    ] = 120.0,
-    output: Annotated[
-        Path, typer.Option("-o", "--output", help="The run's folder; an existing run is resumed.")
-    ] = Path("results/peers"),
+    output: OutputRun = Path("results/peers"),
     as_json: Json = False,
 ) -> None:
     """Compare our algorithms with installed libraries and programs by others, and report.
@@ -91,13 +84,10 @@ def peers(
     measured = call(
         [*mesh, *(split(surfaces) or ([] if mesh or given["mesh_dir"] else USUAL))],
         algorithms=[a.name for a in chosen if a.name not in lacking],
-        faces=faces,
         plugins=plugins,
-        rounds=rounds,
-        timeout=timeout,
         pairing="separate",
         budget=None,
-        out=output,
+        output=output,
         reporter=SHOWN,
     )
     records = measured.asked
@@ -109,12 +99,7 @@ def peers(
     else:
         _show(output, records, lacking)
         out.print(f"Report: {(folder / 'index.html').resolve()}", soft_wrap=True, markup=False)
-    ours = [r for r in records if r.external is None and r.outcome.status != "ok"]
-    for record in ours:
-        name = f"{record.cell.mesh} / {record.cell.algorithm}"
-        complain(f"{name}: {record.outcome.status}: {record.outcome.cause}")
-    if ours:
-        raise typer.Exit(1)
+    fail(failures(r for r in records if r.external is None))
 
 
 def _usual(registry: Registry) -> list[Algorithm]:
@@ -133,13 +118,3 @@ def _show(output: Path, records: Sequence[Record], lacking: dict[str, str]) -> N
     out.print(peers_tables(Evidence(Store(output), tuple(records), ())))
     for name, why in lacking.items():
         out.print(f"{name} is not available: {why}.", style="dim", markup=False, soft_wrap=True)
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        peers,
-        "Examples:  cembench peers  ·  cembench peers --mesh face.obj -o results/peers  ·  "
-        "cembench peers --command './mine {input} {output}' --program target=atlas",
-    ),
-)

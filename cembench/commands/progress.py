@@ -1,17 +1,23 @@
-"""Progress of a run: a live table on a terminal, one line at a time elsewhere."""
+"""Progress of a run and of downloads: live on a terminal, one line at a time elsewhere."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Self
 
 from rich.console import Console, Group, RenderableType
 from rich.live import Live
+from rich.progress import BarColumn, DownloadColumn, TaskID, TextColumn
+from rich.progress import Progress as Bars
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from cembench.mesh.datasets import Dataset
+from cembench.mesh.download import Progress
 from cembench.report.render.terminal import status_style
 from cembench.results.records import Record
 from cembench.running.plan import Task
@@ -224,3 +230,45 @@ def duration(seconds: float) -> str:
     if seconds < 90 * 60:
         return f"{seconds / 60:.0f} min"
     return f"{seconds / 3600:.1f} h"
+
+
+@dataclass
+class _Bar:
+    """The progress bar of one file."""
+
+    bars: Bars
+    line: TaskID
+    total: int = 0
+    whole: TaskID | None = None
+
+    def update(self, count: int) -> None:
+        """Add bytes that have arrived."""
+        self.bars.update(self.line, advance=count, total=self.total or None)
+        if self.whole is not None:
+            self.bars.update(self.whole, advance=count)
+
+    def close(self) -> None:
+        """Hide the bar of this file if there are others."""
+        self.bars.stop_task(self.line)
+        if self.whole is not None:
+            self.bars.update(self.line, visible=False)
+
+
+@contextmanager
+def download_bars(
+    console: Console, datasets: Sequence[Dataset]
+) -> Iterator[Callable[[Dataset], Progress | None]]:
+    """Yield a function that makes a bar for each file on a terminal, and nothing elsewhere."""
+    if not console.is_terminal:
+        yield lambda dataset: None
+        return
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(20), DownloadColumn())
+    total = sum(d.size or 0 for d in datasets)
+    with Bars(*columns, console=console, transient=True) as bars:
+        whole = bars.add_task("all files", total=total or None) if len(datasets) > 1 else None
+
+        def bar(dataset: Dataset) -> Progress:
+            line = bars.add_task(f"fetching {dataset.name}", total=dataset.size)
+            return _Bar(bars, line, whole=whole)
+
+        yield bar

@@ -9,10 +9,16 @@ from typing import Annotated, Any
 import typer
 
 from cembench.api.repair import repair as repair_surface
+from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, note, out, print_json
 from cembench.commands.from_api import Call, from_api
 
 
+@app.command(
+    epilog="Examples:  cembench repair scan.obj -o mended.obj  ·  "
+    "cembench repair scan.ply -o mended.ply --weld 1e-6 --fill-holes 20  ·  "
+    "cembench repair parts.stl -o part.obj --components all --json"
+)
 @from_api(
     repair_surface,
     without=("surface",),
@@ -83,14 +89,3 @@ def print_steps(steps: Mapping[str, int]) -> None:
 
     for step, count in steps.items():
         out.print(f"{count:>9,}  {TITLES[step]}", style="" if count else "dim")
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        repair,
-        "Examples:  cembench repair scan.obj -o mended.obj  ·  "
-        "cembench repair scan.ply -o mended.ply --weld 1e-6 --fill-holes 20  ·  "
-        "cembench repair parts.stl -o part.obj --components all --json",
-    ),
-)

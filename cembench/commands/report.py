@@ -7,9 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cembench.api import benchmark
+from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, out, print_json
 from cembench.commands.from_api import Call, from_api
-from cembench.commands.run import DEFAULT_RUN, Run
+from cembench.commands.options import DEFAULT_RUN, Run
 
 if TYPE_CHECKING:
     from cembench.report.document import Report
@@ -20,6 +21,10 @@ CITATION = {"title", "authors", "place", "doi"}
 MOST_DRAWING = 2
 
 
+@app.command(
+    epilog="Examples:  cembench report results/run  ·  "
+    "cembench report results/run -o out --json  ·  cembench report results/run --tables mine.toml"
+)
 @from_api(
     benchmark.Run.report,
     without=("self", "command", "jobs", "reporter"),
@@ -85,13 +90,3 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
         "claims": claims,
         "verdicts": {verdict: counts[verdict] for verdict in VERDICTS if counts[verdict]},
     }
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        report,
-        "Examples:  cembench report results/run  ·  cembench report results/run -o out --json  ·  "
-        "cembench report results/run --tables mine.toml",
-    ),
-)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import typer
-
 from cembench.api.reproduce import reproduce as reproduce_paper
-from cembench.commands.console import SHOWN, Json, complain, print_json
+from cembench.commands.app import app
+from cembench.commands.console import SHOWN, Json, fail, failures, print_json
 from cembench.commands.exit_codes import resumable
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.report import show_report, summary
 
 
+@app.command(
+    epilog="Examples:  cembench reproduce  ·  "
+    "cembench reproduce --budget 20m -o results/longer  ·  cembench reproduce --offline"
+)
 @from_api(reproduce_paper, without=("jobs", "reporter"), budget="--budget TIME")
 def reproduce(call: Call, *, as_json: Json = False) -> None:
     """Print the tables and verdicts; exit with 1 if a cell did not end ok."""
@@ -25,19 +28,4 @@ def reproduce(call: Call, *, as_json: Json = False) -> None:
         print_json({"surfaces": dict(found.surfaces), "cells": rows(records), "report": about})
     else:
         show_report(found.report, folder)
-    bad = [record for record in records if record.outcome.status != "ok"]
-    for record in bad:
-        name = f"{record.cell.mesh} / {record.cell.algorithm}"
-        complain(f"{name}: {record.outcome.status}: {record.outcome.cause}")
-    if bad:
-        raise typer.Exit(1)
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        reproduce,
-        "Examples:  cembench reproduce  ·  cembench reproduce --budget 20m -o results/longer  ·  "
-        "cembench reproduce --offline",
-    ),
-)
+    fail(failures(records))

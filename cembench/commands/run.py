@@ -1,4 +1,4 @@
-"""The commands on existing runs: status, show, compare, merge and export."""
+"""The commands on existing runs: status, show, compare, merge, export, publish and sign."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cembench.commands.console import Json, complain, note, out, print_json, print_pair, warn
-from cembench.commands.options import Verify
-from cembench.commands.sign import RequireSigned, check_signed
+from cembench.commands.app import app
+from cembench.commands.console import Json, err, fail, note, out, print_json, print_pair, warn
+from cembench.commands.options import DEFAULT_RUN, Run, Verify
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.overwriting import refuse_inputs
 from cembench.report.export_format import Format
@@ -23,10 +23,17 @@ if TYPE_CHECKING:
     from cembench.results.records import Cell, Record
     from cembench.results.store import Store
 
-Run = Annotated[Path, typer.Argument(help="A run's folder.")]
-DEFAULT_RUN = Path("results/run")
+RequireSigned = Annotated[
+    Path | None,
+    typer.Option(
+        "--require-signed",
+        metavar="SIGNERS",
+        help="Refuse runs not signed by somebody in this file (ssh-keygen: ALLOWED SIGNERS).",
+    ),
+]
 
 
+@app.command(epilog="Example:  cembench status results/run")
 def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = False) -> None:
     """Show a run's progress, the cells that did not end ok, and files that were changed.
 
@@ -70,10 +77,7 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
         print_json(about)
     else:
         _show_status(about, others, [(cell, states[cell.label]) for cell in asked])
-    if verified.disagreements:
-        for finding in verified.disagreements:
-            complain(str(finding))
-        raise typer.Exit(1)
+    fail(map(str, verified.disagreements))
 
 
 def _show_status(
@@ -139,6 +143,7 @@ _MEASURING = {
 }
 
 
+@app.command(epilog="Examples:  cembench show face/cem  ·  cembench show 3fa9 --run results/mine")
 def show(
     cell: Annotated[str, typer.Argument(help="The start of a cell's key, or MESH/ALGORITHM.")],
     *,
@@ -159,11 +164,7 @@ def show(
         print_json([row(record) for record in found])
     else:
         _show_records(found)
-    wrong = [finding for finding in findings if finding.disagrees]
-    for finding in wrong:
-        complain(str(finding))
-    if wrong:
-        raise typer.Exit(1)
+    fail(str(finding) for finding in findings if finding.disagrees)
 
 
 def _show_records(found: list[Record]) -> None:
@@ -181,6 +182,7 @@ def _show_records(found: list[Record]) -> None:
                 out.print(words, soft_wrap=True)
 
 
+@app.command(epilog="Example:  cembench compare results/before results/after")
 def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = False) -> None:
     """Show which cells became faster or slower from one run to another.
 
@@ -235,6 +237,7 @@ def compare(before: Run, after: Run, *, verify: Verify = False, as_json: Json = 
             warn(difference)
 
 
+@app.command(epilog="Example:  cembench merge results/a results/b -o results/both")
 def merge(
     runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
     *,
@@ -304,6 +307,7 @@ def _show_conflicts(conflicts: Sequence[Conflict], output: Path) -> None:
         out.print(f"  and {len(conflicts) - NAMED} more: --json names all")
 
 
+@app.command(epilog="Example:  cembench export results/run --format parquet")
 def export(
     run: Run = DEFAULT_RUN,
     *,
@@ -364,11 +368,60 @@ def _chosen(records: list[Record], wanted: str) -> list[Record]:
     return found
 
 
-#: Each command with the examples in its help.
-VERBS = (
-    (status, "Example:  cembench status results/run"),
-    (show, "Examples:  cembench show face/cem  ·  cembench show 3fa9 --run results/mine"),
-    (compare, "Example:  cembench compare results/before results/after"),
-    (merge, "Example:  cembench merge results/a results/b -o results/both"),
-    (export, "Example:  cembench export results/run --format parquet"),
-)
+@app.command(epilog="Example:  cembench publish results/may results/june -o site")
+def publish(
+    runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where the site goes.")],
+    require_signed: RequireSigned = None,
+    as_json: Json = False,
+) -> None:
+    """Write a static site of several runs: index, machines, ratios over time, reports.
+
+    It needs no network and no server: open index.html, or put the folder on a web server.
+    """
+    from dataclasses import asdict
+
+    from cembench.report.site import publish as write_site
+    from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records
+
+    refuse_inputs(output, runs, force=False)
+    check_signed(runs, require_signed)
+    for run in runs:
+        sound_records(Store(run), Depth.sample)
+
+    def progress(words: str, done: int, total: int) -> None:
+        err.print(f"[{done}/{total}] {words}", markup=False, style="dim")
+
+    found = write_site(runs, output, progress)
+    if as_json:
+        print_json({"output": str(output), "runs": [asdict(one) for one in found]})
+    else:
+        out.print(f"{len(found)} runs in {output / 'index.html'}", soft_wrap=True)
+
+
+@app.command(epilog="Example:  cembench sign results/may --key ~/.ssh/id_ed25519")
+def sign(
+    run: Annotated[Path, typer.Argument(help="The run's folder.")],
+    *,
+    key: Annotated[Path, typer.Option("--key", help="Your SSH key.")],
+) -> None:
+    """Sign a run with your SSH key, so that others know who measured it.
+
+    The signature is in RUN/signature, over all its files; sign again after the
+    run has changed. `merge` and `publish` check it with --require-signed.
+    """
+    from cembench.results.signing import sign as signed
+
+    out.print(f"signed: {signed(run, key.expanduser())}", soft_wrap=True)
+
+
+def check_signed(runs: Iterable[Path], signers: Path | None) -> None:
+    """Raise if a run is not signed as ``--require-signed`` asks; print who signed each."""
+    from cembench.results.signing import signer
+
+    if signers is not None:
+        for run in runs:
+            told = f"{run}: signed by {signer(run, signers)}"
+            err.print(told, markup=False, style="dim", soft_wrap=True)

@@ -8,14 +8,19 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cembench.api.theory import theory as examine
+from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, out, print_json
 from cembench.commands.from_api import Call, from_api
-from cembench.commands.run import DEFAULT_RUN
+from cembench.commands.options import DEFAULT_RUN, AddTo
 
 if TYPE_CHECKING:
     from cembench.api.theory_facts import TheoryFacts
 
 
+@app.command(
+    epilog="Examples:  cembench theory face.obj  ·  "
+    "cembench theory spherical-cap --faces 5000 --run results/mine --json"
+)
 @from_api(examine, without=("surface", "reporter"))
 def theory(
     call: Call,
@@ -24,9 +29,7 @@ def theory(
         typer.Argument(metavar="MESH...", help="Mesh file, or a name from `list surfaces`."),
     ],
     *,
-    run: Annotated[
-        Path, typer.Option("--run", "-o", "--output", help="Add the exhibits to this run.")
-    ] = DEFAULT_RUN,
+    run: AddTo = DEFAULT_RUN,
     as_json: Json = False,
 ) -> None:
     """Print what was tested; exit with 1 if a statement fails although all premises hold."""
@@ -58,13 +61,3 @@ def _show(found: TheoryFacts, run: Path) -> None:
     out.print(tables_shown(exhibit))
     out.print(exhibit.text, markup=False)
     out.print(f"picture  {place_of(run, exhibit.name, PICTURE)}", soft_wrap=True, markup=False)
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        theory,
-        "Examples:  cembench theory face.obj  ·  "
-        "cembench theory spherical-cap --faces 5000 --run results/mine --json",
-    ),
-)

@@ -9,6 +9,7 @@ import typer
 
 from cembench.api.validate import validate as validate_solver
 from cembench.api.validate import written_files
+from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
@@ -18,10 +19,14 @@ if TYPE_CHECKING:
     from cembench.validation.verdict import Validation
 
 
+@app.command(
+    epilog="Examples:  cembench validate mine.py  ·  "
+    "cembench validate mine.py:fast --against cem,fdm --profile quick -o results/mine  ·  "
+    "cembench validate mine.py --require not-slower"
+)
 @from_api(
     validate_solver,
     without=("reporter",),
-    out="-o --output",
     require="--require WHAT",
 )
 def validate(
@@ -49,7 +54,7 @@ def validate(
             "with --command COMMAND."
         )
     found = call(plugin or declared[0], surfaces=[*mesh, *split(surfaces)], reporter=SHOWN)
-    folder = call.keywords["out"]
+    folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
     if as_json:
         print_json(_as_json(found, written))
@@ -69,13 +74,3 @@ def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:
 
     said = {"valid": found.valid, "passed": found.passed, "verdict": sentence(found)}
     return said | found.model_dump(mode="json") | written
-
-
-#: Each command with the examples in its help.
-VERBS = (
-    (
-        validate,
-        "Examples:  cembench validate mine.py  ·  cembench validate mine.py:fast --against cem,fdm "
-        "--profile quick -o results/mine  ·  cembench validate mine.py --require not-slower",
-    ),
-)

@@ -122,7 +122,11 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def call(*args: P.args, **options: P.kwargs) -> R:
         arguments = arguments_of(function)
-        for name, value in signature.bind(*args, **options).arguments.items():
+        try:
+            bound = signature.bind(*args, **options)
+        except TypeError:
+            return function(*args, **options)  # raises, and names the function
+        for name, value in bound.arguments.items():
             arguments[name].check(value)
         return function(*args, **options)
 

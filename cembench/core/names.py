@@ -35,9 +35,14 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     >>> did_you_mean("fat-disk", ["flat-disk", "cone"]), did_you_mean("x", ["cone"])
     (' Did you mean flat-disk?', '')
+    >>> did_you_mean("CEM", ["cem", "fdm"]), did_you_mean("tutte", ["cem", "harmonic-tutte"])
+    (' Did you mean cem?', ' Did you mean harmonic-tutte?')
     """
-    names = list(dict.fromkeys(known))
-    near = get_close_matches(name, names) or [one for one in names if one.startswith(name)]
+    names, low = list(dict.fromkeys(known)), name.lower()
+    close = get_close_matches(low, [one.lower() for one in names])
+    near = [one for text in close for one in names if one.lower() == text]
+    near = near or [one for one in names if one.lower().startswith(low)]
+    near = near or [one for one in names if low in one.lower()]
     return f" Did you mean {' or '.join(near)}?" if name and near else ""
 
 

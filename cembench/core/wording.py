@@ -20,30 +20,53 @@ class Setting:
         return f"{self.name}={self.value}" if self.value else f"`{self.name}`"
 
     def in_shell(self, options: Mapping[str, str]) -> str:
-        """Return it as an option; `options` names those that do not follow from the argument."""
+        """Return it as an option; `options` names those that do not follow from the argument.
+
+        A name without a dash is that of a word at its place, not of an option.
+        """
         option = options.get(self.name, f"--{self.name.replace('_', '-')}")
         value = self.value.strip("'\"")
+        if not option.startswith("-"):
+            return value or option
         return option if value in ("", "True") else f"{option} {value}".strip()
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to do, in a message: a call in Python, a command or option in the shell."""
+
+    python: str
+    shell: str
+
+    def in_python(self) -> str:
+        """Return it for a reader in Python."""
+        return self.python
+
+    def in_shell(self, options: Mapping[str, str]) -> str:
+        """Return it for a reader in the shell."""
+        return self.shell
 
 
 class _Sentence(Formatter):
     """Formats a message; a field without a value is a :class:`Setting`, its format the value."""
 
-    def __init__(self, word: Callable[[Setting], str]) -> None:
+    def __init__(self, word: Callable[[Setting | Advice], str]) -> None:
         self.word = word
 
     def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
         return kwargs.get(str(key), Setting(str(key)))
 
     def format_field(self, value: Any, format_spec: str) -> str:
-        if not isinstance(value, Setting):
+        if not isinstance(value, Setting | Advice):
             return str(super().format_field(value, format_spec))
-        return self.word(Setting(value.name, format_spec) if format_spec else value)
+        if format_spec and isinstance(value, Setting):
+            value = Setting(value.name, format_spec)
+        return self.word(value)
 
 
 def in_python(template: str, values: Mapping[str, object]) -> str:
     """Return a message with its arguments as in a call."""
-    return _Sentence(Setting.in_python).vformat(template, (), values)
+    return _Sentence(lambda one: one.in_python()).vformat(template, (), values)
 
 
 def in_shell(template: str, values: Mapping[str, object], options: Mapping[str, str]) -> str:

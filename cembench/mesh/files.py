@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,7 +28,7 @@ from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
 from cembench.mesh.formats.apart import apart
 from cembench.mesh.repair import Repaired, repair
 from cembench.mesh.soup import Soup, Texture
-from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 M = TypeVar("M", bound=TriangleMesh)
 
@@ -166,21 +166,22 @@ def _check_file(path: Path) -> None:
 
 def read_mesh(
     path: str | os.PathLike[str],
-    mesh_type: type[M] = DiskMesh,  # type: ignore[assignment]
+    mesh_type: type[M] | None = None,
     *,
     arrays: tuple[str, str] | None = None,
     polygons: tuple[int, int] | None = None,
 ) -> M:
-    """Read a file as a checked surface of one class, named after the file's stem.
+    """Read a file as a checked surface, named after the file's stem.
 
-    :func:`cembench.load_surface` takes disks and surfaces with holes alike.
+    :func:`cembench.load_surface` also takes names and arrays, repairs and cuts.
 
     Parameters
     ----------
     path : path
         OBJ, OFF, PLY, STL, MAT or NPZ; with the extra "formats" also VTK, VTU, GLB, GLTF and GII.
-    mesh_type : type
-        The required class: `DiskMesh`, `HoledMesh`, or `TriangleMesh` for any surface.
+    mesh_type : type, optional
+        The required class: `DiskMesh`, `HoledMesh`, or `TriangleMesh` for any surface; default: a
+        disk, or a surface with holes.
     arrays : tuple of two str, optional
         For MAT and NPZ files: the names of the vertices and of the triangles (default: found
         automatically).
@@ -191,7 +192,7 @@ def read_mesh(
     Returns
     -------
     DiskMesh, HoledMesh or TriangleMesh
-        The surface, of the class `mesh_type`.
+        The surface.
 
     Raises
     ------
@@ -207,7 +208,28 @@ def read_mesh(
     ('disk', 600)
 
     """
-    return checked(read_soup(path, arrays=arrays, polygons=polygons), mesh_type, Path(path))
+    soup = read_soup(path, arrays=arrays, polygons=polygons)
+    kinds: Any = (DiskMesh, HoledMesh) if mesh_type is None else (mesh_type,)
+    found: M = most_special(soup, kinds, Path(path))
+    return found
+
+
+def most_special(soup: Soup, kinds: Sequence[type[M]], path: Path | None = None) -> M:
+    """Check polygons as the most special of these classes that fits.
+
+    Raises
+    ------
+    MeshError
+        None fits; the message says why it is not of the first.
+
+    """
+    refused: dict[type[M], MeshError] = {}
+    for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
+        try:
+            return checked(soup, kind, path)
+        except MeshError as error:
+            refused[kind] = error
+    raise refused[kinds[0]]
 
 
 def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]:

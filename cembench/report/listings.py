@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from cembench.mesh.datasets import Dataset
 from cembench.registry import Algorithm, Surface
 from cembench.report.document import Column, Plain, Section, Table, Text
 
@@ -38,13 +38,14 @@ def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> Table:
     return Table.of("surfaces", "", columns, rows)
 
 
-def datasets_table(datasets: Sequence[tuple[Dataset, bool]]) -> Table:
-    """Return the datasets, with those already fetched marked."""
+def datasets_table(datasets: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the rows of :func:`cembench.fetch`, with those already fetched marked."""
     rows: list[list[Plain]] = []
-    for d, fetched in datasets:
-        faces = "-" if d.faces is None else d.faces
-        size = "-" if d.size is None else bytes_text(d.size)
-        rows.append([d.name, d.group or "-", faces, size, d.licence, "yes" if fetched else "no"])
+    for d in datasets:
+        faces = "-" if d["faces"] is None else d["faces"]
+        size = "-" if d["size"] is None else bytes_text(d["size"])
+        here = "yes" if d["fetched"] else "no"
+        rows.append([d["name"], d["group"] or "-", faces, size, d["licence"], here])
     columns = [*_columns("dataset", "group"), Column("faces"), Column("size")]
     columns += _columns("licence", "here")
     return Table.of("datasets", "", columns, rows)

@@ -10,6 +10,7 @@ from typing import Any
 
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
+from cembench.core.names import did_you_mean
 from cembench.core.wording import Setting
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.files import (
@@ -142,7 +143,11 @@ def distribute_parameters(
             known = "; ".join(
                 f"{a.name}: {', '.join(p.name for p in a.parameters) or 'none'}" for a in algorithms
             )
-            raise ParameterError(f"no chosen algorithm has a parameter {key!r}; known: {known}.")
+            names = [p.name for a in algorithms for p in a.parameters]
+            raise ParameterError(
+                f"no chosen algorithm has a parameter {key!r}; known: {known}."
+                + did_you_mean(name, names)
+            )
         for a in takers:
             chosen[a.name][name] = value
     return {a.name: a.arguments(chosen[a.name]) for a in algorithms}

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 
 from cembench.core.errors import MeshError
 from cembench.core.names import did_you_mean
+from cembench.core.wording import Advice
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.datasets import is_fetched, surface_file
 from cembench.mesh.defects import as_arrays, located
-from cembench.mesh.files import checked, mesh_names, read_soup, repaired_soup
+from cembench.mesh.files import checked, mesh_names, most_special, read_soup, repaired_soup
 from cembench.mesh.formats.vtk import soup_of_cells
 from cembench.mesh.repair import Repaired
 from cembench.mesh.soup import Soup, damaged
@@ -27,8 +28,12 @@ M = TypeVar("M", bound=TriangleMesh)
 
 #: A checked mesh; the path of a mesh file; the name of a generated surface, or of a public one that
 #: was fetched; arrays (V, F); an object with `vertices` and `faces` (trimesh), with `points` and
-#: `faces` (PyVista), or with `points` and `cells` (meshio).
+#: `faces` (PyVista), with `points` and `cells` (meshio), or a mesh of pymeshlab.
 SurfaceInput: TypeAlias = TriangleMesh | str | os.PathLike[str] | tuple[ArrayLike, ArrayLike] | Any
+
+#: Methods of other libraries that return a mesh: of trimesh's scenes, PyVista's grids, pymeshlab's
+#: sets.
+_MESH_FROM = ("to_mesh", "extract_surface", "current_mesh")
 
 #: The kinds of surface that algorithms take, the most special first.
 KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh)
@@ -64,7 +69,7 @@ def load_surface(
     surface : path, name, pair of arrays (V, F), or mesh
         A mesh file, if there is one of this name; the name of a generated surface, or of a public
         one that was fetched; arrays V (n, 3) and F (m, 3) that counts from 0; a mesh of cembench,
-        trimesh, PyVista or meshio, or any object with `vertices` and `faces`.
+        trimesh, PyVista, meshio or pymeshlab, or any object with `vertices` and `faces`.
     kinds : sequence of mesh classes
         Allowed classes; the surface is of the most special one that fits.
     faces : int, optional
@@ -103,7 +108,7 @@ def load_surface(
     if isinstance(surface, str | os.PathLike):
         registry = registry or load_registry()
         name = os.fspath(surface)
-        path = None if is_generated(name, registry) else _file_named(name, registry)
+        path = None if is_generated(name, registry) else file_named(Path(name), registry)
         surface = read_soup(path) if path else generate_surface(registry, name, faces)
     if isinstance(surface, allowed) and not repair and not cut:
         return surface
@@ -150,13 +155,7 @@ def prepared(
         except MeshError as error:
             raise located(error, path) from None
         return SurfaceFile(file, opened.mesh, repaired, uncut, opened)
-    refused: dict[type[TriangleMesh], MeshError] = {}
-    for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
-        try:
-            return SurfaceFile(file, checked(soup, kind, path), repaired)
-        except MeshError as error:
-            refused[kind] = error
-    raise refused[kinds[0]]
+    return SurfaceFile(file, most_special(soup, kinds, path), repaired)
 
 
 def soup_of(surface: Any) -> Soup:
@@ -178,13 +177,27 @@ def soup_of(surface: Any) -> Soup:
         return Soup.of_triangles(*as_arrays(points, faces))
     if points is not None and isinstance(getattr(surface, "cells", None), list):
         return soup_of_cells(points, surface.cells)
+    if hasattr(surface, "vertex_matrix") and hasattr(surface, "face_matrix"):
+        return Soup.of_triangles(*as_arrays(surface.vertex_matrix(), surface.face_matrix()))
     if isinstance(surface, tuple | list) and len(surface) == 2:
         return Soup.of_triangles(*as_arrays(*surface))
-    size = f" of {len(surface)} items" if isinstance(surface, tuple | list) else ""
     raise MeshError(
         "a surface is a mesh, a path, the name of a registered surface, a pair of arrays (V, F), "
-        f"or an object with vertices and faces; got {type(surface).__name__}{size}."
+        f"or an object with vertices and faces; got {_described(surface)}"
     )
+
+
+def _described(surface: Any) -> str:
+    """Return what was given instead of a surface, and how to make one of it if that is known."""
+    name = type(surface).__name__
+    if isinstance(surface, tuple | list):
+        few = " igl.readOBJ returns F as the fourth: write (found[0], found[3])."
+        return f"{name} of {len(surface)} items.{few * (len(surface) == 6)}"
+    for method in _MESH_FROM:
+        if hasattr(surface, method):
+            return f"{name}, which holds one: write {method}() of it."
+    arrays = " without its faces: write (V, F)." if isinstance(surface, np.ndarray) else "."
+    return f"{name}{arrays}"
 
 
 def _unpadded(faces: Any) -> tuple[Any, Any]:
@@ -216,8 +229,8 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
     return mesh
 
 
-def _file_named(name: str, registry: Registry) -> Path:
-    """Return the file that a name refers to: a path, or a public surface that was fetched.
+def file_named(path: Path, registry: Registry) -> Path:
+    """Return the file that a path or name refers to: itself, or a public surface that was fetched.
 
     Raises
     ------
@@ -225,9 +238,9 @@ def _file_named(name: str, registry: Registry) -> Path:
         It is neither, or the public surface is not here yet.
 
     """
-    path = Path(name)
-    if path.suffix or path.exists():
+    if path.suffix or path.exists() or len(path.parts) > 1:
         return path
+    name = str(path)
     dataset = registry.datasets.get(name)
     if dataset is None:
         raise MeshError(
@@ -236,5 +249,9 @@ def _file_named(name: str, registry: Registry) -> Path:
             + did_you_mean(name, [*registry.surfaces, *registry.datasets, *mesh_names(Path())])
         )
     if not is_fetched(dataset):
-        raise MeshError(f"the public surface {name!r} is not here yet: cembench fetch {name}.")
+        raise MeshError.about(
+            "the public surface {name!r} is not here yet: {fetch} fetches it.",
+            name=name,
+            fetch=Advice(f"`cembench.fetch({name!r})`", f"`cembench fetch {name}`"),
+        )
     return surface_file(dataset)

@@ -10,6 +10,7 @@ from time import monotonic
 from typing import Any
 
 from cembench.core.errors import ParameterError
+from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, Record
@@ -267,8 +268,12 @@ def baselines(
                 for a in registry.algorithms.values()
                 if issubclass(kind, a.mesh_type) and a.name != algorithm.name
             )
-            raise ParameterError(
-                f"--against {name}: {algorithm.name} cannot be compared with it; algorithms that "
-                f"take a {kind.__name__}: {fits or 'none'}."
+            raise ParameterError.about(
+                "{given}: {solver} cannot be compared with it; algorithms that take a {kind}: "
+                "{fits}.",
+                given=Setting("against", repr(name)),
+                solver=algorithm.name,
+                kind=kind.__name__,
+                fits=fits or "none",
             )
     return tuple(dict.fromkeys(asked))

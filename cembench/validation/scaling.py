@@ -19,6 +19,7 @@ from typing import Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict
 
 from cembench.core.errors import ParameterError
+from cembench.core.wording import Setting
 from cembench.results.intervals import ERROR, Interval
 from cembench.results.records import Record, Round, lower_median
 from cembench.results.sequential_checks import LOOKS, next_look, share
@@ -104,9 +105,11 @@ def sizes(up_to: int) -> tuple[int, ...]:
 
     """
     if up_to < LEAST_UP_TO:
-        raise ParameterError(
-            f"--up-to {up_to} is too few to fit an exponent; allowed are {LEAST_UP_TO:,} triangles "
-            "and more, or 0 to leave that stage out."
+        raise ParameterError.about(
+            "{given} is too few to fit an exponent; allowed are {least:,} triangles and more, or 0 "
+            "to leave that stage out.",
+            given=Setting("up_to", str(up_to)),
+            least=LEAST_UP_TO,
         )
     return up_to // 9, up_to // 3, up_to
 

@@ -26,13 +26,13 @@ meshes = sorted(folder.glob("*.obj"))
 # One round is enough to see how it goes. For figures with a 95 % interval leave ``rounds`` out:
 # then cells are measured until they are known to 5 %.
 
-run = cembench.benchmark(meshes, ["cem", "lscm"], rounds=1, out=folder / "run")
+run = cembench.benchmark(meshes, ["cem", "lscm"], rounds=1, output=folder / "run")
 run.table()[["mesh", "algorithm", "status", "angle_error_mean_deg", "flipped_triangles"]]
 
 # %%
 # The second call measures nothing: everything is there.
 
-again = cembench.benchmark(meshes, ["cem", "lscm"], rounds=1, out=folder / "run")
+again = cembench.benchmark(meshes, ["cem", "lscm"], rounds=1, output=folder / "run")
 print(len(again.records()), "records in", again.folder.name)
 
 # %%

@@ -25,7 +25,7 @@ if __name__ == "__main__":
         [cembench.surface(name, 600) for name in names],
         ["cem", "lscm"],
         rounds=1,
-        out=Path(scratch.name) / "run",
+        output=Path(scratch.name) / "run",
         cluster="local:2",
     )
     table = run.table()

@@ -125,7 +125,7 @@ def test_the_bare_constructor_checks_too(what):
 
 def test_benchmark_gives_tables(disk, tmp_path):
     run = cembench.benchmark(
-        [disk, (disk.V * 2, disk.F)], ["harmonic-circle", "lscm"], rounds=1, out=tmp_path / "run"
+        [disk, (disk.V * 2, disk.F)], ["harmonic-circle", "lscm"], rounds=1, output=tmp_path / "run"
     )
     table = run.table("harmonic-circle")
     assert isinstance(table, pd.DataFrame)
@@ -133,7 +133,7 @@ def test_benchmark_gives_tables(disk, tmp_path):
     assert set(table["status"]) == {"ok"}
     assert len(run.speedups("harmonic-circle")) == 2
     assert "<table" in run._repr_html_()
-    again = cembench.benchmark([disk], ["lscm"], rounds=1, out=tmp_path / "run")
+    again = cembench.benchmark([disk], ["lscm"], rounds=1, output=tmp_path / "run")
     assert len(again.records()) == 4
     with pytest.raises(cembench.ParameterError, match="no surface"):
         cembench.benchmark([])

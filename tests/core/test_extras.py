@@ -76,7 +76,7 @@ def a_report(folder):
 
 
 def a_validation(folder):
-    cembench.validate("lscm", out=folder)
+    cembench.validate("lscm", output=folder)
 
 
 def parquet(folder):

@@ -18,8 +18,9 @@ from requests.adapters import HTTPAdapter
 from rich.console import Console
 from scipy.io import savemat
 
+import cembench
 from cembench import registry
-from cembench.commands import fetch as fetch_verbs
+from cembench.commands import console
 from cembench.core.errors import DatasetError, RecordError, RegistryError
 from cembench.mesh.datasets import Dataset, fetch, is_fetched
 from cembench.mesh.files import read_mesh, write_mesh
@@ -241,8 +242,8 @@ def test_fetch_says_where_the_file_is(cli, known, tiny):
 
 def test_a_bar_shows_on_a_terminal(known, tiny, monkeypatch):
     terminal = Console(force_terminal=True, width=80, file=io.StringIO())
-    monkeypatch.setattr(fetch_verbs, "err", terminal)
-    fetch_verbs.fetched(tiny)
+    monkeypatch.setattr(console, "err", terminal)
+    cembench.fetch("tiny", reporter=console.SHOWN)
     assert is_fetched(tiny)
     shown = terminal.file.getvalue()
     assert "fetching tiny" in shown

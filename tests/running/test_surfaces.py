@@ -27,6 +27,10 @@ def meshio_mesh(mesh):
     return meshio.Mesh(mesh.V, [("triangle", mesh.F)])
 
 
+def pymeshlab_mesh(mesh):
+    return pytest.importorskip("pymeshlab").Mesh(mesh.V, mesh.F)
+
+
 def trimesh_mesh(mesh):
     trimesh = pytest.importorskip("trimesh")
     return trimesh.Trimesh(mesh.V, mesh.F, process=False)
@@ -41,6 +45,7 @@ def trimesh_mesh(mesh):
         lambda mesh: (np.asfortranarray(mesh.V), mesh.F.astype(np.int32)),  # as igl returns them
         pyvista_data,
         meshio_mesh,
+        pymeshlab_mesh,
         trimesh_mesh,
     ],
 )
@@ -85,6 +90,14 @@ def test_holes_are_allowed_or_not():
         assert [problem.defect for problem in refused.value.problems] == [Defect.holes]
 
 
+def test_a_file_with_holes_is_read_unless_a_disk_is_required(tmp_path):
+    ring = load_surface(gallery.tube())
+    cembench.write_mesh(tmp_path / "ring.obj", ring)
+    assert isinstance(cembench.read_mesh(tmp_path / "ring.obj"), HoledMesh)
+    with pytest.raises(MeshError, match="boundary loops"):
+        cembench.read_mesh(tmp_path / "ring.obj", DiskMesh)
+
+
 def test_a_surface_is_repaired_and_cut():
     torus = gallery.torus()
     cut = load_surface(torus, cut=True)
@@ -109,6 +122,9 @@ V, F = DISK.V, DISK.F
         ((V, F, V), r"a surface is a mesh, .*; got tuple of 3 items"),
         (7, r"an object with vertices and faces; got int"),
         (SimpleNamespace(vertices=V, faces=F + 1), "count from 1"),
+        ((V, [], [], F, [], []), r"tuple of 6 items\..*\(found\[0\], found\[3\]\)"),
+        (SimpleNamespace(extract_surface=None), r"write extract_surface\(\) of it"),
+        (V, r"ndarray without its faces: write \(V, F\)"),
     ],
 )
 def test_what_is_not_a_surface_gets_a_sentence_with_a_remedy(surface, message):
@@ -119,5 +135,7 @@ def test_what_is_not_a_surface_gets_a_sentence_with_a_remedy(surface, message):
 def test_a_public_surface_that_is_not_here_says_how_to_fetch_it(monkeypatch, tmp_path):
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
     name = next(iter(load_registry().datasets))
-    with pytest.raises(MeshError, match=f"cembench fetch {name}"):
+    with pytest.raises(MeshError, match=f"cembench.fetch..{name}") as refused:
         load_surface(name)
+    refused.value.reword({})
+    assert f"`cembench fetch {name}`" in str(refused.value)

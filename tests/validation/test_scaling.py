@@ -167,7 +167,7 @@ def test_a_solver_that_could_not_be_timed_has_no_growth():
 
 
 def test_too_few_triangles_are_refused():
-    with pytest.raises(ParameterError, match="--up-to 100 is too few"):
+    with pytest.raises(ParameterError, match="up_to=100 is too few"):
         sizes(100)
 
 

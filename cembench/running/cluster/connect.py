@@ -1,4 +1,4 @@
-"""Connect to the cluster that ``--cluster`` names: local workers, a scheduler, or Slurm.
+"""Connect to the cluster that `cluster` names: local workers, a scheduler, or Slurm.
 
 Anybody who can connect to a scheduler or worker of dask can run code as the user who started it. So
 everything that is started here uses TLS with certificates made for the one run, and its web pages
@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from cembench.core.errors import ClusterError, ParameterError
 from cembench.core.extras import Extra, require
+from cembench.core.wording import Setting
 from cembench.running.cluster.host import place
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ _ADDRESS = re.compile(r"(tcp|tls)://\S+:\d+")
 
 @dataclass(frozen=True)
 class ClusterPlace:
-    """A cluster, as named by ``--cluster``."""
+    """A cluster, as `cluster` names it."""
 
     #: "local", "address" or "slurm".
     kind: str
@@ -71,7 +72,7 @@ class ClusterPlace:
 
 
 def parse_cluster(text: str) -> ClusterPlace:
-    """Parse the value of ``--cluster``.
+    """Parse the value of `cluster`.
 
     Raises
     ------
@@ -93,11 +94,16 @@ def parse_cluster(text: str) -> ClusterPlace:
     kind, colon, rest = text.partition(":")
     if kind == "slurm" and colon:
         return ClusterPlace("slurm", settings=_settings(rest))
-    raise ParameterError(
-        f"--cluster {text!r} is not allowed; write local:4 (workers on this machine), "
-        "tls://HOST:8786 or tcp://HOST:8786 (a running scheduler), or "
-        "slurm:partition=cpu,cores=16,machines=10."
+    raise _wrong(
+        text,
+        "write local:4 (workers on this machine), tls://HOST:8786 or tcp://HOST:8786 (a running "
+        "scheduler), or slurm:partition=cpu,cores=16,machines=10.",
     )
+
+
+def _wrong(text: str, allowed: str) -> ParameterError:
+    given = Setting("cluster", repr(text))
+    return ParameterError.about("{given} is not allowed; {allowed}", given=given, allowed=allowed)
 
 
 def _settings(text: str) -> dict[str, str]:
@@ -105,22 +111,17 @@ def _settings(text: str) -> dict[str, str]:
     for part in text.split(","):
         name, equals, value = part.partition("=")
         if not equals or name not in SLURM or not value:
-            raise ParameterError(f"--cluster slurm: {part!r} is not allowed; {_allowed()}")
+            raise _wrong(f"slurm:{text}", f"{part!r} is unknown: {_allowed()}")
         settings[name] = value
     missing = [name for name, (usual, _) in SLURM.items() if usual is None and name not in settings]
     if missing:
-        raise ParameterError(f"--cluster slurm: {missing[0]} is missing; {_allowed()}")
+        raise _wrong(f"slurm:{text}", f"{missing[0]} is missing: {_allowed()}")
     settings = {name: settings.get(name, usual or "") for name, (usual, _) in SLURM.items()}
     for name in ("cores", "machines"):
         if not re.fullmatch(r"[1-9]\d{0,4}", settings[name]):
-            raise ParameterError(
-                f"--cluster slurm: {name}={settings[name]} is not a positive whole number; "
-                f"{_allowed()}"
-            )
+            raise _wrong(f"slurm:{text}", f"{name} is a positive whole number: {_allowed()}")
     if settings["exclusive"] not in ("yes", "no"):
-        raise ParameterError(
-            f"--cluster slurm: exclusive={settings['exclusive']} is not allowed; {_allowed()}"
-        )
+        raise _wrong(f"slurm:{text}", f"exclusive is yes or no: {_allowed()}")
     return settings
 
 

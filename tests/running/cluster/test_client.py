@@ -171,7 +171,7 @@ def test_a_run_whose_own_workers_are_all_gone_ends_and_says_so(tmp_path, monkeyp
 
 
 def test_the_python_function_takes_a_client(client, tmp_path):
-    run = benchmark(["flat-disk"], ["harmonic-circle"], rounds=1, out=tmp_path, cluster=client)
+    run = benchmark(["flat-disk"], ["harmonic-circle"], rounds=1, output=tmp_path, cluster=client)
     (record,) = run.records()
     assert record.outcome.status == "ok"
     assert read_state(tmp_path).done == 1
