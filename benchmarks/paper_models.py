@@ -23,7 +23,7 @@ from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.results.papers import find_paper
-from cembench.running.plan import paper_role_of
+from cembench.running.plan import provenance_of
 
 CEM_PAPER = find_paper("cem")
 #: The model whose maps fold by every method.
@@ -68,7 +68,7 @@ def models(folder: Path) -> dict[str, DiskMesh]:
             mesh = read_mesh(path)
         except MeshError:
             continue  # not a disk, and every model is one
-        if row := paper_role_of(registry, mesh).paper_row:
+        if row := provenance_of(registry, mesh).paper_row:
             meshes[row] = mesh
     rows = {dataset.paper_row for dataset in registry.datasets.values() if dataset.paper_row}
     if missing := rows - meshes.keys():

@@ -8,14 +8,14 @@ from collections import Counter
 from pathlib import Path
 
 from benchmarks.pages import ROOT, Section, Table
-from cembench.results.multiple_testing import arithmetic, geometric, rate_interval
+from cembench.results.families import rate_interval
 
 #: A policy of solving, the table of its averages, and the kept report that README quotes.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
 REPORTS = {"reuse": ROOT / "reports/standard", "backslash": ROOT / "reports/paper"}
 #: The readings that are shown, by the beginning of their rows.
 MEAN, GEOMETRIC = "mean rate (as the paper)", "geometric mean of ratios - 1"
-AVERAGES = {MEAN: arithmetic, GEOMETRIC: geometric}
+AVERAGES = (MEAN, GEOMETRIC)
 
 
 def averages(file: Path) -> dict[str, dict[str, str]]:
@@ -55,15 +55,15 @@ def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
     """Return the interval of an average in words; nothing where cells have too few rounds."""
     if not records.exists():
         return ""
-    rate = rate_interval(ratios(records, algorithm, policy), AVERAGES[reading])
+    rate = rate_interval(ratios(records, algorithm, policy), log=reading == GEOMETRIC)
     return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
 
 
 def readme_speedups(*, report: Path | None = None) -> Section:
     """Tabulate how much faster CEM is, from the tables of kept reports and their records.
 
-    Averages have a 95 % interval over surfaces and rounds (hierarchical bootstrap, as in the
-    report's table of certainty) where most cells have the rounds for one. Without a report each
+    Averages have a 95 % interval over the surfaces (Student's, as in the report's table of
+    certainty) where most cells have the rounds for one. Without a report each
     policy has the one that README quotes.
     """
     folders = {policy: report or kept for policy, kept in REPORTS.items()}

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import csv
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
+from statistics import mean
 
 import matplotlib as mpl
 import numpy as np
-from scipy.stats import binomtest
 
 from benchmarks.measuring import png
 from benchmarks.pages import ROOT, Section
+from cembench.results.families import family_means, share_interval
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -32,15 +33,35 @@ def by_algorithm(records: Path) -> dict[str, list[dict[str, str]]]:
     return dict(values)
 
 
-def over_best(rows: dict[str, list[dict[str, str]]], column: str) -> dict[str, list[float]]:
-    """Return each valid map's figure over the smallest on its surface, by algorithm."""
+def family_of(row: dict[str, str]) -> str:
+    """Return the object that a row's surface shows."""
+    return row.get("family") or row["mesh"]
+
+
+def over_best(
+    rows: dict[str, list[dict[str, str]]], column: str
+) -> dict[str, list[tuple[float, float]]]:
+    """Return each valid map's figure over the smallest on its surface, by algorithm.
+
+    Beside it is its weight: a family's is divided among its surfaces.
+    """
+    families = {r["mesh_hash"]: family_of(r) for some in rows.values() for r in some}
     valid = {name: {r["mesh_hash"]: float(r[column]) for r in some if r["status"] == "ok"}
              for name, some in rows.items()}  # fmt: skip
     best: dict[str, float] = {}
     for figures in valid.values():
         for surface, figure in figures.items():
             best[surface] = min(figure, best.get(surface, np.inf))
-    return {name: [f / best[s] for s, f in figures.items()] for name, figures in valid.items()}
+    counts = {name: Counter(families[s] for s in figures) for name, figures in valid.items()}
+    return {
+        name: [(f / best[s], 1 / counts[name][families[s]]) for s, f in figures.items()]
+        for name, figures in valid.items()
+    }
+
+
+def _percentiles(weighted: list[tuple[float, float]]) -> list[float]:
+    values, weights = zip(*weighted, strict=True)
+    return list(np.percentile(values, SHARES, weights=weights, method="inverted_cdf"))
 
 
 def real_picture(*, report: Path = ROOT / "reports/real") -> Section:
@@ -48,16 +69,18 @@ def real_picture(*, report: Path = ROOT / "reports/real") -> Section:
     rows = by_algorithm(report / "records.csv")
     errors = over_best(rows, "angle_error_mean_deg")
     seconds = over_best(rows, "seconds")
-    names = sorted(rows, key=lambda name: -float(np.median(errors[name])))
+    names = sorted(rows, key=lambda name: -_percentiles(errors[name])[1])
     colours = [TARGETS[rows[name][0]["target"]] for name in names]
     figure, axes = plt.subplots(1, 3, figsize=(9, 4.6), sharey=True, layout="constrained")
     for y, (name, colour) in enumerate(zip(names, colours, strict=True)):
-        ok, n = sum(r["status"] == "ok" for r in rows[name]), len(rows[name])
-        likely = binomtest(ok, n).proportion_ci(method="wilson")
+        shares = family_means(
+            [r["status"] == "ok" for r in rows[name]], list(map(family_of, rows[name]))
+        )
+        likely = share_interval(mean(shares), len(shares))
         axes[0].plot([100 * likely.low, 100 * likely.high], [y, y], color=colour, lw=1.2)
-        axes[0].plot(100 * ok / n, y, "o", color=colour, ms=5)
+        axes[0].plot(100 * mean(shares), y, "o", color=colour, ms=5)
         for axis, figures in ((axes[1], errors), (axes[2], seconds)):
-            least, middle, most = np.percentile(figures[name], SHARES)
+            least, middle, most = _percentiles(figures[name])
             axis.plot([least, most], [y, y], color=colour, lw=1.2)
             axis.plot(middle, y, "o", color=colour, ms=5)
     axes[0].set_yticks(range(len(names)), names, fontsize=8)

@@ -15,7 +15,7 @@ from cembench.registry import Registry, load_registry
 from cembench.report.surface_facts import factor_spans, find_facts, row_check
 from cembench.results.papers import find_paper
 from cembench.results.records import MeshFacts
-from cembench.running.plan import mesh_facts, paper_role_of
+from cembench.running.plan import mesh_facts, provenance_of
 
 PAPER = find_paper("cem")
 COUNTS = """
@@ -58,7 +58,7 @@ def models(registry: Registry, files: Iterable[Path]) -> Iterator[dict[str, Any]
     cem, seen = registry.algorithm("cem"), set[str]()
     for path in files:
         mesh = read_mesh(path)
-        standing = paper_role_of(registry, mesh)
+        standing = provenance_of(registry, mesh)
         if standing.origin != "model":
             raise SystemExit(f"{path} is none of the paper's models; see `cembench fetch`.")
         if standing.paper_row in seen:

@@ -43,6 +43,8 @@ def dataset_of(row: Mapping[str, str]) -> Dataset:
         arrays=(vertices, triangles) if triangles else None,
         polygons=(int(first), int(last)) if last else None,
         note="; ".join(filter(None, (f"terms: {row['terms']}", row["note"]))),
+        source=row["repository"],
+        family=row["family"],
     )
 
 

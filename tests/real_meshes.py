@@ -9,6 +9,11 @@ FOLDER = Path(
     os.environ.get("CEMBENCH_TEST_MESHES", Path(__file__).parents[1] / "../shared/meshes")
 ).resolve()
 
+#: A folder with the meshes of the set "corpus", as its MANIFEST.tsv lists them.
+CORPUS = Path(
+    os.environ.get("CEMBENCH_CORPUS", Path(__file__).parents[1] / "../shared/corpus")
+).resolve()
+
 DISKS = (
     "canonical_face.obj",
     "chinese_lion.obj",

@@ -78,7 +78,7 @@ BUDGETS = {
     "report": 7_900,
     "validation": 2_250,
     "morphing": 1_750,
-    "api": 6_000,
+    "api": 6_100,
     "commands": 2_950,
 }
 

@@ -23,7 +23,7 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.in_this_process import map_here, may_run_here
 from cembench.running.options import Options
-from cembench.running.plan import MeasurementSettings, Task, paper_role_of, plan_cells
+from cembench.running.plan import MeasurementSettings, Task, plan_cells, provenance_of
 from cembench.running.surfaces import (
     SurfaceFile,
     file_named,
@@ -134,7 +134,7 @@ def jobs_of(
     for surface in shells.parts:
         mesh = surface.mesh
         taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
-        role = {mesh.name: paper_role_of(registry, mesh)}
+        role = {mesh.name: provenance_of(registry, mesh)}
         (task,) = plan_cells([taken], [mesh], parameters, settings, plugins, role)
         jobs.append(Job(surface, task))
     return shells, tuple(jobs)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry
     from cembench.report.document import Report
     from cembench.results.records import MeshOrigin
-    from cembench.running.plan import PaperRole
+    from cembench.running.plan import Provenance
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def reproduce(
 
 def _surfaces(
     registry: Registry, algorithms: list[Algorithm], offline: bool, jobs: int, reporter: Reporter
-) -> tuple[list[TriangleMesh], dict[str, PaperRole]]:
+) -> tuple[list[TriangleMesh], dict[str, Provenance]]:
     """Return a surface for each row: the model if it is there, else its stand-in; and the roles."""
     from cembench.api.paper_surfaces import (
         STAND_IN_BYTES,
@@ -151,7 +151,7 @@ def _surfaces(
     from cembench.api.run_plan import read_surfaces
     from cembench.mesh.datasets import is_fetched, surface_file
     from cembench.results.profiles import Profile, surfaces_of
-    from cembench.running.plan import paper_roles
+    from cembench.running.plan import provenances
 
     stand_ins = {registry.surface(s).paper_row: s for s in surfaces_of(Profile.quick, registry)}
     public = public_models(registry, list(stand_ins))
@@ -170,4 +170,4 @@ def _surfaces(
         )
     files = map(surface_file, models.values())
     read, roles = read_surfaces(files, (), registry, algorithms, reporter, faces=None, repair=False)
-    return [*read, *made], roles | paper_roles(registry, list(missing.values()))
+    return [*read, *made], roles | provenances(registry, list(missing.values()))

@@ -23,11 +23,11 @@ from cembench.running.estimate import Estimate, estimate, planned_seconds
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import (
-    PaperRole,
+    Provenance,
     Task,
     mesh_files,
-    paper_role_of,
-    paper_roles,
+    provenance_of,
+    provenances,
 )
 from cembench.running.surfaces import (
     generate_surface,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 #: Surfaces, and their roles in the paper by name.
-Surfaces = tuple[list[TriangleMesh], dict[str, PaperRole]]
+Surfaces = tuple[list[TriangleMesh], dict[str, Provenance]]
 #: Maximum number of surfaces named that cannot be measured.
 NAMED = 5
 
@@ -160,18 +160,18 @@ def read_surfaces(
         return load_file(path, kinds, repair=repair).mesh
 
     meshes: list[TriangleMesh] = []
-    roles: dict[str, PaperRole] = {}
+    roles: dict[str, Provenance] = {}
 
     def add(mesh: TriangleMesh) -> None:
         meshes.append(mesh)
-        roles[mesh.name] = paper_role_of(registry, mesh)
+        roles[mesh.name] = provenance_of(registry, mesh)
 
     for folder in folders:
         _add_folder(folder, read, add, reporter)
     for number, one in enumerate(given, start=1):
         if is_generated(one, registry):
             meshes.append(generate_surface(registry, one, faces))
-            roles |= paper_roles(registry, [one])
+            roles |= provenances(registry, [one])
         elif isinstance(one, str) and one in registry.datasets and not Path(one).exists():
             add(read(local_files([Path(one)], registry, reporter)[0]))
         else:

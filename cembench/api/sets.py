@@ -6,6 +6,7 @@ listed too, with the reason, because success rates need the right denominator.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
@@ -28,14 +29,16 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.exhibits import Exhibit, ExhibitTable
-from cembench.running.plan import PaperRole
+from cembench.running.plan import Provenance, provenance_of, provenance_of_dataset
 
 #: Default number of surfaces from a set without an end.
 USUAL_LIMIT = 100
 #: Name of the exhibit that lists the surfaces of a run's sets.
 EXHIBIT = "surface-set"
-#: Registered name of the face model's surface family.
-FACE = "ict-face"
+#: Registered name of the face model's surface family, and who published the model.
+FACE, FACE_SOURCE = "ict-face", "ICT-VGL/ICT-FaceKit"
+#: Environment variable for a folder with the set "corpus", which is otherwise fetched.
+CORPUS, CORPUS_VARIABLE = "corpus", "CEMBENCH_CORPUS"
 
 ShowProgress = Callable[[Dataset], Progress | None]
 
@@ -73,6 +76,7 @@ SETS: Mapping[str, SurfaceSet] = MappingProxyType(
         "stress": SurfaceSet("surfaces that are hard to map, or damaged", ("stress",)),
         "ict-faces": SurfaceSet("faces of the ICT model, random expressions", part="disk"),
         "ict-faces-holes": SurfaceSet("the same, with eyes and mouth as holes", part="face"),
+        "corpus": SurfaceSet("real surfaces of many repositories, by families", ("corpus",)),
         "thingi10k": SurfaceSet("models for 3D printing, closed ones of genus 0 cut open"),
     }
 )  # fmt: skip
@@ -116,6 +120,8 @@ def surfaces_of_set(
     ['flat']
 
     """
+    if name == CORPUS:
+        name = os.environ.get(CORPUS_VARIABLE) or name
     if name not in SETS:
         return _of_path(name, limit)
     chosen = SETS[name]
@@ -149,7 +155,8 @@ def _of_datasets(datasets: Sequence[Dataset], progress: ShowProgress) -> Iterato
             yield Provided(dataset.name, dataset.source_url, error=why, licence=dataset.licence)
         else:
             load = partial(_read, dataset)
-            yield provided(dataset.name, dataset.source_url, load, dataset.licence)
+            surface = provided(dataset.name, dataset.source_url, load, dataset.licence)
+            yield replace(surface, provenance=provenance_of_dataset(dataset))
 
 
 def _read(dataset: Dataset) -> TriangleMesh:
@@ -162,7 +169,8 @@ def _of_face_model(registry: Registry, part: str, limit: int) -> Iterator[Provid
         given = family.arguments({"seed": seed, "expression": "random", "part": part})
         mesh: TriangleMesh = family.function(**given)
         name = f"{FACE}-{seed}" if part == "disk" else f"ict-{part}-{seed}"
-        yield Provided(name, f"{family.source}; seed {seed}", mesh, licence="MIT")
+        about = Provenance(source=FACE_SOURCE, family=FACE)
+        yield Provided(name, f"{family.source}; seed {seed}", mesh, licence="MIT", provenance=about)
 
 
 @dataclass(frozen=True)
@@ -176,13 +184,13 @@ class Gathered:
     refused : tuple of Provided
         The other surfaces, each with the reason.
     roles : mapping
-        The role in a paper, by surface name, of those that are its models.
+        Where each of them is from, by its name.
 
     """
 
     surfaces: tuple[Provided, ...]
     refused: tuple[Provided, ...]
-    roles: Mapping[str, PaperRole]
+    roles: Mapping[str, Provenance]
 
     @property
     def meshes(self) -> list[TriangleMesh]:
@@ -199,8 +207,6 @@ def gathered(
     """
     names, seen = Names(), set[str]()
     kinds = tuple({a.mesh_type for a in algorithms})
-    rows = {d.mesh_hash: d.paper_row for d in registry.datasets.values() if d.paper_row}
-    named = {d.name: d.paper_row for d in registry.datasets.values() if d.paper_row}
     surfaces, refused, roles = [], [], {}
     for one in given:
         if one.mesh is None:
@@ -213,9 +219,8 @@ def gathered(
             seen.add(one.mesh.hash)
             kept = replace(one, name=names.of(one.name))
             surfaces.append(kept)
-            row = rows.get(one.mesh.hash) or named.get(one.name, "")
-            if row:
-                roles[kept.name] = PaperRole(row, "model")
+            recognised = provenance_of(registry, one.mesh)
+            roles[kept.name] = recognised if recognised.family else one.provenance
     return Gathered(tuple(surfaces), tuple(refused), MappingProxyType(roles))
 
 
@@ -231,9 +236,14 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
     tables = [
         ExhibitTable(
             title="Surfaces of this run",
-            columns=("surface", "vertices", "triangles", "boundaries", "from", "licence"),
+            columns=(
+                *("surface", "family", "vertices", "triangles", "boundaries", "from", "licence"),
+            ),
             rows=tuple(
-                (one.name, one.mesh.n, one.mesh.m, len(one.mesh.loops), one.source, one.licence)
+                (
+                    *(one.name, found.roles[one.name].family or one.name, one.mesh.n, one.mesh.m),
+                    *(len(one.mesh.loops), one.source, one.licence),
+                )
                 for one in found.surfaces
                 if one.mesh is not None
             ),

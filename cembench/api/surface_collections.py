@@ -8,6 +8,7 @@ that success rates have the right denominator.
 from __future__ import annotations
 
 import bz2
+import csv
 import gzip
 import importlib
 import lzma
@@ -15,9 +16,9 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO, cast
@@ -26,8 +27,11 @@ from cembench.core.errors import CembenchError, MeshError, ParameterError
 from cembench.mesh.cut import cut_open
 from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.running.plan import Provenance
 from cembench.running.surfaces import load_surface
 
+#: Name of the table in a folder that says where its surfaces are from.
+MANIFEST = "MANIFEST.tsv"
 #: Maximum size of an archive member, in bytes.
 LARGEST_MEMBER = 2**31
 #: Maximum number of archive members that are examined.
@@ -59,6 +63,8 @@ class Provided:
         The licence stated by the provider; "" for none.
     cut : bool
         Whether it was closed and was cut open.
+    provenance : Provenance
+        What is known of who published it, and of the object that it shows.
 
     """
 
@@ -68,10 +74,13 @@ class Provided:
     error: str = ""
     licence: str = ""
     cut: bool = False
+    provenance: Provenance = field(default_factory=Provenance)
 
 
 def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Provided]:
     """Yield the surfaces of all mesh files in a folder and its subfolders, sorted by path.
+
+    A table :data:`MANIFEST` in the folder says where they are from (:func:`read_manifest`).
 
     Parameters
     ----------
@@ -83,7 +92,7 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
     Raises
     ------
     ParameterError
-        The path is not a folder.
+        The path is not a folder, or its manifest cannot be read.
 
     Examples
     --------
@@ -96,11 +105,57 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
     if not folder.is_dir():
         raise ParameterError(f"{folder} is not a folder; name a folder that holds mesh files.")
     found = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
-    names = Names()
+    names, manifest = Names(), read_manifest(folder)
     for path in _first(found, limit):
-        inside = path.relative_to(folder)
-        name = names.of(inside.with_suffix("").as_posix().replace("/", "-"))
-        yield provided(name, str(path), partial(read_mesh, path, TriangleMesh))
+        inside = path.relative_to(folder).with_suffix("").as_posix()
+        row = manifest.get(inside, {})
+        name = names.of(row.get("name") or inside.replace("/", "-"))
+        one = provided(name, str(path), partial(read_mesh, path, TriangleMesh))
+        about = Provenance(source=row.get("source", ""), family=row.get("family", ""))
+        yield replace(one, licence=row.get("licence", ""), provenance=about)
+
+
+def read_manifest(folder: Path) -> dict[str, dict[str, str]]:
+    """Return the rows of a folder's manifest by the path of their file, without its suffix.
+
+    A manifest is a table separated by tabs. A row's file is the path in its column `file`, or its
+    `name` in the subfolder that its `group` names. What else is used: `source` (who published it),
+    `family` (the object that it shows: surfaces of one family count as one in intervals), and
+    `licence`.
+
+    Returns
+    -------
+    dict
+        The rows; empty if the folder has no manifest, or one without these columns.
+
+    Raises
+    ------
+    ParameterError
+        The manifest cannot be read.
+
+    """
+    place = folder / MANIFEST
+    if not place.is_file():
+        return {}
+    try:
+        rows = list(csv.DictReader(place.read_text("utf-8").splitlines(), delimiter="\t"))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ParameterError(
+            f"{place} cannot be read as a table: {error}. Write it as UTF-8 text with a line a "
+            "surface and tabs between the columns, or move it away."
+        ) from error
+    return {
+        file: {key: value for key, value in row.items() if key and isinstance(value, str)}
+        for row in rows
+        if (file := _file_in(row))
+    }
+
+
+def _file_in(row: Mapping[str, str | None]) -> str:
+    """Return the path of a manifest's file without its suffix; "" if the row names none."""
+    if row.get("file"):
+        return PurePosixPath(row["file"] or "").with_suffix("").as_posix()
+    return "/".join(filter(None, (row.get("group"), row.get("name")))) if row.get("name") else ""
 
 
 def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Provided]:

@@ -61,13 +61,19 @@ def file_name(name: str, longest: int = LONGEST) -> str:
     return f"{readable[: longest - DIGITS - 1]}~{digest(name)[:DIGITS]}"
 
 
+#: Maximum number of known names that a message lists.
+MOST_NAMED = 60
+
+
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     """Return a message for an unknown name, with the known ones and those that are spelled alike.
 
     >>> unknown("metric", "image_aera", ["dirichlet_energy", "image_area"])
     "unknown metric 'image_aera'; known: dirichlet_energy, image_area. Did you mean image_area?"
     """
-    names = ", ".join(known := sorted(known)) or "none"
+    known = sorted(known)
+    names = ", ".join(known[:MOST_NAMED]) or "none"
+    names += f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
     return f"unknown {kind} {name!r}; known: {names}.{did_you_mean(name, known)}"
 
 

@@ -86,6 +86,10 @@ class Dataset:
         First and last polygon of the surface, counted from 0, if the file holds more.
     note : str
         A remark for the user.
+    source : str
+        Who published it: a repository, owner/name.
+    family : str
+        The object that it shows; "" for one that no other dataset shows.
     part : Part, optional
         For a file that is part of a model and not a surface: what is kept of it.
 
@@ -104,6 +108,8 @@ class Dataset:
     arrays: tuple[str, str] | None = None
     polygons: tuple[int, int] | None = None
     note: str = ""
+    source: str = ""
+    family: str = ""
     part: Part | None = None
 
     @property

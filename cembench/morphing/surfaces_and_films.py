@@ -17,7 +17,7 @@ from cembench.morphing.morph import Morph
 from cembench.registry import Registry
 from cembench.running.local import map_once
 from cembench.running.options import Options
-from cembench.running.plan import MeasurementSettings, paper_roles, plan_cells
+from cembench.running.plan import MeasurementSettings, plan_cells, provenances
 from cembench.running.surfaces import SurfaceInput, is_generated, load_surface
 
 #: Called with a text at each step.
@@ -109,5 +109,5 @@ def _frame_of(frames: int, tell: Tell) -> Callable[[int], object]:
 
 def rows_of_paper(registry: Registry, surfaces: Sequence[str]) -> tuple[str, ...]:
     """Return the model of the paper that each surface stands in for; "" for none."""
-    roles = paper_roles(registry, [name for name in surfaces if name in registry.surfaces])
+    roles = provenances(registry, [name for name in surfaces if name in registry.surfaces])
     return tuple(roles[name].paper_row if name in roles else "" for name in surfaces)

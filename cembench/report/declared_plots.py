@@ -280,14 +280,19 @@ def _profile(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _D
         return None
     finite = ratios.to_numpy()
     last = min(spec.x.high or inf, 1.15 * float(finite[finite < inf].max()))
+    families = [evidence.surfaces[place].family for place in ratios.index]
+    weights = [1 / families.count(family) for family in families]
     series = tuple(
-        PlotSeries(label, *staircase(ratios[label].tolist(), last), "steps", evidence.styles[label])
+        PlotSeries(
+            *(label, *staircase(ratios[label].tolist(), last, weights)),
+            *("steps", evidence.styles[label]),
+        )
         for label in map(str, ratios)
     )
     x = Axis(spec.x.axis().title, log=True, low=1.0, high=last)
-    panel = PlotPanel(x, Axis("surfaces (%)", low=0, high=104), series)
+    panel = PlotPanel(x, Axis("families (%)", low=0, high=104), series)
     left_out = [label for label in dict.fromkeys(frame["label"]) if label not in ratios]
-    return _Drawn(panel, len(ratios), left_out, spec.about)
+    return _Drawn(panel, len(set(families)), left_out, spec.about)
 
 
 def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Drawn | None:

@@ -98,15 +98,17 @@ def cost_ratios(frame: pd.DataFrame, cost: pd.Series, least: float = 0.0) -> pd.
     return table.div(table.min(axis=1), axis=0)
 
 
-def staircase(ratios: Sequence[float], last: float) -> tuple[list[float], list[float]]:
+def staircase(
+    ratios: Sequence[float], last: float, weights: Sequence[float]
+) -> tuple[list[float], list[float]]:
     """Return the performance profile of ratios: x up to `last`, and the share in percent.
 
-    It is the share of surfaces on which a cost is at most tau times the best one there (Dolan and
-    More, 2002). Infinite ratios, where there is no good map, keep a curve below 100 %.
+    It is the weighted share of surfaces on which a cost is at most tau times the best one there
+    (Dolan and More, 2002). Infinite ratios, where there is no good map, keep a curve below 100 %.
 
-    >>> staircase([1.0, 2.0, inf, inf], 4.0)
+    >>> staircase([1.0, 2.0, inf, inf], 4.0, [1, 1, 1, 1])
     ([1.0, 1.0, 2.0, 4.0], [25.0, 25.0, 50.0, 50.0])
     """
-    ordered = sorted(r for r in ratios if r <= last)
-    x = [1.0, *ordered, last]
-    return x, [100 * sum(r <= tau for r in ordered) / len(ratios) for tau in x]
+    ordered = sorted(pair for pair in zip(ratios, weights, strict=True) if pair[0] <= last)
+    x = [1.0, *(ratio for ratio, _ in ordered), last]
+    return x, [100 * sum(w for r, w in ordered if r <= tau) / sum(weights) for tau in x]

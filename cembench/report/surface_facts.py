@@ -26,7 +26,7 @@ from cembench.registry import Algorithm, Registry, Surface
 from cembench.report.document import Column, Plain, Table, missing, words
 from cembench.results.papers import paper_of
 from cembench.results.records import MeshFacts
-from cembench.running.plan import mesh_facts, paper_roles
+from cembench.running.plan import mesh_facts, provenances
 from cembench.running.sources import code_hash
 from cembench.running.surfaces import generate_surface
 
@@ -197,5 +197,5 @@ def _mapper(registry: Registry) -> Algorithm:
 
 
 def _standing(registry: Registry, surface: Surface) -> dict[str, Any]:
-    known = paper_roles(registry, [surface.name])
+    known = provenances(registry, [surface.name])
     return {"standing": known[surface.name]} if known else {}

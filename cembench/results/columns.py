@@ -148,6 +148,11 @@ def _solve_from(record: Record) -> str | None:
     return solve_words(record) if has else None
 
 
+def family_of(record: Record) -> str:
+    """Return the object that a record's surface shows; if unknown, the surface's own name."""
+    return record.mesh.family or record.cell.mesh
+
+
 def half_width(record: Record) -> float | None:
     """Return half the width of the 95 % interval of a cell's seconds, in percent of them."""
     found, seconds = seconds_interval(record), record.outcome.median_seconds
@@ -239,6 +244,8 @@ EXPORTED = (
     _C("notices", lambda r: [str(notice) for notice in r.mesh.notices]),
     _C("origin", _at("mesh.origin")),
     _C("paper_row", lambda r: r.mesh.paper_row or None),
+    _C("source", lambda r: r.mesh.source or None),
+    _C("family", family_of),
     _C("solves", _at("cell.solves"), "solves"),
     _C("backend", _at("cell.backend")),
     _C("threads", _at("cell.threads")),

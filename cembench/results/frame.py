@@ -18,7 +18,7 @@ import numpy as np
 
 from cembench.core.errors import ParameterError
 from cembench.results.columns import significant
-from cembench.results.intervals import LEVEL
+from cembench.results.families import family_means, share_interval
 from cembench.results.multiple_testing import geometric, sign_test
 
 if TYPE_CHECKING:
@@ -33,26 +33,35 @@ _METHODS = frozenset(
 )
 
 
-def share_interval(successes: int, n: int) -> tuple[float, float]:
-    """Return the 95 % Wilson interval of a share.
-
-    >>> [round(end, 3) for end in share_interval(10, 10)]
-    [0.722, 1.0]
-    """
-    from scipy.stats import binomtest  # slow to import
-
-    found = binomtest(successes, n).proportion_ci(LEVEL, method="wilson")
-    return float(found.low), float(found.high)
-
-
 def _count(of: pd.Series) -> int:
     """Return how many are true, or, of figures, how many there are."""
     return int(of.sum() if of.dtype == bool else of.notna().sum())
 
 
-def _share_words(of: pd.Series) -> str:
-    low, high = share_interval(int(of.sum()), len(of))
-    return f"{100 * low:.1f} to {100 * high:.1f}"
+def _shares(of: pd.Series, families: pd.Series | None) -> list[float]:
+    """Return the share of each family; each entry is one of its own if there are none."""
+    found = of if of.dtype == bool else of.notna()
+    return family_means(list(found), list(range(len(found)) if families is None else families))
+
+
+def _share(of: pd.Series, families: pd.Series | None = None) -> float:
+    return 100 * float(np.mean(_shares(of, families)))
+
+
+def _share_words(of: pd.Series, families: pd.Series | None = None) -> str:
+    shares = _shares(of, families)
+    found = share_interval(float(np.mean(shares)), len(shares))
+    return f"{100 * found.low:.1f} to {100 * found.high:.1f}"
+
+
+def _family_percentile(of: pd.Series, families: pd.Series, q: float) -> float | None:
+    """Return a percentile of surfaces that weigh as much as their family divided among them."""
+    known = of.notna()
+    if not known.any():
+        return None
+    values, own = of[known].astype(float).to_numpy(), families[known]
+    weights = 1 / own.map(own.value_counts()).to_numpy()
+    return float(np.percentile(values, q, weights=weights, method="inverted_cdf"))
 
 
 def _at_largest(of: pd.Series, wanted: pd.Series) -> Any:
@@ -91,8 +100,10 @@ def _figure(of: Callable[..., Any]) -> Callable[..., float | None]:
 FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
     {
         "count": _count,
-        "share": lambda of: 100 * _count(of) / len(of),
+        "families": lambda of: of.nunique(),
+        "share": _share,
         "share_interval": _share_words,
+        "family_percentile": _family_percentile,
         "mean": _figure(np.mean),
         "median": _figure(np.median),
         "percentile": _figure(_percentile),

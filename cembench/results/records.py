@@ -208,6 +208,9 @@ class MeshFacts(BaseModel):
     #: The model of a paper that the surface is or stands in for, if any.
     paper_row: str = ""
     origin: MeshOrigin = "surface"
+    #: Who published it, and the object that it shows; "" where unknown, and in older records.
+    source: str = ""
+    family: str = ""
 
 
 class Neighbours(BaseModel):

@@ -13,6 +13,7 @@ from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import did_you_mean
 from cembench.core.wording import Setting
 from cembench.linear_algebra.backends import default_backend
+from cembench.mesh.datasets import Dataset
 from cembench.mesh.files import (
     READERS,
     is_named_like_a_mesh,
@@ -38,11 +39,27 @@ class Task:
 
 
 @dataclass(frozen=True)
-class PaperRole:
-    """A surface's model of a paper, and whether it is that model or a stand-in."""
+class Provenance:
+    """Where a surface is from: its paper's model, its source, and its family.
+
+    Parameters
+    ----------
+    paper_row : str
+        The model of a paper that it is or stands in for, if any.
+    origin : {"model", "stand-in", "surface"}
+        Which of the two it is; "surface" for neither.
+    source : str
+        Who published it, e.g. a repository; "" if unknown.
+    family : str
+        The object that it shows. Surfaces of one family, such as scans of one statue, are not
+        independent samples; "" if unknown, which makes the surface a family of its own.
+
+    """
 
     paper_row: str = ""
     origin: MeshOrigin = "surface"
+    source: str = ""
+    family: str = ""
 
 
 @dataclass(frozen=True)
@@ -69,7 +86,7 @@ def plan_cells(
     parameters: Mapping[str, Any],
     how: MeasurementSettings,
     plugins: Sequence[str] = (),
-    standing: Mapping[str, PaperRole] = MappingProxyType({}),
+    standing: Mapping[str, Provenance] = MappingProxyType({}),
 ) -> list[Task]:
     """Return a task for every algorithm on every surface that it takes, grouped by surface.
 
@@ -105,7 +122,7 @@ def plan_cells(
                 f"{mesh.name} is a {type(mesh).__name__}, which none of the chosen algorithms "
                 f"accepts: {chosen}."
             )
-        role = standing.get(mesh.name, PaperRole())
+        role = standing.get(mesh.name, Provenance())
         facts = mesh_facts(mesh, role)
         model = role.paper_row if role.origin == "model" else ""
         settings = paper_of(model).as_printed(model, algorithms) | dict(parameters)
@@ -153,7 +170,7 @@ def distribute_parameters(
     return {a.name: a.arguments(chosen[a.name]) for a in algorithms}
 
 
-def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFacts:
+def mesh_facts(mesh: TriangleMesh, standing: Provenance = Provenance()) -> MeshFacts:
     """Return the facts of a surface for tables."""
     return MeshFacts(
         vertices=mesh.n,
@@ -163,6 +180,8 @@ def mesh_facts(mesh: TriangleMesh, standing: PaperRole = PaperRole()) -> MeshFac
         notices=mesh.notices,
         paper_row=standing.paper_row,
         origin=standing.origin,
+        source=standing.source,
+        family=standing.family,
     )
 
 
@@ -200,14 +219,22 @@ def mesh_files(folder: Path) -> list[Path]:
     )
 
 
-def paper_roles(registry: Registry, names: Iterable[str]) -> dict[str, PaperRole]:
-    """Return the roles in the paper of these registered surfaces; others are left out."""
+def provenances(registry: Registry, names: Iterable[str]) -> dict[str, Provenance]:
+    """Return where these generated surfaces are from: each name is a family of its own."""
     rows = {name: registry.surface(name).paper_row for name in names}
-    return {name: PaperRole(row, "stand-in") for name, row in rows.items() if row}
+    return {
+        name: Provenance(row, "stand-in" if row else "surface", family=name)
+        for name, row in rows.items()
+    }
 
 
-def paper_role_of(registry: Registry, mesh: TriangleMesh) -> PaperRole:
-    """Return the role in the paper of a surface that was not generated; it is known by its mesh."""
-    rows = {d.mesh_hash: d.paper_row for d in registry.datasets.values() if d.mesh_hash}
-    row = rows.get(mesh.hash, "")
-    return PaperRole(row, "model") if row else PaperRole()
+def provenance_of(registry: Registry, mesh: TriangleMesh) -> Provenance:
+    """Return where a surface that was not generated is from; it is recognised by its mesh."""
+    known = (d for d in registry.datasets.values() if d.mesh_hash == mesh.hash)
+    return next(map(provenance_of_dataset, known), Provenance())
+
+
+def provenance_of_dataset(dataset: Dataset) -> Provenance:
+    """Return where a dataset's surface is from."""
+    row = dataset.paper_row
+    return Provenance(row, "model" if row else "surface", dataset.source, dataset.family)

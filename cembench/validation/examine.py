@@ -18,7 +18,7 @@ from cembench.results.store import Store
 from cembench.running.environment import describe_environment
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
-from cembench.running.plan import MeasurementSettings, PaperRole, plan_cells
+from cembench.running.plan import MeasurementSettings, Provenance, plan_cells
 from cembench.running.watcher import Watcher
 from cembench.validation import surfaces
 from cembench.validation.contract import examine_contract
@@ -58,7 +58,7 @@ class ValidationOptions:
     against: Sequence[str] | None = None
     #: Surfaces to compare on; empty: the default six.
     meshes: Sequence[TriangleMesh] = ()
-    standing: Mapping[str, PaperRole] = field(default_factory=dict)
+    standing: Mapping[str, Provenance] = field(default_factory=dict)
     faces: int = 5000
     rounds: int = DEFAULT_ROUNDS
     #: Triangles of the largest mesh of the scaling stage; 0: skip the stage.

@@ -179,10 +179,13 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
 
 def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
     from cembench.registry import load_registry
-    from cembench.running.plan import PaperRole, paper_roles
+    from cembench.running.plan import Provenance, provenances
 
-    found = paper_roles(load_registry(), ["foot-stand-in", "flat-disk"])
-    assert found == {"foot-stand-in": PaperRole("Foot", "stand-in")}
+    found = provenances(load_registry(), ["foot-stand-in", "flat-disk"])
+    assert found == {
+        "foot-stand-in": Provenance("Foot", "stand-in", family="foot-stand-in"),
+        "flat-disk": Provenance(family="flat-disk"),
+    }
 
 
 def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):

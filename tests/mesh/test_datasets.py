@@ -26,7 +26,7 @@ from cembench.mesh.datasets import Dataset, fetch, is_fetched
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
-from cembench.running.plan import PaperRole, paper_role_of
+from cembench.running.plan import Provenance, provenance_of
 from tests.limits import files_of_at_most, tree
 from tests.real_meshes import real_mesh
 
@@ -190,7 +190,9 @@ def test_seven_of_those_that_are_known_are_models_of_the_paper():
         "human-brain": "Human Brain",
         "left-hand": "Left Hand",
     }
-    with pytest.raises(RegistryError, match="unknown dataset 'teapot'; known: alex-3holes, "):
+    with pytest.raises(
+        RegistryError, match="unknown dataset 'teapot'; known: airplane, alex-3holes, "
+    ):
         load_registry().dataset("teapot")
 
 
@@ -200,17 +202,18 @@ def test_a_model_is_recognised_by_its_mesh_in_any_file(tiny, known, server, tmp_
     mesh = read_mesh(path)
     write_mesh(tmp_path / "other.ply", mesh)
     for file in (path, tmp_path / "other.ply"):
-        found = paper_role_of(load_registry(), read_mesh(file))
-        assert found == PaperRole("Nefertiti", "model")
+        found = provenance_of(load_registry(), read_mesh(file))
+        assert found == Provenance("Nefertiti", "model")
     unknown = replace(load_registry(), datasets={"tiny": tiny})
-    assert paper_role_of(unknown, mesh) == PaperRole()
+    assert provenance_of(unknown, mesh) == Provenance()
 
 
 @pytest.mark.parametrize("name", ["chinese_lion.mat", "chinese_lion.obj"])
 def test_the_chinese_lion_is_recognised_in_either_format(name):
     path = real_mesh(name)
-    found = paper_role_of(load_registry(), read_mesh(path, TriangleMesh))
-    assert found == PaperRole("Chinese Lion", "model")
+    found = provenance_of(load_registry(), read_mesh(path, TriangleMesh))
+    source = "garyptchoi/disk-conformal-map"
+    assert found == Provenance("Chinese Lion", "model", source, "chinese-lion")
 
 
 def test_fetch_lists_what_there_is(cli, known):

@@ -22,7 +22,7 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 from cembench.report.surface_facts import factor_spans, row_check
 from cembench.results.profiles import Profile, surfaces_of
-from cembench.running.plan import PaperRole, mesh_facts
+from cembench.running.plan import Provenance, mesh_facts
 
 #: Made in seconds; the others are for the slow run.
 QUICK = ("nefertiti-stand-in", "cowboy-hat-stand-in", "chinese-vase-stand-in")
@@ -48,7 +48,7 @@ def fresh_cache(tmp_path_factory: pytest.TempPathFactory) -> object:
 
 
 def _check(name: str, mesh: DiskMesh) -> dict[str, Any]:
-    check = row_check(mesh_facts(mesh, PaperRole(ROWS[name].model, "stand-in")))
+    check = row_check(mesh_facts(mesh, Provenance(ROWS[name].model, "stand-in")))
     assert check is not None
     return check
 

@@ -10,7 +10,7 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.findings import many_findings
 from cembench.report.content.many_surfaces import HARDEST, hardest
-from cembench.report.content.pairwise_wins import _wins, pairwise_wins
+from cembench.report.content.pairwise_wins import pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
 from cembench.report.difficulty import boundary_crowding
@@ -18,7 +18,6 @@ from cembench.report.document import plain
 from cembench.report.run_tables import many_table
 from cembench.report.write_report import write_report
 from cembench.results.exhibits import Exhibit, write_exhibit
-from cembench.results.frame import share_interval
 from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
 from tests.report.small_run import ok, record
@@ -63,20 +62,13 @@ def by_label(table):
 
 def test_shares_count_what_was_tried_and_say_what_failed(evidence):
     table = declared_table(evidence, "success")
-    assert [c.title for c in table.columns][6:8] == ["invalid", "timeout"]
+    assert [c.title for c in table.columns][7:9] == ["invalid", "timeout"]
     cem = by_label(table)["CEM"]
-    assert [cem[k].number for k in (2, 3)] == [COUNT, COUNT - 3]
-    assert cem[4].number == pytest.approx(100 * 23 / 26)
-    assert [cem[k].number for k in (6, 7)] == [2, 1]
-    assert cem[8].text == "folded 2, timeout 1"
-    assert by_label(table)["LSCM"][3].number == COUNT
-
-
-@pytest.mark.parametrize("k", [0, 1, 13, 25, 26])
-def test_the_interval_of_a_share_holds_it_and_says_something_at_the_ends(k):
-    low, high = share_interval(k, 26)
-    assert 0 <= low <= k / 26 <= high <= 1
-    assert high - low > 0.1
+    assert [cem[k].number for k in (2, 3, 4)] == [COUNT, COUNT, COUNT - 3]
+    assert cem[5].number == pytest.approx(100 * 23 / 26)
+    assert [cem[k].number for k in (7, 8)] == [2, 1]
+    assert cem[9].text == "folded 2, timeout 1"
+    assert by_label(table)["LSCM"][4].number == COUNT
 
 
 def test_a_profile_ends_at_the_success_rate_and_the_best_starts_highest(evidence):
@@ -106,12 +98,6 @@ def test_wins_are_counted_both_ways_and_failures_lose(evidence):
     assert rows["CEM"][names.index("CEM")].text == ""
     a, b = won(angles, "CEM", "Direct CEM"), won(angles, "Direct CEM", "CEM")
     assert int(a.split()[0]) + int(b.split()[0]) == int(a.split()[2])
-
-
-def test_equal_figures_and_untried_surfaces_are_no_win():
-    first = [1.0, 2.0, np.inf, np.inf, np.nan]
-    second = [1.0 + 1e-9, 1.0, 5.0, np.inf, 1.0]
-    assert _wins(first, second) == (0, 2)
 
 
 def test_the_hardest_are_those_with_the_worst_best_map(evidence):
@@ -176,11 +162,52 @@ def test_what_is_found_counts_all_surfaces(evidence):
     # CEM has a map of 23, fewer than nine tenths.
     assert angles.startswith("On 26 surfaces, Direct CEM ")
     assert angles.endswith("Left out, with too few maps: CEM.")
-    assert re.fullmatch(r".* on \d+ of 26 surfaces and is within 1 % of the best on \d+\.", counts)
+    assert re.fullmatch(
+        r".* in \d+ % of 26 families \(95 % interval \d+ to \d+\) and is within 1 % of the best "
+        r"in \d+ %\.",
+        counts,
+    )
     assert "surface" in fastest
     cells, *_, worst = found.figures
     assert cells.number == f"{100 * 101 / 104:.1f} %"
     assert worst.words.startswith("the worst mean angle error of a valid map: ")
+
+
+@pytest.fixture(scope="module")
+def of_families(run):
+    """The same run, where 20 surfaces are faces of one model."""
+    held = Evidence.of(run)
+    faces = {surface(k).hash for k in range(20)}
+    records = [
+        r.model_copy(update={"mesh": r.mesh.model_copy(update={"family": "face"})})
+        if r.cell.mesh_hash in faces
+        else r
+        for r in held.records
+    ]
+    return Evidence(held.store, tuple(records), ())
+
+
+def test_a_family_counts_once_in_shares_and_wins_and_profiles(of_families):
+    cem = by_label(declared_table(of_families, "success"))["CEM"]
+    assert [cem[k].number for k in (2, 3, 4)] == [COUNT, 7, COUNT - 3]
+    assert cem[5].number == pytest.approx(100 * (17 / 20 + 6) / 7)
+    low, high = map(float, cem[6].text.split(" to "))
+    assert (low, high) == pytest.approx((100 * np.array([0.61, 1.0])), abs=4)
+    _, seconds = pairwise_wins(of_families, "reuse")
+    column = [c.title for c in seconds.columns].index("Direct CEM")
+    assert by_label(seconds)["CEM"][column].text == "7 of 7 *"
+    profile = declared_plot(of_families, "accuracy-profiles").panels[0]
+    assert profile.title == "mean angle error, n = 7"
+    ends = {line.name: line.y[-1] for line in profile.series}
+    assert ends["CEM"] == pytest.approx(100 * (17 / 20 + 6) / 7)
+
+
+def test_every_sentence_says_on_how_many_families_it_rests(of_families):
+    valid, angles, counts, *_ = map(plain, many_findings(of_families).sentences)
+    assert valid.startswith("Over 26 surfaces of 7 families, 3 of 4 algorithms")
+    assert "On 26 surfaces of 7 families, Direct CEM" in angles
+    assert "95 % interval over 7 families" in angles
+    assert "of 7 families (95 % interval" in counts
 
 
 def test_the_terminal_has_a_line_an_algorithm(evidence):

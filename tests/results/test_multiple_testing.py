@@ -5,15 +5,7 @@ from scipy.stats import binomtest
 from benchmarks import noise, precision
 from cembench.results.comparison import compare_ratios
 from cembench.results.intervals import ERROR
-from cembench.results.multiple_testing import (
-    arithmetic,
-    average_interval,
-    corrected,
-    geometric,
-    holm,
-    rate_interval,
-    sign_test,
-)
+from cembench.results.multiple_testing import corrected, holm, sign_test
 from cembench.results.sequential_checks import share
 
 
@@ -51,35 +43,3 @@ def test_one_of_a_hundred_is_found_where_it_is_clear():
 def test_the_sign_test_is_the_binomial_one(wins, losses):
     assert sign_test(wins, losses) == pytest.approx(binomtest(wins, wins + losses).pvalue)
     assert sign_test(0, 0) == 1
-
-
-def test_the_interval_of_an_average_holds_what_surfaces_and_rounds_vary():
-    rng = np.random.default_rng(5)
-    tight = [[3.0 * f for f in rng.lognormal(0, 0.01, 7)] for _ in range(12)]
-    varied = [[s * f for f in rng.lognormal(0, 0.01, 7)] for s in rng.lognormal(1, 0.8, 12)]
-    narrow, wide = (average_interval(some, geometric) for some in (tight, varied))
-    assert 3.0 in narrow
-    assert narrow.high / narrow.low < 1.02
-    assert wide.high / wide.low > 1.5
-    assert average_interval(tight, geometric) == narrow
-    assert average_interval(tight[:5], geometric) is None
-
-
-def test_it_covers_the_average_about_as_often_as_stated():
-    rng = np.random.default_rng(9)
-    held = 0
-    for k in range(60):
-        true = rng.lognormal(1, 0.5, 14)
-        rounds = [list(s * rng.lognormal(0, 0.05, 7)) for s in true]
-        held += np.e in average_interval(rounds, geometric, seed=k)
-    assert held / 60 > 0.8
-
-
-def test_the_interval_of_a_rate_is_that_of_the_average_less_one_and_needs_rounds():
-    rng = np.random.default_rng(2)
-    ratios = [[3.0 * s * f for f in rng.lognormal(0, 0.01, 6)] for s in rng.lognormal(0, 0.3, 8)]
-    found, whole = rate_interval(ratios, arithmetic), average_interval(ratios, arithmetic)
-    assert (found.low, found.high) == pytest.approx((whole.low - 1, whole.high - 1))
-    assert rate_interval([r[:5] for r in ratios], arithmetic) is None
-    assert rate_interval([*[r[:5] for r in ratios[:3]], *ratios[3:]], geometric) is not None
-    assert rate_interval([], arithmetic) is None

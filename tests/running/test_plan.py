@@ -4,11 +4,11 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.registry import load_registry
-from cembench.running.plan import MeasurementSettings, PaperRole, plan_cells
+from cembench.running.plan import MeasurementSettings, Provenance, plan_cells
 
 ROLES = {
-    "model": PaperRole("Nefertiti", "model"),
-    "stand-in": PaperRole("Nefertiti", "stand-in"),
+    "model": Provenance("Nefertiti", "model"),
+    "stand-in": Provenance("Nefertiti", "stand-in"),
 }
 MESHES = [flat_disk(200 + 20 * k).renamed(name) for k, name in enumerate([*ROLES, "own"])]
 

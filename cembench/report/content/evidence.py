@@ -20,7 +20,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.difficulty import Difficulty, difficulty
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import record_rows
-from cembench.results.columns import COLUMNS, DERIVED
+from cembench.results.columns import COLUMNS, DERIVED, family_of
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
@@ -77,6 +77,8 @@ class MeasuredSurface:
     non_delaunay_share: float
     paper_row: str
     origin: MeshOrigin
+    #: The object that it shows.
+    family: str
 
     @property
     def title(self) -> str:
@@ -257,12 +259,18 @@ class Evidence:
                 non_delaunay_share=facts.non_delaunay_share,
                 paper_row=facts.paper_row if facts.paper_row in order else "",
                 origin=facts.origin if facts.paper_row in order else "surface",
+                family=family_of(record),
             )
 
         def place(s: MeasuredSurface) -> tuple[int, int, str]:
             return (order.index(s.paper_row) if s.paper_row else len(order), s.faces, s.name)
 
         return tuple(sorted(found.values(), key=place))
+
+    @property
+    def families(self) -> int:
+        """Number of objects that the surfaces show."""
+        return len({surface.family for surface in self.surfaces})
 
     @property
     def models(self) -> tuple[MeasuredSurface, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from statistics import mean
 
 from cembench.report.content.by_surface import own_table
 from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, Evidence
@@ -20,6 +21,7 @@ from cembench.report.content.standings import (
 )
 from cembench.report.document import Claim, Figure, Finding, Findings, Sentence
 from cembench.results.comparison import Comparison
+from cembench.results.families import FEWEST_FAMILIES, family_means, share_interval
 from cembench.results.outliers import outlier_lines
 from cembench.results.stability import scatter_words, stability_words
 
@@ -64,6 +66,11 @@ def _beside_the_paper(known: Sequence[str], field: Field, sentence: str) -> str:
     return start + sentence[0].lower() + sentence[1:]
 
 
+def surfaces_words(surfaces: int, families: int) -> str:
+    """Return a number of surfaces, and of the families that they are of if these are fewer."""
+    return f"{surfaces} surfaces" + (f" of {families} families" if families < surfaces else "")
+
+
 def field_words(field: Field) -> list[str]:
     """Return sentences on whose angle errors are the smallest, and who is the fastest."""
     best, *others = field.standings
@@ -76,8 +83,9 @@ def field_words(field: Field) -> list[str]:
 
 def _on(field: Field) -> str:
     if field.n < field.surfaces:
-        return f"the {field.n} of {field.surfaces} surfaces that all of them mapped"
-    return "one surface" if field.n == 1 else f"{field.n} surfaces"
+        of = f", {field.families} families" if field.families < field.n else ""
+        return f"the {field.n} of {field.surfaces} surfaces that all of them mapped{of}"
+    return "one surface" if field.n == 1 else surfaces_words(field.n, field.families)
 
 
 def _angles(field: Field, best: Standing, others: Sequence[Standing]) -> str:
@@ -99,23 +107,36 @@ def _angles(field: Field, best: Standing, others: Sequence[Standing]) -> str:
 
 
 def _certainty(field: Field, found: AngleRatio) -> str:
-    """Return the interval over surfaces of a ratio, and its median, in brackets."""
+    """Return the interval over families of a ratio, and its median, in brackets."""
     if field.n == 1:
         return ""
     interval = (
-        f"95 % interval over surfaces {found.interval.low:.3f} to {found.interval.high:.3f}"
+        f"95 % interval over {field.families} families "
+        f"{found.interval.low:.3f} to {found.interval.high:.3f}"
         if found.interval
-        else "too few surfaces for an interval"
+        else f"too few families for an interval: {field.families}"
     )
     return f" ({interval}; median {found.median:.3f})"
 
 
 def _counts(field: Field, *standings: Standing) -> str:
-    """Return on how many surfaces angle errors are the smallest, or nearly."""
-    return "; ".join(
-        f"{s.label} has the smallest angle errors on {field.near(s, 0)} of {field.n} surfaces and "
-        f"is within {100 * NEAR:.0f} % of the best on {field.near(s, NEAR)}"
+    """Return how often angle errors are the smallest, or nearly: in families, if these suffice."""
+    if field.families < FEWEST_FAMILIES:
+        return "; ".join(
+            f"{s.label} has the smallest angle errors on {sum(field.near(s, 0))} of {field.n} "
+            f"surfaces and is within {100 * NEAR:.0f} % of the best on {sum(field.near(s, NEAR))}"
+            for s in standings
+        )
+    shares = [
+        [mean(family_means(field.near(s, within), s.families)) for within in (0, NEAR)]
         for s in standings
+    ]
+    around = [share_interval(best, field.families) for best, _ in shares]
+    return "; ".join(
+        f"{s.label} has the smallest angle errors in {100 * best:.0f} % of {field.families} "
+        f"families (95 % interval {100 * i.low:.0f} to {100 * i.high:.0f}) and is within "
+        f"{100 * NEAR:.0f} % of the best in {100 * near:.0f} %"
+        for s, (best, near), i in zip(standings, shares, around, strict=True)
     )
 
 
@@ -143,21 +164,26 @@ def field_figures(field: Field) -> list[Finding]:
     good, best = field.good, field.standings[0]
     compared = compare_seconds(good[1], good[0]) if len(good) > 1 else None
     if compared is not None:
-        figures.append(_times(good[0], good[1], compared))
+        figures.append(_times(field, good[0], good[1], compared))
     figures.append(
         Finding(
             f"{best.angle:.2f}°",
             f"mean angle error of {best.label}, the lowest of {len(field.standings)}"
-            + (" (geometric mean over surfaces)" if field.n > 1 else ""),
+            + (f" (geometric mean over {_families(field)})" if field.n > 1 else ""),
         )
     )
     return figures
 
 
-def _times(first: Standing, second: Standing, compared: Comparison) -> Finding:
+def _families(field: Field) -> str:
+    return f"{field.families} {'families' if field.families > 1 else 'family'}"
+
+
+def _times(field: Field, first: Standing, second: Standing, compared: Comparison) -> Finding:
     interval = compared.interval
+    over = f" over {_families(field)}" if field.families >= FEWEST_FAMILIES else ""
     told = (
-        f"95 % interval {interval.low:.2f} to {interval.high:.2f}"
+        f"95 % interval{over} {interval.low:.2f} to {interval.high:.2f}"
         if interval
         else f"{compared.rounds} round{'s' if compared.rounds > 1 else ''}: too few for an interval"
     )
@@ -195,7 +221,8 @@ def many_findings(evidence: Evidence) -> Findings:
     ok = main.sort_values("series", kind="stable").groupby("label", sort=False)["ok"]
     whole = [str(label) for label, all_ok in ok.all().items() if all_ok]
     sentences = [
-        f"Over {len(evidence.surfaces)} surfaces, {len(whole)} of {len(ok)} algorithms have a "
+        f"Over {surfaces_words(len(evidence.surfaces), evidence.families)}, {len(whole)} of "
+        f"{len(ok)} algorithms have a "
         f"valid map of every one that they take{f': {listed(whole)}' if whole else ''}."
     ]
     figures = [Finding(f"{100 * main['ok'].mean():.1f} %", f"of {len(main)} cells are valid maps")]

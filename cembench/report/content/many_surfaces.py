@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cembench.report.content.by_surface import hardest_table
 from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface
+from cembench.report.content.findings import surfaces_words
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.pairwise_wins import pairwise_wins
 from cembench.report.declared import declared_table
@@ -75,4 +76,5 @@ def many_section(
     gallery = hardest_gallery(evidence, shown, inspections)
     if gallery:
         items.append(gallery)
-    return Section("many", f"Over {len(evidence.surfaces)} surfaces", tuple(items))
+    over = surfaces_words(len(evidence.surfaces), evidence.families)
+    return Section("many", f"Over {over}", tuple(items))

@@ -11,8 +11,8 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.rates import measured_rates
 from cembench.report.content.speedup_significance import paired_rounds
 from cembench.report.document import VERDICTS, Claim, Sentence
+from cembench.results.families import FEWEST_FAMILIES, rate_interval
 from cembench.results.intervals import DEFAULT_ROUNDS
-from cembench.results.multiple_testing import FEWEST_SURFACES, arithmetic, rate_interval
 
 #: Verdicts whose claims are named in the count.
 _NAMED = ("does not hold here", "holds in part")
@@ -21,8 +21,8 @@ _NAMED = ("does not hold here", "holds in part")
 def claim_of_the_paper(evidence: Evidence) -> str:
     """Return the paper's average rates of speedup beside those of this run, as a sentence.
 
-    A measured rate has its 95 % interval over models and rounds in brackets where there are enough
-    of both (:func:`cembench.results.multiple_testing.rate_interval`).
+    A measured rate has its 95 % interval over models in brackets where there are enough of them
+    and of rounds (:func:`cembench.results.families.rate_interval`).
     """
     paper = evidence.paper
     names = ", ".join(algorithm.upper() for algorithm in paper.compared)
@@ -34,9 +34,9 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     over = [f"{models} of its models"] if models else []
     over += [f"{others} stand-in{'s' if others > 1 else ''}"] if others else []
     intervals = (
-        "with 95 % intervals over models and rounds"
+        "with 95 % intervals over models"
         if any(sure for _, (_, sure) in told)
-        else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_SURFACES} models)"
+        else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_FAMILIES} models)"
     )
     return (
         f"{paper.reference.upper()} against {names}: printed {printed}; here {here}. This is "
@@ -52,7 +52,7 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
         series, interval = evidence.series_of(algorithm), None
         if rates and series is not None:
             rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
-            interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
+            interval = rate_interval([ratios for _, ratios, _ in rounds], log=False)
         between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
         told.append(f"{mean_rate(rates):.1f}{between}" if rates else "not measured")
         sure = sure or interval is not None

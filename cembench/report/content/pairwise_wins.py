@@ -1,13 +1,14 @@
-"""Pairwise wins of algorithms over surfaces, with sign tests."""
+"""Pairwise wins of algorithms over families of surfaces, with sign tests."""
 
 from __future__ import annotations
 
 from itertools import combinations
-from math import inf, isclose, isnan
+from math import inf
 
 from cembench.report.content.evidence import ANGLE, DISK, Evidence
 from cembench.report.content.printed_beside_measured import policy_suffix
 from cembench.report.document import Column, Table, Value, missing, words
+from cembench.results.families import votes
 from cembench.results.intervals import ERROR
 from cembench.results.multiple_testing import holm, sign_test
 
@@ -35,7 +36,8 @@ def _table(evidence: Evidence, name: str, title: str, policy: str, figure: str) 
     table = tried.assign(cost=cost).pivot(index="place", columns="label", values="cost")
     scores = {str(label): column.tolist() for label, column in table.items()}
     pairs = list(combinations([s.label for s in series], 2))
-    wins = {(a, b): _wins(scores[a], scores[b]) for a, b in pairs}
+    families = [evidence.surfaces[place].family for place in table.index]
+    wins = {(a, b): votes(scores[a], scores[b], families, SAME) for a, b in pairs}
     chances = holm([sign_test(*wins[pair]) for pair in pairs])
     entries: dict[tuple[str, str], Value] = {}
     for (a, b), chance in zip(pairs, chances, strict=True):
@@ -50,11 +52,11 @@ def _table(evidence: Evidence, name: str, title: str, policy: str, figure: str) 
         title,
         (Column("better", numeric=False), *(Column(s.label, "than") for s in series)),
         tuple(rows),
-        "Number of surfaces on which the algorithm of the row beats that of the column, out of "
-        "those that both were tried on; equal figures are left out. A cell that did not end ok "
-        "loses to one that did. A star marks a number beyond chance, with a confidence of "
-        f"{100 * (1 - ERROR):.0f} %{_together(len(pairs))}. Only surfaces are counted; the size of "
-        "the difference does not matter.",
+        "Number of families on most of whose surfaces the algorithm of the row beats that of the "
+        "column, out of those with surfaces that both were tried on; ties are left out. A cell "
+        "that did not end ok loses to one that did. A star marks a number beyond chance, with a "
+        f"confidence of {100 * (1 - ERROR):.0f} %{_together(len(pairs))}. Only families are "
+        "counted; the size of the difference does not matter.",
     )
 
 
@@ -64,16 +66,8 @@ def _together(pairs: int) -> str:
     return f" for all {pairs} pairs of this table together (two-sided sign tests, Holm)"
 
 
-def _wins(first: list[float], second: list[float]) -> tuple[int, int]:
-    """Return on how many surfaces the first and the second are smaller; untried ones are NaN."""
-    both = [(a, b) for a, b in zip(first, second, strict=True) if not (isnan(a) or isnan(b))]
-    differ = [(a, b) for a, b in both if not (a == b or isclose(a, b, rel_tol=SAME))]
-    won = sum(a < b for a, b in differ)
-    return won, len(differ) - won
-
-
 def _entry(won: int, lost: int, chance: float) -> Value:
     if not won + lost:
-        return missing("no surface on which they differ")
+        return missing("no family on which they differ")
     star = " *" if chance <= ERROR else ""
     return Value(f"{won} of {won + lost}{star}", won / (won + lost), "derived")

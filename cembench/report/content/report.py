@@ -14,7 +14,7 @@ from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.exponents import exponents_table
-from cembench.report.content.findings import findings, many_findings
+from cembench.report.content.findings import findings, many_findings, surfaces_words
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.linear_algebra_work import work_tables
 from cembench.report.content.machines import machines_section
@@ -163,6 +163,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
         ("measured", " to ".join(dict.fromkeys((dates[0], dates[-1])))),
         ("cells", ", ".join(f"{count} {status}" for status, count in statuses.most_common())),
         ("surfaces", ", ".join(f"{count} {_KINDS[o]}" for o, count in origins.items())),
+        ("families", f"{evidence.families}: what a statement on other surfaces rests on"),
         ("algorithms", ", ".join(series.label for series in evidence.series)),
         ("solves", ", ".join(evidence.policies)),
         ("rounds", (", ".join(map(str, rounds)) or "none") + _precision_words(evidence)),
@@ -289,7 +290,8 @@ def _title_of_own_surfaces(evidence: Evidence) -> str:
     algorithms = len({series.algorithm for series in evidence.series})
     surfaces = evidence.surfaces
     named = [surface.title for surface in surfaces]
-    of = " and ".join(named) if len(named) < 3 else f"{len(named)} surfaces"
+    many = surfaces_words(len(named), evidence.families)
+    of = " and ".join(named) if len(named) < 3 else many
     return f"{of}, mapped by {algorithms} algorithm{'s' if algorithms > 1 else ''}"
 
 

@@ -5,34 +5,30 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from itertools import islice
-
-import numpy as np
+from math import exp, log
+from statistics import mean
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
-from cembench.results.multiple_testing import (
-    FEWEST_SURFACES,
-    average_interval,
-    corrected,
-    geometric,
-    sign_test,
-)
+from cembench.results.families import FEWEST_FAMILIES, average_interval, family_means, votes
+from cembench.results.multiple_testing import corrected, sign_test
 
 CAPTION = (
     "'One by one': the number of surfaces on which the 95 % interval of the ratio within rounds "
     "excludes 1. 'Together': the number when all of the {n} verdicts of this table must be right "
-    "with 95 % (Holm). 'Over surfaces': whether {cem} wins on more surfaces than by chance "
-    "(two-sided sign test), and the geometric mean of t / t_{cem} with a 95 % interval over "
-    "surfaces and rounds (hierarchical bootstrap, seed 0), for other surfaces like these. "
+    "with 95 % (Holm). 'Over families', the objects that surfaces show: whether {cem} wins on most "
+    "surfaces of more families than by chance (two-sided sign test), and the geometric mean of "
+    "t / t_{cem} with Student's 95 % interval, for other families like these. "
     f"{NOT_DETECTED}"
 )
 _ONCE = " Each model counts once, and is preferred over its stand-in."
 
 
-#: The comparisons of an algorithm with the reference, and the rounds' ratios, of each surface.
-_Compared = list[tuple[Comparison, list[float]]]
+#: The comparisons of an algorithm with the reference, and the rounds' ratios, of each surface, and
+#: its family.
+_Compared = list[tuple[Comparison, list[float], str]]
 
 
 def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
@@ -46,7 +42,7 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
     }
     if not compared:
         return []
-    together = corrected([one for found in compared.values() for one, _ in found])
+    together = corrected([one for found in compared.values() for one, *_ in found])
     number, cem, left = len(together), evidence.reference.upper(), iter(together)
     verdicts = (f"{cem} faster", f"{cem} slower", "undecided")
     columns = (
@@ -54,7 +50,7 @@ def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
         Column("surfaces"),
         *(Column(name, "one by one") for name in verdicts),
         *(Column(name, "together") for name in verdicts),
-        *(Column(name, "over surfaces") for name in ("wins", "sign test", "mean", "95 % interval")),
+        *(Column(name, "over families") for name in ("wins", "sign test", "mean", "95 % interval")),
     )
     return [
         Table(
@@ -83,24 +79,25 @@ def paired_rounds(
         base = evidence.base(record) if record is not None else None
         one = compare(record, base) if record is not None and base is not None else None
         if record is not None and base is not None and one is not None and one.rounds:
-            found.append((one, paired_ratios(record, base)))
+            found.append((one, paired_ratios(record, base), surface.family))
     return found
 
 
 def _row(label: str, compared: _Compared, together: Sequence[Comparison]) -> tuple[Value, ...]:
-    figures = [one.ratio for one, _ in compared]
-    wins, losses = sum(r > 1 for r in figures), sum(r < 1 for r in figures)
-    p, mean = sign_test(wins, losses), float(geometric(np.array(figures)))
-    interval = average_interval([ratios for _, ratios in compared], geometric)
+    figures, families = [one.ratio for one, *_ in compared], [family for *_, family in compared]
+    wins, losses = votes([1.0] * len(figures), figures, families)
+    p = sign_test(wins, losses)
+    average = exp(mean(family_means([log(ratio) for ratio in figures], families)))
+    interval = average_interval(figures, families)
     return (
         words(label),
         count(len(figures)),
-        *_verdicts([one for one, _ in compared]),
+        *_verdicts([one for one, *_ in compared]),
         *_verdicts(together),
         Value(f"{wins} of {wins + losses}", wins, "derived"),
         Value(f"p = {p:.2g}", p, "derived"),
-        Value(f"{mean:.2f}", mean, "derived"),
-        missing(f"fewer than {FEWEST_SURFACES} surfaces")
+        Value(f"{average:.2f}", average, "derived"),
+        missing(f"fewer than {FEWEST_FAMILIES} families")
         if interval is None
         else Value(f"{interval.low:.2f} to {interval.high:.2f}", None, "derived"),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, inf, log
-from statistics import median
+from statistics import mean, median
 
 import numpy as np
 
@@ -18,8 +18,8 @@ from cembench.report.content.evidence import (
     figure_of,
 )
 from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
+from cembench.results.families import FEWEST_FAMILIES, average_interval, family_means
 from cembench.results.intervals import Interval
-from cembench.results.multiple_testing import average_interval, geometric
 from cembench.results.records import Record
 
 #: An algorithm takes part with maps of at least this share of the surfaces that most mapped.
@@ -44,6 +44,8 @@ class Standing:
 
     series: AlgorithmSeries
     records: tuple[Record, ...]
+    #: The family of each record's surface.
+    families: tuple[str, ...]
 
     @property
     def label(self) -> str:
@@ -52,8 +54,9 @@ class Standing:
 
     @property
     def seconds(self) -> float:
-        """The geometric mean of the seconds."""
-        return exp(float(np.mean([log(r.outcome.median_seconds or 1.0) for r in self.records])))
+        """The geometric mean of the seconds over families."""
+        logs = [log(r.outcome.median_seconds or 1.0) for r in self.records]
+        return exp(mean(family_means(logs, self.families)))
 
     @property
     def angles(self) -> list[float]:
@@ -62,15 +65,15 @@ class Standing:
 
     @property
     def angle(self) -> float:
-        """The geometric mean of the mean angle errors."""
-        return float(geometric(np.array(self.angles)))
+        """The geometric mean of the mean angle errors over families."""
+        return exp(mean(family_means([log(a) for a in self.angles], self.families)))
 
 
 @dataclass(frozen=True)
 class AngleRatio:
     """The angle errors of an algorithm over those of another on the same surfaces.
 
-    The interval is over surfaces (bootstrap); None for fewer than six.
+    All three are over families; the interval is None for fewer than six.
     """
 
     mean: float
@@ -99,6 +102,11 @@ class Field:
         return len(self.standings[0].records)
 
     @property
+    def families(self) -> int:
+        """Number of objects that these surfaces show."""
+        return len(set(self.standings[0].families))
+
+    @property
     def smallest(self) -> list[float]:
         """The smallest mean angle error on each surface."""
         return [min(column) for column in zip(*(s.angles for s in self.standings), strict=True)]
@@ -109,10 +117,10 @@ class Field:
         kept = [s for s in self.standings if as_good(s.angles, self.smallest)]
         return sorted(kept, key=lambda s: s.seconds)
 
-    def near(self, standing: Standing, share: float) -> int:
-        """Return on how many surfaces the angle error is within a share of the smallest."""
+    def near(self, standing: Standing, share: float) -> list[bool]:
+        """Return on which surfaces the angle error is within a share of the smallest."""
         pairs = zip(standing.angles, self.smallest, strict=True)
-        return sum(own <= (1 + share) * least for own, least in pairs)
+        return [own <= (1 + share) * least for own, least in pairs]
 
 
 def field_of(evidence: Evidence, policy: str) -> Field | None:
@@ -127,8 +135,12 @@ def field_of(evidence: Evidence, policy: str) -> Field | None:
     common = set.intersection(*map(set, chosen.values())) if chosen else set()
     if not common:
         return None
-    order = [s.mesh_hash for s in evidence.surfaces if s.mesh_hash in common]
-    standings = [Standing(s, tuple(maps[key] for key in order)) for s, maps in chosen.items()]
+    shared = [s for s in evidence.surfaces if s.mesh_hash in common]
+    families = tuple(s.family for s in shared)
+    standings = [
+        Standing(s, tuple(maps[one.mesh_hash] for one in shared), families)
+        for s, maps in chosen.items()
+    ]
     return Field(
         tuple(sorted(standings, key=lambda s: s.angle)),
         len({key for maps in held.values() for key in maps}),
@@ -147,18 +159,26 @@ def _maps(evidence: Evidence, series: AlgorithmSeries, policy: str) -> dict[str,
 
 
 def compare_angles(other: Standing, best: Standing) -> AngleRatio:
-    """Return the geometric mean over surfaces of other / best, with its interval and the median."""
+    """Return the geometric mean over families of other / best, with its interval and the median."""
     ratios = [a / b for a, b in zip(other.angles, best.angles, strict=True)]
-    interval = average_interval([[ratio] for ratio in ratios], geometric)
-    return AngleRatio(float(geometric(np.array(ratios))), median(ratios), interval)
+    logs = family_means([log(ratio) for ratio in ratios], best.families)
+    interval = average_interval(ratios, best.families)
+    return AngleRatio(exp(mean(logs)), exp(median(logs)), interval)
 
 
 def compare_seconds(slower: Standing, faster: Standing) -> Comparison | None:
-    """Compare two algorithms by the geometric mean over surfaces of the ratios in each round."""
+    """Compare two algorithms by the ratios of their seconds within rounds.
+
+    With enough families the ratios of these decide, which is a statement on other families;
+    otherwise the means over the surfaces in each round do, a statement on these surfaces.
+    """
     ratios = [paired_ratios(a, b) for a, b in zip(slower.records, faster.records, strict=True)]
     rounds = min(map(len, ratios))
     if not rounds:
         return None
+    if len(set(faster.families)) >= FEWEST_FAMILIES:
+        logs = [median(map(log, found)) for found in ratios]
+        return compare_ratios([exp(own) for own in family_means(logs, faster.families)])
     together = np.log([found[:rounds] for found in ratios]).mean(axis=0)
     return compare_ratios(np.exp(together).tolist())
 
