@@ -73,7 +73,7 @@ def direct_cem_holes(
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
-        widest, holes = mesh.outer_and_holes(outer)
+        widest, holes = mesh.outer_and_holes(_only_loop_with_ears(mesh) if outer is None else outer)
     bordered = BorderedLaplacian(mesh, L, (widest, *holes))
     S = bordered.dirichlet_to_neumann()
     with phase("start"):
@@ -109,6 +109,20 @@ def direct_cem_holes(
         **folds,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
+
+
+def _only_loop_with_ears(mesh: HoledMesh) -> int | None:
+    """Return a vertex of the one loop that has triangles with all corners on it; None for others.
+
+    Such a triangle lies inside a circle, so it folds at a hole.
+    """
+    of = np.full(mesh.n, -1)
+    for k, loop in enumerate(mesh.loops):
+        of[loop] = k
+    corners = of[mesh.F]
+    alike = (corners[:, 0] >= 0) & (np.ptp(corners, axis=1) == 0)
+    found = np.unique(corners[alike, 0])
+    return int(mesh.loops[int(found[0])][0]) if len(found) == 1 else None
 
 
 def _annulus(

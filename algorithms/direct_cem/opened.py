@@ -18,9 +18,9 @@ from cembench.conformal.fold_repair import accepted_repair, figures
 from cembench.conformal.folds import interior_without_folds
 from cembench.conformal.metrics import angle_errors, flipped_triangles
 from cembench.conformal.patches import filled
-from cembench.conformal.planar import crossing_polygons
+from cembench.conformal.planar import crossing_polygons, fitted_circle, folded_triangles
 from cembench.core.clock import phase
-from cembench.core.errors import MeshError
+from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import HoledMesh
 
 from .disk import direct_cem
@@ -28,10 +28,17 @@ from .disk import direct_cem
 Complex = NDArray[np.complex128]
 Loop = NDArray[np.int64]
 
-#: Radii of the circles that are tried, as shares of the largest about the centre in the polygon.
-SHARES = (0.9, 0.5, 0.2)
+#: Radii of the circles that are tried, as shares of the largest about the centre in the polygon;
+#: with 0 the polygon stays.
+SHARES = np.array([0.9, 0.3, 0.0])
+#: Rings of vertices around folds that are laid out again about a circle.
+RINGS = (1, 2, 4)
 #: Patches are no remedy if more than this share of the triangles fold.
-MOST_FOLDED = 0.03
+MOST_FOLDED = 0.01
+#: Circles as exact as this, and as far apart, do not meet.
+ROUND = 1e-6
+#: A repaired map with a mean angle error above so many degrees is compared with the last resort.
+POOR = 10.0
 
 
 def valid_with_holes(
@@ -63,19 +70,23 @@ def valid_with_holes(
         map, ``last_resort`` has ``opened_holes``, their number.
 
     """
-    folded = flipped_triangles(mesh, own)
+    with phase("folds"):
+        folded = flipped_triangles(mesh, own)
+        turned = _with_ears_turned(mesh, loops[1:], own) if folded and repair else own
     last_resort = last_resort and repair
     in_patches = folded <= MOST_FOLDED * mesh.m or not last_resort
-    repaired, extras = accepted_repair(mesh, own, repair=repair and in_patches)
+    repaired, extras = accepted_repair(mesh, turned, repair=repair and in_patches)
+    extras["folded_before_repair"] = folded
     if not last_resort or not (folded or _cross(own, loops)):
         return repaired, extras
     extras["before_repair"] = figures(mesh, own, folded)
-    try:
-        opened = opened_disk(mesh, loops[1:])
-    except MeshError:  # a fan has a triangle without area
-        return repaired, extras
     with phase("folds"):
-        if _cost(mesh, loops, opened) < _cost(mesh, loops, repaired):
+        cost = _cost(mesh, loops, repaired)
+    if cost < (0, False, POOR):
+        return repaired, extras
+    opened = opened_disk(mesh, loops[1:])
+    with phase("folds"):
+        if _cost(mesh, loops, opened) < cost:
             return opened, extras | {"last_resort": {"opened_holes": len(loops) - 1}}
     return repaired, extras
 
@@ -93,13 +104,8 @@ def opened_disk(mesh: HoledMesh, holes: Sequence[Loop]) -> Complex:
     Returns
     -------
     complex (n,)
-        The map. It has folds if an edge inside the surface joins two vertices of a hole; such a
-        surface has no map without.
-
-    Raises
-    ------
-    MeshError
-        A fan has a triangle without area.
+        The map. A hole keeps its polygon where a circle leaves folds, as it does where an edge
+        inside the surface joins two of the hole's vertices.
 
     Examples
     --------
@@ -111,17 +117,32 @@ def opened_disk(mesh: HoledMesh, holes: Sequence[Loop]) -> Complex:
 
     """
     disk = direct_cem(filled(mesh, holes)).uv
-    maps = []
-    for share in SHARES:
+    of = _holes_of(mesh, holes)
+    graph = vertex_graph(mesh.F, mesh.n)
+    tries = np.zeros(len(holes), dtype=np.int64)
+    while True:
         z = disk[: mesh.n].copy()
-        for centre, hole in zip(disk[mesh.n :], holes, strict=True):
-            spokes = z[hole] - centre
-            z[hole] = centre + share * _room(spokes) * spokes / np.abs(spokes)
-        z, _ = interior_without_folds(mesh, z)
-        maps.append((flipped_triangles(mesh, z), z))
-        if not maps[-1][0]:
-            break
-    return min(maps, key=lambda one: one[0])[1]
+        for centre, hole, share in zip(disk[mesh.n :], holes, SHARES[tries], strict=True):
+            if share:
+                spokes = z[hole] - centre
+                z[hole] = centre + share * _room(spokes) * spokes / np.abs(spokes)
+        z = _with_ears_turned(mesh, [holes[k] for k in np.flatnonzero(SHARES[tries]).tolist()], z)
+        z, _ = interior_without_folds(mesh, z, RINGS)
+        near = np.zeros(mesh.n)
+        near[mesh.F[folded_triangles(z, mesh.F)]] = 1
+        concerned = np.unique(of[(near + graph @ near > 0) & (of >= 0)])
+        concerned = concerned[tries[concerned] < len(SHARES) - 1]
+        if not len(concerned):
+            return z
+        tries[concerned] += 1
+
+
+def _holes_of(mesh: HoledMesh, holes: Sequence[Loop]) -> Loop:
+    """Return which hole each vertex is on, (n,); -1 for none."""
+    of = np.full(mesh.n, -1)
+    for k, hole in enumerate(holes):
+        of[hole] = k
+    return of
 
 
 def _room(spokes: Complex) -> float:
@@ -131,9 +152,39 @@ def _room(spokes: Complex) -> float:
     return float(np.abs(spokes + nearest * sides).min())
 
 
+def _with_ears_turned(mesh: HoledMesh, holes: Sequence[Loop], z: Complex) -> Complex:
+    """Mirror the tips of triangles with two sides on a hole in their third side.
+
+    A triangle with all corners on a hole's circle lies inside it; its tip must leave the circle.
+    """
+    of = _holes_of(mesh, holes)
+    corners = of[mesh.F]
+    all_on_one = (corners[:, 0] >= 0) & (np.ptp(corners, axis=1) == 0)
+    turned = z.copy()
+    for triangle in mesh.F[all_on_one]:
+        loop = holes[of[triangle[0]]]
+        place = {int(v): int(np.flatnonzero(loop == v)[0]) for v in triangle}
+        for k in range(3):
+            tip, a, b = (int(triangle[(k + d) % 3]) for d in range(3))
+            steps = {(place[v] - place[tip]) % len(loop) for v in (a, b)}
+            if steps == {1, len(loop) - 1} and len(loop) > 3:
+                side = z[b] - z[a]
+                turned[tip] = z[a] + side * np.conj((z[tip] - z[a]) / side)
+    return turned if len(folded_triangles(turned, mesh.F)) < len(folded_triangles(z, mesh.F)) else z
+
+
 def _cross(z: Complex, loops: Sequence[Loop]) -> bool:
-    """Whether boundaries meet each other in the image."""
-    return crossing_polygons([z[loop] for loop in loops]) is not None
+    """Whether boundaries meet each other or themselves in the image."""
+    outer, *holes = (z[loop] for loop in loops)
+    fitted = [fitted_circle(hole) for hole in holes]
+    c, r = np.array([c for c, _ in fitted]), np.array([r for _, r in fitted])
+    nearest = np.cos(np.abs(np.angle(np.roll(outer, -1) / outer)).max() / 2)
+    gaps = np.abs(c[:, None] - c) - (r[:, None] + r)
+    np.fill_diagonal(gaps, nearest - np.abs(c) - r)
+    off = [np.abs(np.abs(hole - c[k]) / r[k] - 1).max() for k, hole in enumerate(holes)]
+    if max(off) < ROUND and (gaps > ROUND).all():
+        return False
+    return crossing_polygons([outer, *holes]) is not None
 
 
 def _cost(mesh: HoledMesh, loops: Sequence[Loop], z: Complex) -> tuple[int, bool, float]:

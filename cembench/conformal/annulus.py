@@ -18,12 +18,19 @@ from cembench.conformal.folds import in_order
 from cembench.conformal.harmonic import HarmonicExtension
 from cembench.conformal.laplacian import laplacian
 from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.triangle_mesh import HoledMesh
 
 Complex = NDArray[np.complex128]
 Loop = NDArray[np.int64]
+
+#: Doubles hold the annulus with radii 1 and exp(-DEEPEST), and areas of triangles near the hole by
+#: exact arithmetic.
+DEEPEST = 700.0
+#: An arc, in radians, above which the polygon of a boundary may not go around the centre.
+WIDEST = 0.9 * np.pi
 
 
 def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
@@ -44,7 +51,8 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     Raises
     ------
     AlgorithmFailed
-        A boundary does not go around its circle once.
+        A boundary does not go around its circle once, or the hole would be smaller than doubles
+        hold.
 
     Examples
     --------
@@ -58,7 +66,8 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     """
     with phase("boundary"):
         cut = cut_open(mesh)
-        jump = 2 * np.pi * _across(cut, outer, hole)
+        paths = _rims(cut, outer, hole)
+        jump = 2 * np.pi * _bank(cut, paths)
     L_cut = laplacian(cut.mesh, delaunay=True)
     with phase("assembly"):
         copies = np.arange(cut.mesh.n)
@@ -71,24 +80,54 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     u = extension(on_hole)
     v = np.zeros(mesh.n)
     v[others] = Cholesky(L[others][:, others]).solve(-(glue.T @ (L_cut @ jump))[others])
-    circles = np.exp(1j * v)
-    ordered = np.concatenate([in_order(circles[outer]), in_order(circles[hole].conj()).conj()])
-    moved = np.angle(ordered / circles[b])
+    lifted = v[cut.origin] + jump
+    goals = _increasing(lifted[paths[0]]), -_increasing(-lifted[paths[1]])
+    moved = np.concatenate(goals) - np.concatenate([lifted[path[:-1]] for path in paths])
     if np.abs(moved).max() > 0:
-        v += extension(moved)
+        at = np.concatenate([cut.origin[path[:-1]] for path in paths])
+        by_vertex = np.zeros(mesh.n)
+        by_vertex[at] = moved
+        v += extension(by_vertex[b])
     modulus = 2 * np.pi / (u @ (L @ u))
+    if not modulus < DEEPEST:
+        raise AlgorithmFailed(
+            f"the hole's radius would be exp(-{modulus:.0f}), below what doubles hold: map the "
+            "surface with a free boundary"
+        )
     image: Complex = np.exp(-modulus * u + 1j * v)
     return image
 
 
-def _across(cut: Cut, outer: Loop, hole: Loop) -> NDArray[np.float64]:
+def _rims(cut: Cut, outer: Loop, hole: Loop) -> tuple[Loop, Loop]:
+    """Return the boundaries on a cut annulus, each from one bank of the cut to the other."""
+    b = cut.mesh.boundary
+    on_outer = np.isin(cut.origin[b], outer)
+    begins = int(np.flatnonzero(on_outer & ~np.roll(on_outer, 1))[0])
+    b = np.roll(b, -begins)
+    on_hole = np.flatnonzero(np.isin(cut.origin[b], hole))
+    return b[: len(outer) + 1], b[on_hole[0] : on_hole[0] + len(hole) + 1]
+
+
+def _bank(cut: Cut, paths: tuple[Loop, Loop]) -> NDArray[np.float64]:
     """Return 1 for the vertices of a cut annulus on the bank after a turn, 0 for all others."""
     b = cut.mesh.boundary
-    along = cut.origin[b]
-    on_outer, on_hole = np.isin(along, outer), np.isin(along, hole)
-    begins = int(np.flatnonzero(on_outer & ~np.roll(on_outer, 1))[0])
-    b, on_outer, on_hole = (np.roll(part, -begins) for part in (b, on_outer, on_hole))
-    bank = b[np.flatnonzero(on_outer)[-1] : np.flatnonzero(on_hole)[0] + 1]
+    b = np.roll(b, -int(np.flatnonzero(b == paths[0][-1])[0]))
     after = np.zeros(cut.mesh.n)
-    after[bank] = 1
+    after[b[: int(np.flatnonzero(b == paths[1][0])[0]) + 1]] = 1
     return after
+
+
+def _increasing(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the nearest angles (k,) in order, for the vertices of a circle; the last closes it.
+
+    They are evenly spaced where neighbours would be so far apart that the polygon misses the
+    centre.
+    """
+    arcs = np.diff(angles)
+    if arcs.max() > WIDEST:
+        return angles[0] + np.arange(len(arcs)) * 2 * np.pi / len(arcs)
+    if arcs.min() > 0:
+        return angles[:-1]
+    circle = np.exp(1j * angles[:-1])
+    moved: NDArray[np.float64] = np.angle(in_order(circle) / circle)
+    return angles[:-1] + moved
