@@ -3,29 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.conformal.annulus import annulus_map
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_energy import EnergyModel, in_gauge, minimise
 from cembench.conformal.circle_domain import CircleDomain
-from cembench.conformal.filled_start import widest_start
-from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.filled_start import CROWDED, widest_start
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
-from cembench.conformal.metrics import SampledAngleError
+from cembench.conformal.metrics import SampledAngleError, dirichlet_energy, image_area
 from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import algorithm
 
 from .gauge_walk import STEPS, gauge_walk
+from .opened import valid_with_holes
 
 Complex = NDArray[np.complex128]
+Loop = NDArray[np.int64]
 
 #: Largest relative increase of E_C for giving crowded arcs the proportions of the start.
 MOST_COST = 0.01
@@ -46,6 +50,7 @@ def direct_cem_holes(
     outer: Annotated[int, Field(ge=0, lt=2**63)] | None = None,
     delaunay: bool = False,
     repair: bool = True,
+    last_resort: bool = True,
 ) -> Parameterization:
     """Map a surface with holes to the circle domain of least conformal energy.
 
@@ -61,11 +66,14 @@ def direct_cem_holes(
     energy history is that of this domain), and a Moebius map then brings the outer boundary
     outside. Arcs below a hundredth of the mean arc, which hardly change the energy, take the
     proportions of the start's if that has better angles and raises E_C by at most 1 % (`settled`).
-    Folds are repaired with the boundary fixed (`fold_repairs`).
+    A surface with one hole whose radius stays below 1e-3 is mapped by its logarithm (`stopped`:
+    "annulus"), since E_C in the disk does not see the far end of a tube. Folds are repaired with
+    the boundary fixed (`fold_repairs`); `last_resort` replaces a map that folds all the same by one
+    of the filled surface, with circles cut out of it.
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):
-        widest, holes = mesh.outer_and_holes(outer)
+        widest, holes = mesh.outer_and_holes(_only_loop_with_ears(mesh) if outer is None else outer)
     bordered = BorderedLaplacian(mesh, L, (widest, *holes))
     S = bordered.dirichlet_to_neumann()
     with phase("start"):
@@ -74,6 +82,9 @@ def direct_cem_holes(
     with phase("start"):
         lengths = [edge_lengths(mesh, loop) for loop in (widest, *holes)]
         start = widest_start(S, seen, lengths)
+    if len(holes) == 1 and start.radii.min() < CROWDED:
+        with suppress(AlgorithmFailed):  # too few vertices to go around a circle
+            return _annulus(mesh, widest, holes[0], repair, last_resort)
     chart = start.rims.outer
     start = start if chart else in_gauge(start, weights)
     held = weights if gauge == "triangle" and not chart else start.outer_measure
@@ -86,7 +97,7 @@ def direct_cem_holes(
     steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
     uv, walked = gauge_walk(here, bordered.harmonic_extension, angle_error, steps)
     energies += () if chart else walked
-    uv, folds = accepted_repair(mesh, uv, repair=repair)
+    uv, folds = valid_with_holes(mesh, (widest, *holes), uv, repair=repair, last_resort=last_resort)
     extras = {
         "stopped": found.reason,
         "gradient": None if found.reason == "crowded" else found.gradient,
@@ -98,6 +109,30 @@ def direct_cem_holes(
         **folds,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
+
+
+def _only_loop_with_ears(mesh: HoledMesh) -> int | None:
+    """Return a vertex of the one loop that has triangles with all corners on it; None for others.
+
+    Such a triangle lies inside a circle, so it folds at a hole.
+    """
+    of = np.full(mesh.n, -1)
+    for k, loop in enumerate(mesh.loops):
+        of[loop] = k
+    corners = of[mesh.F]
+    alike = (corners[:, 0] >= 0) & (np.ptp(corners, axis=1) == 0)
+    found = np.unique(corners[alike, 0])
+    return int(mesh.loops[int(found[0])][0]) if len(found) == 1 else None
+
+
+def _annulus(
+    mesh: HoledMesh, outer: Loop, hole: Loop, repair: bool, last_resort: bool
+) -> Parameterization:
+    """Return the map of a surface with one hole by its logarithm."""
+    own = annulus_map(mesh, outer, hole)
+    uv, folds = valid_with_holes(mesh, (outer, hole), own, repair=repair, last_resort=last_resort)
+    energy = dirichlet_energy(mesh, uv) - image_area(mesh, uv)
+    return Parameterization(uv, 0, (energy,), {"stopped": "annulus", **folds})
 
 
 def _settled(

@@ -170,6 +170,8 @@ def _tried(here: EnergyModel, step: Real) -> EnergyModel | None:
     """Return the model after a step, or None if circles meet or the gauge is lost."""
     domain = here.moved(step)
     if not domain.apart:
+        domain = domain.apart_from(here.domain)
+    if not domain.apart:
         return None
     try:
         return here.at(in_gauge(domain, here.weights))

@@ -25,6 +25,8 @@ LEAST_SHARE = 0.1
 #: Arcs below this share of the mean arc are crowded: they hardly change the energy, and the inexact
 #: steps of a minimiser leave them to chance.
 RESOLVED = 1e-2
+#: Share of the room between circles that a step leaves at least.
+KEPT = 0.1
 #: A half chord below this belongs to a vanishing arc or to nearly the whole circle; the latter only
 #: if the arc was longer than a radian before.
 _ROUNDING, _WIDE = 1e-9, 1.0
@@ -170,6 +172,24 @@ class CircleDomain:
         between = np.abs(c[:, None] - c) - (r[:, None] + r)
         np.fill_diagonal(between, np.inf)
         return bool((np.abs(c) + r < 1).all() and (between > 0).all() and (r > 0).all())
+
+    def apart_from(self, before: CircleDomain) -> CircleDomain:
+        """Return the domain with smaller radii where circles meet that were apart before.
+
+        They keep a share :data:`KEPT` of the room that they had.
+        """
+        now, then = self._room(), before._room()
+        factors = np.where(now > 1, 1.0, now / (1 + KEPT * (then - 1))).min(axis=1, initial=1)
+        radii = self.radii.copy()
+        radii[self.rims.holes] *= factors
+        return replace(self, radii=radii)
+
+    def _room(self) -> Real:
+        """Return by which factors (h, h) pairs of circles can grow; on the diagonal, each alone."""
+        c, r = self.centres[self.rims.holes], self.radii[self.rims.holes]
+        room = np.abs(c[:, None] - c) / (r[:, None] + r)
+        np.fill_diagonal(room, (1 - np.abs(c)) / r)
+        return room
 
     def moved(self, along: Real, growth: Real, shift: Complex) -> CircleDomain:
         """Return the domain after a step in this direction.

@@ -27,6 +27,8 @@ Complex = NDArray[np.complex128]
 ROOM = 0.45
 #: If a circle is smaller than this, other loops are tried as the outer one.
 CROWDED = 1e-3
+#: Of more holes, which are tried takes longer than the map; so these many, of all sizes, are.
+ALL_TRIED, MOST_TRIED = 32, 8
 #: Minimal share of the mean arc for arcs of a disk that fills a hole: with shorter ones its energy
 #: suffers from cancellation, and a start does not depend on them.
 PATCH_SHARE = 1e-4
@@ -42,7 +44,13 @@ def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> 
     start = filled_start(S, seen, lengths, 0)
     if start.radii.min() >= CROWDED:
         return start
-    others = [filled_start(S, seen, lengths, k) for k in range(1, len(lengths))]
+    holes = np.argsort(start.radii[1:], kind="stable") + 1
+    holes = (
+        holes[np.linspace(0, len(holes) - 1, MOST_TRIED).round().astype(int)]
+        if len(holes) > ALL_TRIED
+        else holes
+    )
+    others = [filled_start(S, seen, lengths, k) for k in np.sort(holes).tolist()]
     return max((start, *others), key=lambda domain: domain.radii.min())
 
 

@@ -8,6 +8,8 @@ folds at the expense of its angles is useless.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -87,11 +89,13 @@ def without_folds(mesh: DiskMesh, L: scipy.sparse.csc_array, z: Complex) -> tupl
     return z, rounds + more
 
 
-def interior_without_folds(mesh: TriangleMesh, z: Complex) -> tuple[Complex, int]:
+def interior_without_folds(
+    mesh: TriangleMesh, z: Complex, rings: Sequence[int] = RINGS
+) -> tuple[Complex, int]:
     """Repair the interior of a map around its folds; the boundary stays.
 
     Vertices within a few rings of a fold are laid out again, with everything else fixed. If a fold
-    remains, they are put back and more rings are tried, up to the last entry of `RINGS`. Returns as
+    remains, they are put back and more rings are tried, up to the last of `rings`. Returns as
     :func:`without_folds`.
     """
     folded = _folded(mesh, z)
@@ -102,13 +106,13 @@ def interior_without_folds(mesh: TriangleMesh, z: Complex) -> tuple[Complex, int
         held = np.zeros(mesh.n, dtype=bool)
         held[np.concatenate(mesh.loops)] = True
         graph = vertex_graph(mesh.F, mesh.n)
-        for rings in RINGS:
+        for count in rings:
             folded = folded[~held[mesh.F[folded]].all(axis=1)]
             if not len(folded):
                 break
             near = np.zeros(mesh.n, dtype=bool)
             near[mesh.F[folded]] = True
-            for _ in range(rings):
+            for _ in range(count):
                 near |= graph @ near.astype(np.float64) > 0
             z = _accepted(mesh, z, *untangled(mesh, z, near & ~held, graph))
             folded = folded_triangles(z, mesh.F)

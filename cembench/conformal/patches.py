@@ -19,6 +19,8 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 Real = NDArray[np.float64]
 Loop = NDArray[np.int64]
 
+#: Height of a fan's triangle, as a share of its base, below which it has no area.
+SLIM = 1e-9
 #: Number of terms of the power series above rounding errors, for |x| <= pi.
 _TERMS = 28
 
@@ -34,16 +36,25 @@ def fan(loop: Loop, centre: int) -> NDArray[np.int64]:
 def filled(mesh: TriangleMesh, holes: Sequence[Loop]) -> DiskMesh:
     """Return the surface with each hole filled by a fan to its centroid; these vertices come last.
 
-    Raises
-    ------
-    MeshError
-        A fan has a triangle without area: the centroid lies on the rim.
-
+    Where a triangle of the fan would have no area, as in a slit, the centre is above the centroid
+    by the mean length of the hole's edges.
     """
-    centres = np.array([mesh.V[hole].mean(axis=0) for hole in holes]).reshape(-1, 3)
+    rims = [mesh.V[hole] for hole in holes]
+    centres = np.array([_centre(rim) for rim in rims]).reshape(-1, 3)
     fans = [fan(hole, mesh.n + k) for k, hole in enumerate(holes)]
     V, F = np.concatenate([mesh.V, centres]), np.concatenate([mesh.F, *fans])
-    return DiskMesh.from_arrays(V, F, name=mesh.name)
+    return DiskMesh.trusted(V, F, name=mesh.name)
+
+
+def _centre(rim: Real) -> Real:
+    """Return a point that sees the edges of a rim (k, 3) in triangles with an area."""
+    centre: Real = rim.mean(axis=0)
+    sides, spokes = np.roll(rim, -1, axis=0) - rim, rim - centre
+    heights = np.linalg.norm(np.cross(sides, spokes), axis=1)
+    if (heights > SLIM * (sides**2).sum(axis=1)).all():
+        return centre
+    off = np.linalg.svd(spokes)[2][-1]
+    return centre + np.linalg.norm(sides, axis=1).mean() * off
 
 
 def fan_patch(rim: Real) -> Real:

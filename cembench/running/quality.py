@@ -100,6 +100,14 @@ def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) ->
     own = f"failed ({failure})" if failure else f"has {folded:,} folds" if folded else "is crowded"
     before = extras.get("before_repair", {}).get("angle_error_mean_deg")
     cost = "" if before is None else f" instead of {before:.2f}"
+    if "opened_holes" in done:
+        crosses = f"has {folded:,} folds" if folded else "has boundaries that cross"
+        message = (
+            f"the method's own map {crosses}, so this one is its last resort: the surface was "
+            f"mapped with its holes filled, and {done['opened_holes']:,} circles were cut out of "
+            f"that map; the mean angle error is {error:.2f} degrees{cost}"
+        )
+        return [Notice(NoticeKind.LAST_RESORT, message)]
     message = (
         f"the method's own map {own}, so this one is its last resort: "
         f"{done['moved_boundary_vertices']:,} boundary vertices were moved, and mean value weights "

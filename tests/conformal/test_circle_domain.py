@@ -105,3 +105,14 @@ def test_circles_that_meet_or_leave_the_disk_are_seen():
     assert domain.apart
     assert not domain.moved(still, none, np.array([0, 0.5, 0])).apart
     assert not domain.moved(still, np.array([0, 0.15, 0.15]), none).apart
+
+
+def test_circles_that_a_step_makes_meet_shrink_until_they_have_room():
+    domain, still = ring_and_two_holes(), np.zeros(20)
+    for shift in (np.array([0, 0.15, 0.15]), np.array([0, -0.1, 0.1])):
+        there = domain.moved(still, np.array([0, 0.2, 0.2]), shift)
+        if not there.apart:
+            pulled = there.apart_from(domain)
+            assert pulled.apart
+            assert (pulled.centres == there.centres).all()
+    assert domain.apart_from(domain).radii == pytest.approx(domain.radii)
