@@ -16,7 +16,7 @@ _REMEDY = (
     "bff-program",
     title="BFF",
     target="free boundary",
-    command="bff-command-line {input} {output}",
+    command="bff-command-line {input} {output} --scaling=1e6",
     source=_SOURCE,
     remedy=_REMEDY,
 )
@@ -31,10 +31,10 @@ def bff(mesh: DiskMesh) -> None:
     "bff-program-disk",
     title="BFF to the disk",
     target="disk",
-    command="bff-command-line {input} {output} --flattenToDisk",
+    command="bff-command-line {input} {output} --flattenToDisk --scaling=1e6",
     source=_SOURCE,
     remedy=_REMEDY,
-    circle=1e-5,
+    circle=1e-3,
     fit=True,
 )
 def bff_disk(mesh: DiskMesh) -> None:

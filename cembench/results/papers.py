@@ -136,6 +136,8 @@ class PrintedTable(_Part):
     by_policy: bool = False
     #: Whether it compares the other algorithms with the reference; then it ends with averages.
     compares: bool = False
+    #: The addresses at which its cells are printed.
+    sources: tuple[str, ...] = ()
 
 
 class Erratum(_Part):
@@ -237,6 +239,8 @@ class Paper(_Part):
     rate: str = "the rate of speedup, t / t_reference - 1"
     #: Averages in its text, by what is averaged and by algorithm.
     stated: Mapping[Literal["rate", "saving"], Mapping[str, float]] = {}
+    #: Models that are registered surfaces, at the printed number of triangles, or public meshes.
+    surfaces: Mapping[str, str] = {}
     pictures: tuple[Picture, ...] = ()
     plots: Mapping[str, PlottedFigure] = {}
     exhibits: tuple[ExpectedExhibit, ...] = ()
@@ -284,6 +288,11 @@ class Paper(_Part):
     def faces(self, model: str) -> int:
         """Return the number of triangles of a model."""
         return self.count(model, "faces")
+
+    def model_of(self, surface: str, faces: int) -> str:
+        """Return the model that a surface of this name and size is by `surfaces`, or ""."""
+        named = (model for model, name in self.surfaces.items() if name == surface)
+        return next((model for model in named if self.faces(model) == faces), "")
 
     def plotted(self, plot: str) -> PlottedFigure:
         """Return the figure that is plotted in this way; an empty one if there is none."""
@@ -431,7 +440,7 @@ def _check(paper: Paper) -> None:
         if column not in paper.tables.get(number, {}).get(model, {}):
             what = f"table {number} has no cell {column!r} of {model!r}"
             raise _wrong(paper.folder / "tables.toml", "errata", what)
-    named = [picture.model for picture in paper.pictures]
+    named = [*paper.surfaces, *(picture.model for picture in paper.pictures)]
     named += [model for one in paper.plots.values() for model in one.models]
     named += [model for one in paper.runs for model in one.models]
     named += [model for one in paper.exhibits for model in one.models]
@@ -588,8 +597,12 @@ def find_paper(named: str) -> Paper:
 
 
 def usual_paper() -> Paper:
-    """Return the paper that profiles and reports are of where no other is named."""
-    return next(iter(papers().values()), NO_PAPER)
+    """Return the paper that profiles and reports are of where no other is named.
+
+    It is the first that has ``[profiles]``.
+    """
+    known = sorted(papers().values(), key=lambda paper: "profiles" not in paper.model_fields_set)
+    return next(iter(known), NO_PAPER)
 
 
 def paper_of(model: str) -> Paper:

@@ -5,7 +5,7 @@
 function uv = tutte(V, F)
   n = size(V, 1);
   H = sparse(F, F(:, [2 3 1]), 1, n, n);      % the directed edges
-  [from, to] = find(H & ~H');                 % those without a twin: the boundary
+  [from, to] = find(H > H');                 % those without a twin: the boundary
   next = zeros(n, 1);  next(from) = to;
   loop = from(1);
   while next(loop(end)) ~= loop(1), loop(end + 1) = next(loop(end)); end

@@ -123,7 +123,7 @@ class Evidence:
         exhibits = tuple(read_exhibits(run))
         older = {record.cell.key for record in records} - {record.cell.key for record in kept}
         found = cls(store, tuple(kept), exhibits, frozenset(older), paper)
-        if paper is not None and not found.models:
+        if paper is not None and paper.models and not found.models:
             raise RecordError(
                 f"no surface of {run} is, or stands in for, a model of {paper.title!r}; its models "
                 f"are {', '.join(paper.models)}. Ask for another paper, or for none."
@@ -246,10 +246,18 @@ class Evidence:
     @cached_property
     def surfaces(self) -> tuple[MeasuredSurface, ...]:
         """The paper's models in the paper's order, then other surfaces by size."""
+        from cembench.registry import load_registry
+
         order = self.paper.models
+        public = {one.mesh_hash: one.name for one in load_registry().datasets.values()}
         found: dict[str, MeasuredSurface] = {}
         for record in self.records:
             facts = record.mesh
+            name = public.get(record.cell.mesh_hash, record.cell.mesh)
+            row, origin = facts.paper_row, facts.origin
+            if row not in order:
+                row = self.paper.model_of(name, facts.faces)
+                origin = "model" if row else "surface"
             found[record.cell.mesh_hash] = MeasuredSurface(
                 name=record.cell.mesh,
                 mesh_hash=record.cell.mesh_hash,
@@ -257,8 +265,8 @@ class Evidence:
                 faces=facts.faces,
                 boundary_vertices=facts.boundary_vertices,
                 non_delaunay_share=facts.non_delaunay_share,
-                paper_row=facts.paper_row if facts.paper_row in order else "",
-                origin=facts.origin if facts.paper_row in order else "surface",
+                paper_row=row,
+                origin=origin,
                 family=family_of(record),
             )
 

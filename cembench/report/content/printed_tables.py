@@ -40,14 +40,15 @@ def printed_table(evidence: Evidence, number: int, policy: str | None) -> list[T
     footers = READINGS if table.compares else ()
     disks = evidence.disk_series
     tables = []
-    if evidence.models:
+    if evidence.models and table.figures:
         own = [q for a in shown for q in _quantities(evidence, number, evidence.series_of(a), a)]
         absent = ", ".join(absent_models(evidence))
         here = f" Here {POLICIES.get(policy, policy)}." if policy else ""
         tables.append(
             table_beside(
                 evidence, name, f"Table {number}: {table.title}{add}", evidence.models, own,
-                policy=policy, caption=table.caption + here, footers=footers, notes=table.notes,
+                policy=policy, caption=table.caption + here, footers=footers,
+                notes=(*table.notes, *(f"printed at {place}" for place in table.sources)),
                 absent=f"not in this run: {absent}" if absent else "",
             )
         )  # fmt: skip
@@ -60,7 +61,7 @@ def printed_table(evidence: Evidence, number: int, policy: str | None) -> list[T
                     evidence.models, more, policy=policy, footers=footers,
                 )
             )  # fmt: skip
-    if evidence.others:
+    if evidence.others and table.figures:
         left_out = set(paper.algorithms) - set(shown)
         series = [s for s in disks if s.algorithm not in left_out]
         tables.append(

@@ -242,9 +242,11 @@ def _paper_summary(run: _Run) -> Section:
     return Section("summary", "What this is", tuple(items))
 
 
-def _tables(run: _Run) -> Section:
+def _tables(run: _Run) -> Section | None:
     """Return the paper's tables, each comparison of seconds with its averages and certainty."""
     evidence, printed = run.evidence, run.evidence.paper.printed
+    if not printed:
+        return None
     items: list[Item] = []
     for number in sorted(printed):
         if printed[number].compares:

@@ -425,7 +425,7 @@ def environment() -> jinja2.Environment:
 
 
 def _prose(words: str) -> Markup:
-    """Return a report's text as HTML: `code` between backticks, symbols such as E_C."""
+    """Return a report's text as HTML: `code` between backticks, symbols such as E_C, links."""
     text, *rest = re.split(r"`([^`\n]+)`", words)
     pairs = zip(rest[::2], rest[1::2], strict=True)
     return _symbols(text) + Markup("").join(
@@ -435,7 +435,8 @@ def _prose(words: str) -> Markup:
 
 def _symbols(words: str) -> Markup:
     symbol = re.compile(r"\b([A-Za-z])_([A-Z]+)\b")
-    return Markup(symbol.sub(r"<i>\1</i><sub>\2</sub>", str(escape(words))))
+    text = re.sub(r"(https://[^\s<>]*[\w/])", r'<a href="\1">\1</a>', str(escape(words)))
+    return Markup(symbol.sub(r"<i>\1</i><sub>\2</sub>", text))
 
 
 def policy(scripts: Sequence[bytes]) -> str:

@@ -1,0 +1,3 @@
+function t = TriRep(F, varargin)
+  t = struct('F', F);
+end

@@ -1,0 +1,3 @@
+function o = optimoptions(varargin)
+  o = struct(varargin{2:end});
+end

@@ -1,0 +1,1 @@
+"""OpenABF's benchmarks of angle based flattening on surfaces by formula."""
