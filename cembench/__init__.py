@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from cembench.api.parameterize_many import parameterize_many
     from cembench.api.repair import Repair, repair
     from cembench.api.reproduce import Reproduction, reproduce
+    from cembench.api.submissions import Submission, check_submissions, submit
     from cembench.api.theory import theory
     from cembench.api.validate import validate
     from cembench.core.errors import (
@@ -87,6 +88,7 @@ _PLACES = {
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
+    "cembench.api.submissions": ("Submission", "check_submissions", "submit"),
     "cembench.api.theory": ("theory",),
     "cembench.api.validate": ("validate",),
 }
@@ -114,11 +116,13 @@ __all__ = [
     "Reproduction",
     "Result",
     "Run",
+    "Submission",
     "TriangleMesh",
     "__version__",
     "algorithm",
     "benchmark",
     "catalogue",
+    "check_submissions",
     "cut",
     "external_program",
     "holes",
@@ -132,6 +136,7 @@ __all__ = [
     "read_mesh",
     "repair",
     "reproduce",
+    "submit",
     "surface",
     "surface_family",
     "theory",

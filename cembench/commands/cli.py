@@ -26,6 +26,7 @@ from cembench.commands import report as report_verbs
 from cembench.commands import reproduce as reproduce_verbs
 from cembench.commands import run as run_verbs
 from cembench.commands import sign as sign_verbs
+from cembench.commands import submit as submit_verbs
 from cembench.commands import theory as theory_verbs
 from cembench.commands import validate as validate_verbs
 from cembench.commands.console import SHOWN, Json, err, out, print_json
@@ -143,6 +144,7 @@ _MORE = (
     report_verbs,
     publish_verbs,
     sign_verbs,
+    submit_verbs,
     validate_verbs,
     holes_verbs,
     theory_verbs,

@@ -35,14 +35,17 @@ def sign(
     out.print(f"signed: {signed(run, key.expanduser())}", soft_wrap=True)
 
 
-def check_signed(runs: Iterable[Path], signers: Path | None) -> None:
-    """Raise if a run is not signed as ``--require-signed`` asks; print who signed each."""
+def check_signed(runs: Iterable[Path], signers: Path | None) -> dict[Path, str]:
+    """Return who signed each run, and print it; raise if one is not as ``--require-signed`` asks.
+
+    Without that, nothing is known.
+    """
     from cembench.results.signing import signer
 
-    if signers is not None:
-        for run in runs:
-            told = f"{run}: signed by {signer(run, signers)}"
-            err.print(told, markup=False, style="dim", soft_wrap=True)
+    found = {} if signers is None else {run: signer(run, signers) for run in runs}
+    for run, name in found.items():
+        err.print(f"{run}: signed by {name}", markup=False, style="dim", soft_wrap=True)
+    return found
 
 
 #: Each verb with the examples that its help shows.
