@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 # Holds what `make reproduce` needs; an environment that is ready holds it too.
 LIGHT  := $(VENV)/ready-to-reproduce
 
-.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels fuzz clean
+.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels fuzz stale refresh release-check test-matrix clean
 
 reproduce: $(LIGHT)
 	$(BIN)/cembench reproduce
@@ -38,6 +38,14 @@ bench: $(READY)
 
 bench-kernels: $(READY)
 	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
+
+# Fails while a kept report or a table of a page is older than the code it depends on; reports/README.md lists them.
+stale: $(READY)
+	$(BIN)/python -m benchmarks stale --check
+
+# What makes them again, and how long that took.
+refresh: $(READY)
+	$(BIN)/python -m benchmarks stale --refresh
 
 # Hours where nothing limits it; goes on where it was ended. FUZZ="--seconds 600 --seed 2" and the like.
 fuzz: $(READY)
