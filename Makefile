@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 # Holds what `make reproduce` needs; an environment that is ready holds it too.
 LIGHT  := $(VENV)/ready-to-reproduce
 
-.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels fuzz clean
+.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels fuzz stale refresh release-check test-matrix pins clean
 
 reproduce: $(LIGHT)
 	$(BIN)/cembench reproduce
@@ -38,6 +38,27 @@ bench: $(READY)
 
 bench-kernels: $(READY)
 	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
+
+# Fails while a kept report or a table of a page is older than the code it depends on; reports/README.md lists them.
+stale: $(READY)
+	$(BIN)/python -m benchmarks stale --check
+
+# What makes them again, and how long that took.
+refresh: $(READY)
+	$(BIN)/python -m benchmarks stale --refresh
+
+# Wheel and sdist, built and tried in an environment of their own.
+release-check: $(READY)
+	$(BIN)/python .ci/release_check.py
+
+# The tests under each Python that is installed here, and under the lowest versions of all libraries.
+test-matrix: $(READY)
+	$(BIN)/python .ci/test_matrix.py
+
+# What the kept reports were measured with, each file with its hash; `pip install --require-hashes -r` takes it.
+pins: $(READY)
+	UV_CUSTOM_COMPILE_COMMAND="make pins" $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes \
+	  --extra fetch --extra report --extra standins --constraint requirements/kept.in pyproject.toml --output-file requirements/kept.txt
 
 # Hours where nothing limits it; goes on where it was ended. FUZZ="--seconds 600 --seed 2" and the like.
 fuzz: $(READY)

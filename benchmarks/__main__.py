@@ -6,16 +6,20 @@ import argparse
 import ast
 import inspect
 import os
+import shlex
 import sys
 import types
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from io import StringIO
 from pathlib import Path
+from time import perf_counter
 from typing import Any, Literal, get_args, get_origin
 
 from benchmarks.measuring import for_measuring
+from benchmarks.origins import record
 from benchmarks.pages import Section, Table
+from benchmarks.stale import PAGE as STATES
 from cembench.core.atomic import write_text
 
 HERE = Path(__file__).parent
@@ -85,7 +89,9 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--save", type=Path, metavar="FOLDER", help="write tables as CSV, pictures")
     asked = vars(parser.parse_args(arguments[1:]))
     write_docs, folder = asked.pop("write_docs"), asked.pop("save")
+    started = perf_counter()
     result = study(**asked)
+    seconds = perf_counter() - started
     sections = [result] if isinstance(result, Section) else list(result)
     print("\n\n".join(map(str, sections)))
     if folder:
@@ -93,6 +99,9 @@ def main(arguments: Sequence[str]) -> None:
         write_tables(sections, folder)
     for section in sections if write_docs else ():
         section.write(name)
+        if section.page and section.page != STATES:
+            given = shlex.join(["python", "-m", "benchmarks", *arguments])
+            record(f"{section.page} {name}", f"benchmarks/{name}.py", given, seconds)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.origins import MEASURING, record
 from benchmarks.pages import ROOT, Section, Table
 from cembench.core.atomic import write_text
 
@@ -38,7 +39,7 @@ def short_records(text: str) -> str:
     return lines.getvalue()
 
 
-def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = ()) -> Section:
+def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: str = "") -> Section:
     """Shorten a report to what the repository keeps: page, plots, tables and records.
 
         cembench run ... -o results/real
@@ -48,7 +49,7 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = ()) -> Sec
     Pages and pictures of every surface, and every figure in three forms, make a clone heavy;
     `cembench report` makes them again from a run. Records are kept without their histories and
     phases. The folder is replaced if it holds a report. A folder of `hide`, one that others do not
-    have, is named by its last part.
+    have, is named by its last part. `run` is the command that measured it, for `make refresh`.
     """
     folder = folder.absolute()
     name = folder.relative_to(ROOT) if folder.is_relative_to(ROOT) else folder
@@ -70,6 +71,9 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = ()) -> Sec
                 shown = shown.replace(str(path), path.name)
             if shown != text:
                 write_text(file, shown)
+    if folder.is_relative_to(ROOT):
+        commits = re.findall(r"commit ([0-9a-f]{7,40})", page)
+        record(name.as_posix(), MEASURING, run, None, commits[-1] if commits else "")
     files = [file for file in sorted(folder.rglob("*")) if file.is_file()]
     rows = [{"file": file.relative_to(folder), "bytes": file.stat().st_size} for file in files]
     return Section([Table(rows, "| file | bytes |\n|---|---:|\n| {file} | {bytes:,} |")])

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from cembench.api.parameterize_many import parameterize_many
     from cembench.api.repair import Repair, repair
     from cembench.api.reproduce import Reproduction, reproduce
+    from cembench.api.submissions import Submission, check_submissions, submit
     from cembench.api.theory import theory
     from cembench.api.validate import validate
     from cembench.core.errors import (
@@ -90,6 +91,7 @@ _PLACES = {
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
+    "cembench.api.submissions": ("Submission", "check_submissions", "submit"),
     "cembench.api.theory": ("theory",),
     "cembench.api.validate": ("validate",),
 }
@@ -118,11 +120,13 @@ __all__ = [
     "Reproduction",
     "Result",
     "Run",
+    "Submission",
     "TriangleMesh",
     "__version__",
     "algorithm",
     "benchmark",
     "catalogue",
+    "check_submissions",
     "cut",
     "external_program",
     "fetch",
@@ -137,6 +141,7 @@ __all__ = [
     "read_mesh",
     "repair",
     "reproduce",
+    "submit",
     "surface",
     "surface_family",
     "theory",

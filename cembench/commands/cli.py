@@ -13,7 +13,7 @@ from cembench.commands.exit_codes import ending
 
 #: The modules that add commands to the application, in the order of the help.
 MODULES = (
-    *("catalogue", "map", "benchmark", "reproduce", "report", "run"),
+    *("catalogue", "map", "benchmark", "reproduce", "report", "run", "submit"),
     *("validate", "peers", "holes", "theory", "morph", "fetch", "repair", "cut"),
 )
 for _name in MODULES:

@@ -1,4 +1,4 @@
-"""The commands on existing runs: status, show, compare, merge, export, publish and sign."""
+"""The commands on existing runs: status, show, compare, merge and export."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.app import app
-from cembench.commands.console import Json, err, fail, note, out, print_json, print_pair, warn
-from cembench.commands.options import DEFAULT_RUN, Run, Verify
+from cembench.commands.console import Json, fail, note, out, print_json, print_pair, warn
+from cembench.commands.options import DEFAULT_RUN, RequireSigned, Run, Verify
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.overwriting import refuse_inputs
 from cembench.report.export_format import Format
@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from cembench.results.merging import Conflict
     from cembench.results.records import Cell, Record
     from cembench.results.store import Store
-
-RequireSigned = Annotated[
-    Path | None,
-    typer.Option(
-        "--require-signed",
-        metavar="SIGNERS",
-        help="Refuse runs not signed by somebody in this file (ssh-keygen: ALLOWED SIGNERS).",
-    ),
-]
 
 
 @app.command(epilog="Example:  cembench status results/run")
@@ -258,6 +249,7 @@ def merge(
     """
     from dataclasses import asdict
 
+    from cembench.commands.submit import check_signed
     from cembench.results.machines import machine_of
     from cembench.results.merging import merge as merged
     from cembench.results.store import Store
@@ -366,62 +358,3 @@ def _chosen(records: list[Record], wanted: str) -> list[Record]:
         known = ", ".join(dict.fromkeys(f"{r.cell.mesh}/{r.cell.algorithm}" for r in records))
         raise RecordError(f"no cell {wanted!r} in this run; it holds: {known or 'nothing'}.")
     return found
-
-
-@app.command(epilog="Example:  cembench publish results/may results/june -o site")
-def publish(
-    runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
-    *,
-    output: Annotated[Path, typer.Option("-o", "--output", help="Where the site goes.")],
-    require_signed: RequireSigned = None,
-    as_json: Json = False,
-) -> None:
-    """Write a static site of several runs: index, machines, ratios over time, reports.
-
-    It needs no network and no server: open index.html, or put the folder on a web server.
-    """
-    from dataclasses import asdict
-
-    from cembench.report.site import publish as write_site
-    from cembench.results.store import Store
-    from cembench.results.verify import Depth, sound_records
-
-    refuse_inputs(output, runs, force=False)
-    check_signed(runs, require_signed)
-    for run in runs:
-        sound_records(Store(run), Depth.sample)
-
-    def progress(words: str, done: int, total: int) -> None:
-        err.print(f"[{done}/{total}] {words}", markup=False, style="dim")
-
-    found = write_site(runs, output, progress)
-    if as_json:
-        print_json({"output": str(output), "runs": [asdict(one) for one in found]})
-    else:
-        out.print(f"{len(found)} runs in {output / 'index.html'}", soft_wrap=True)
-
-
-@app.command(epilog="Example:  cembench sign results/may --key ~/.ssh/id_ed25519")
-def sign(
-    run: Annotated[Path, typer.Argument(help="The run's folder.")],
-    *,
-    key: Annotated[Path, typer.Option("--key", help="Your SSH key.")],
-) -> None:
-    """Sign a run with your SSH key, so that others know who measured it.
-
-    The signature is in RUN/signature, over all its files; sign again after the
-    run has changed. `merge` and `publish` check it with --require-signed.
-    """
-    from cembench.results.signing import sign as signed
-
-    out.print(f"signed: {signed(run, key.expanduser())}", soft_wrap=True)
-
-
-def check_signed(runs: Iterable[Path], signers: Path | None) -> None:
-    """Raise if a run is not signed as ``--require-signed`` asks; print who signed each."""
-    from cembench.results.signing import signer
-
-    if signers is not None:
-        for run in runs:
-            told = f"{run}: signed by {signer(run, signers)}"
-            err.print(told, markup=False, style="dim", soft_wrap=True)

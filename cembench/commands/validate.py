@@ -10,7 +10,7 @@ import typer
 from cembench.api.validate import validate as validate_solver
 from cembench.api.validate import written_files
 from cembench.commands.app import app
-from cembench.commands.console import SHOWN, Json, out, print_json, split
+from cembench.commands.console import SHOWN, Json, Markdown, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
@@ -44,6 +44,11 @@ def validate(
         list[str], typer.Option(help="Compare on these surfaces (see `list surfaces`).")
     ] = [],  # noqa: B006
     mesh: Annotated[list[Path], typer.Option(help="Compare on this file. Repeatable.")] = [],  # noqa: B006
+    markdown: Markdown = None,
+    junit: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the checks as JUnit's XML, for test viewers."),
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Print the verdict; exit with 1 if the solver is not valid, or not what is required."""
@@ -53,6 +58,10 @@ def validate(
             "name one solver: a PLUGIN (FILE.py, module:name or a registered name), or a program "
             "with --command COMMAND."
         )
+    if junit:
+        from cembench.validation.summaries import check_junit
+
+        check_junit(junit)
     found = call(plugin or declared[0], surfaces=[*mesh, *split(surfaces)], reporter=SHOWN)
     folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
@@ -64,6 +73,13 @@ def validate(
         out.print(validation_text(found))
         for path in written.values():
             out.print(path, style="dim", markup=False, soft_wrap=True)
+    if markdown or junit:
+        from cembench.validation.summaries import append_markdown, write_junit
+
+        if markdown:
+            append_markdown(found, markdown)
+        if junit:
+            write_junit(found, junit)
     if not found.passed:
         raise typer.Exit(1)
 

@@ -3,6 +3,7 @@
 ::
 
     index.html                 what the runs are, and what became of ratios from one to the next
+    leaderboard/index.html     all runs together: angles, seconds at equal angles, success
     figures/history.*          the ratios as a plot, and its data
     runs/<name>/index.html     the report of each run, one file
     contents.json              which of the folder's files are the site's, with their hashes
@@ -17,6 +18,7 @@ from dataclasses import dataclass
 from math import exp, log
 from pathlib import Path
 from statistics import mean
+from types import MappingProxyType
 
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable, write_text
@@ -26,6 +28,7 @@ from cembench.core.names import distinct_slugs
 from cembench.core.version import installed_version
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import build_report
+from cembench.report.leaderboard import Entrant, leaderboard
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.results.machines import machine_of, machine_of_record, software_differences
@@ -69,7 +72,10 @@ class HeadlineRatio:
 
 
 def publish(
-    runs: Sequence[Path], folder: Path, progress: Progress = lambda *_: None
+    runs: Sequence[Path],
+    folder: Path,
+    progress: Progress = lambda *_: None,
+    signers: Mapping[Path, str] = MappingProxyType({}),
 ) -> list[PublishedRun]:
     """Write the site of several runs.
 
@@ -81,6 +87,8 @@ def publish(
         A new or empty folder, or an earlier site.
     progress : function
         Called with the progress.
+    signers : mapping
+        Who signed a run, for those that are known to be signed.
 
     Returns
     -------
@@ -103,29 +111,31 @@ def publish(
         raise ParameterError("publish takes at least one run; name each run once.")
     folders.check(folder, "report")
     names = distinct_slugs({str(place): place.name for place in places})
-    found = []
+    found, entrants = [], []
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
             for k, run in enumerate(runs):
                 name = names[str(places[k])]
                 progress(name, k, len(runs))
-                found.append(_publish_one(run, name, draft))
+                evidence = Evidence.of(run)
+                found.append(_publish_one(evidence, name, draft))
+                entrants.append(Entrant(name, evidence, signers.get(run, "")))
             progress("index", len(runs), len(runs))
             found.sort(key=lambda one: (one.date, one.name))
             _write_index(found, draft)
+            _write_leaderboard(entrants, draft)
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
     return found
 
 
-def _publish_one(run: Path, name: str, draft: Path) -> PublishedRun:
+def _publish_one(evidence: Evidence, name: str, draft: Path) -> PublishedRun:
     from cembench.report.render.html import render  # needs the extra
 
-    evidence = Evidence.of(run)
     with draft_folder(draft / "making") as making:
-        report = build_report(evidence, making, f"cembench report {run}")
+        report = build_report(evidence, making, f"cembench report {name}")
         write_text(draft / "runs" / name / "index.html", render(report, making))
     return about(evidence, name)
 
@@ -218,6 +228,13 @@ def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
         )
     )
     write_text(draft / "index.html", page)
+
+
+def _write_leaderboard(entrants: Sequence[Entrant], draft: Path) -> None:
+    from cembench.report.render.html import write_html
+
+    ordered = sorted(entrants, key=lambda one: one.name)
+    write_html(leaderboard(ordered, "cembench publish"), draft / "leaderboard")
 
 
 def _plot(runs: Sequence[PublishedRun], told: Mapping[str, list[HeadlineRatio | None]]) -> Plot:

@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from cembench.core.atomic import is_draft, write_bytes
@@ -43,14 +43,28 @@ def sign(run: Path, key: Path) -> Path:
         OpenSSH is not installed, or refuses the key.
 
     """
-    signature = _ssh_keygen(["sign", "-f", str(key)], _contents(run))
-    if signature is None:
+    write_bytes(run / SIGNATURE, _signature(_contents(run), key))
+    return run / SIGNATURE
+
+
+def signature_of(files: Mapping[str, bytes], key: Path) -> bytes:
+    """Return the signature of a run that consists of these files; raises as :func:`sign`."""
+    hashes = [(name, hashlib.sha256(content).hexdigest()) for name, content in files.items()]
+    return _signature(_message(hashes), key)
+
+
+def _signature(message: bytes, key: Path) -> bytes:
+    found = _ssh_keygen(["sign", "-f", str(key)], message)
+    if found is None:
         raise ParameterError(
             f"ssh-keygen does not sign with {key}. Name a private key, as ~/.ssh/id_ed25519, or "
             "the public key of one that your agent holds."
         )
-    write_bytes(run / SIGNATURE, signature)
-    return run / SIGNATURE
+    return found
+
+
+def _message(hashes: Iterable[tuple[str, str]]) -> bytes:
+    return json.dumps(sorted(hashes)).encode()
 
 
 def signer(run: Path, allowed: Path) -> str:
@@ -99,7 +113,7 @@ def _contents(run: Path) -> bytes:
         with os.fdopen(open_file(path, run), "rb") as file:
             hashed = hashlib.file_digest(file, "sha256").hexdigest()
         found.append((path.relative_to(run).as_posix(), hashed))
-    return json.dumps(sorted(found)).encode()
+    return _message(found)
 
 
 def _files(run: Path) -> Iterator[Path]:

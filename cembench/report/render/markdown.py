@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from cembench.core.atomic import write_text
+from cembench.core.loading import is_there, read_bytes
 from cembench.report.document import (
     SUSPECTS,
     Claim,
@@ -50,6 +51,19 @@ def write_markdown(report: Report, folder: Path) -> Path:
     return path
 
 
+def append_section(path: Path, section: Section) -> None:
+    """Append a section to a file of Markdown, such as the summary of a job; it links to no files.
+
+    Raises
+    ------
+    RecordError
+        The file cannot be read or written.
+
+    """
+    before = read_bytes(path).decode(errors="replace").splitlines() if is_there(path) else []
+    _write(path, [*before, *_section(section, 2, None, [])])
+
+
 def escape(text: str) -> str:
     """Return text escaped for Markdown."""
     return text.translate(_SPECIAL).replace("\n", " ")
@@ -85,21 +99,25 @@ def _page(section: Section) -> PurePosixPath:
     return PurePosixPath("pages", f"{section.name}.md")
 
 
-def _section(section: Section, depth: int, up: PurePosixPath, pages: list[Section]) -> list[str]:
-    if section.page:
+def _section(
+    section: Section, depth: int, up: PurePosixPath | None, pages: list[Section]
+) -> list[str]:
+    """Return a section; `up` leads to the report's folder, None if there is none to link to."""
+    if section.page and up is not None:
         pages.append(section)
         return [f"- [{escape(section.title)}]({up / _page(section)})"]
-    anchor = f'<a id="{section.name}"></a>'
+    anchor = ["", f'<a id="{section.name}"></a>'] if up is not None else []
     return [
-        "",
-        anchor,
+        *anchor,
         "",
         f"{'#' * depth} {escape(section.title)}",
         *_body(section, depth, up, pages),
     ]
 
 
-def _body(section: Section, depth: int, up: PurePosixPath, pages: list[Section]) -> list[str]:
+def _body(
+    section: Section, depth: int, up: PurePosixPath | None, pages: list[Section]
+) -> list[str]:
     lines = []
     for item in section.items:
         lines += ["", *_item(item, depth + 1, up)]
@@ -110,12 +128,14 @@ def _body(section: Section, depth: int, up: PurePosixPath, pages: list[Section])
     return lines
 
 
-def _item(item: Item, depth: int, up: PurePosixPath) -> list[str]:
+def _item(item: Item, depth: int, up: PurePosixPath | None) -> list[str]:
     title = "#" * min(depth, 6)
     if isinstance(item, Text):
         return [escape(item.words)]
     if isinstance(item, Table):
         return [f"{title} {escape(item.title)}", "", *table_lines(item, up)]
+    if isinstance(item, Figure | Gallery) and up is None:
+        return []
     if isinstance(item, Figure):
         return [f"{title} {escape(item.full_title)}", "", *_figure(item, up)]
     if isinstance(item, Gallery):
@@ -144,7 +164,8 @@ def _claim(claim: Claim, title: str) -> list[str]:
     ]
 
 
-def _figure(figure: Figure, up: PurePosixPath) -> list[str]:
+def _figure(figure: Figure, up: PurePosixPath | None) -> list[str]:
+    up = up or PurePosixPath()
     shown = f"![{escape(figure.alternative or figure.title)}]({up / figure.files[0]})"
     links = [f"[{path.suffix[1:].upper()}]({up / path})" for path in figure.files[1:]]
     if figure.data:
@@ -153,8 +174,8 @@ def _figure(figure: Figure, up: PurePosixPath) -> list[str]:
     return [shown, "", escape(figure.caption) + tail]
 
 
-def table_lines(table: Table, up: PurePosixPath) -> list[str]:
-    """Return the table with its caption, notes and a link to its CSV."""
+def table_lines(table: Table, up: PurePosixPath | None) -> list[str]:
+    """Return the table with its caption, notes and a link to its CSV; links need `up`."""
     heads = [escape(heading(column)) for column in table.columns]
     rule = ["---:" if column.numeric else ":---" for column in table.columns]
     lines = [_cells(heads), _cells(rule)]
@@ -167,11 +188,11 @@ def table_lines(table: Table, up: PurePosixPath) -> list[str]:
         lines.append(_cells([f"*{c}*" if c else "" for c in cells] if k >= last else cells))
     lines += ["", escape(table.caption)] if table.caption else []
     lines += ["", *(f"- {escape(note)}" for note in table.notes)] if table.notes else []
-    return [*lines, "", f"[CSV]({up / csv_of(table)})"]
+    return lines if up is None else [*lines, "", f"[CSV]({up / csv_of(table)})"]
 
 
-def _value(value: Value, text: str, up: PurePosixPath) -> str:
-    if not value.record:
+def _value(value: Value, text: str, up: PurePosixPath | None) -> str:
+    if not value.record or up is None:
         return escape(text)
     return f"[{escape(text)}]({up / 'records.md'}#{value.record[:KEY]})"
 
@@ -198,4 +219,4 @@ def _short(value: Any) -> str:
 
 
 def _write(path: Path, lines: Iterable[str]) -> None:
-    write_text(path, "\n".join(lines).rstrip() + "\n")
+    write_text(path, "\n".join(lines).strip() + "\n")

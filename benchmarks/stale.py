@@ -1,0 +1,102 @@
+"""Which kept reports and tables in pages are older than the code that their figures depend on?"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+import sys
+from typing import Any
+
+from benchmarks.origins import changed, origins, working_tree
+from benchmarks.pages import ROOT, Section, Table
+
+PAGE = "reports/README.md"
+LAYOUT = """
+| what | made at | on | changed since | made again by | took |
+|---|---|---|---|---|---:|
+| {what} | `{commit}` | {date} | {changed} | `{command}` | {took} |
+"""
+#: What reads records alone, and no figure of which depends on anything but the kept reports.
+OF_RECORDS = ("readme_speedups",)
+
+
+def made_tables() -> list[str]:
+    """Return the tables in pages that studies fill: the page and the study."""
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    found = []
+    for page in pages:
+        for study in re.findall(r"<!-- made by benchmarks/(\w+)\.py -->", page.read_text()):
+            found.append(f"{page.relative_to(ROOT).as_posix()} {study}")
+    return found
+
+
+def kept_reports() -> list[str]:
+    """Return the folders of kept reports."""
+    return [f"reports/{path.parent.name}" for path in sorted(ROOT.glob("reports/*/report.md"))]
+
+
+def took(seconds: float | None) -> str:
+    """Return a time in words.
+
+    >>> took(40), took(5400), took(None)
+    ('40 s', '1.5 h', 'not recorded')
+    """
+    if seconds is None:
+        return "not recorded"
+    for unit, size in (("h", 3600), ("min", 120)):
+        if seconds >= size:
+            return f"{seconds / (3600 if unit == 'h' else 60):.2g} {unit}"
+    return f"{seconds:.0f} s"
+
+
+def measured_seconds(report: str) -> float:
+    """Return the seconds of one call in each round of a kept report: what a run takes at least."""
+    with (ROOT / report / "records.csv").open(newline="", encoding="utf-8") as lines:
+        rounds = [json.loads(row["seconds_raw"] or "[]") for row in csv.DictReader(lines)]
+    return sum(map(sum, rounds))
+
+
+def stale(*, check: bool = False, refresh: bool = False) -> Section:
+    """List kept reports and tables in pages, with what has changed since they were made.
+
+    `check` exits with 1 if something is stale; `refresh` lists the commands that make it again.
+    """
+    known, now = origins(), working_tree()
+    rows: list[dict[str, Any]] = []
+    for what in [*kept_reports(), *(t for t in made_tables() if not t.endswith(OF_RECORDS))]:
+        about = known.get(what)
+        if about is None:
+            about = {"commit": "-", "date": "-", "command": "-", "seconds": None}
+            differing = ["unknown: nothing is recorded"]
+        else:
+            differing = changed(about, now)
+        seconds, words = about["seconds"], took(about["seconds"])
+        if seconds is None and what.startswith("reports/"):
+            words = f"at least {took(measured_seconds(what))}"
+        rows.append(
+            {
+                "what": what,
+                **{name: about[name] for name in ("commit", "date", "command")},
+                "changed": ", ".join(differing) or "nothing",
+                "took": words,
+                "seconds": seconds,
+            }
+        )
+    old = [row for row in rows if row["changed"] != "nothing"]
+    told = f"{len(old)} of {len(rows)} are older than the code that their figures depend on."
+    if refresh:
+        by_command = {row["command"]: row for row in old}
+        lines = [f"{row['command']:70}  # {row['took']}" for row in by_command.values()]
+        sure = sum(row["seconds"] or 0 for row in by_command.values())
+        rest = sum(row["seconds"] is None for row in by_command.values())
+        print("\n".join(lines))
+        print(f"# {took(sure)} for those that were timed; {rest} were not.\n")
+    elif check and old:
+        print(
+            "\n".join(
+                f"{row['what']}: changed since {row['commit']}: {row['changed']}" for row in old
+            )
+        )
+        sys.exit(told)
+    return Section([told, Table(rows, LAYOUT)], page=PAGE)

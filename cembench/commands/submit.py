@@ -1,0 +1,166 @@
+"""The commands that share runs: publish, sign, submit, and check what others sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from cembench.api import submissions as api
+from cembench.api.submissions import Submission
+from cembench.commands.app import app
+from cembench.commands.console import Json, Markdown, err, out, print_json
+from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import RequireSigned
+from cembench.core.overwriting import refuse_inputs
+
+if TYPE_CHECKING:
+    from cembench.report.document import Table
+
+
+@app.command(
+    epilog="Example:  cembench submit results/run -o mine.zip --maps --author 'A. Lovelace'"
+)
+@from_api(api.submit, author="--author NAME", licence="--licence SPDX")
+def submit(call: Call, *, as_json: Json = False) -> None:
+    """Print what was packed."""
+    found = call()
+    if as_json:
+        print_json(asdict(found) | {"output": str(call.keywords["output"])})
+        return
+    out.print(f"{found.cells} cells, {found.maps} with maps: {call.keywords['output']}")
+
+
+@app.command(epilog="Example:  cembench submissions check submissions --require-signed signers")
+def submissions(
+    what: Annotated[Literal["check"], typer.Argument(help="What to do: check.")],
+    folder: Annotated[Path, typer.Argument(help="A folder of bundles, or one bundle.")],
+    *,
+    require_signed: RequireSigned = None,
+    markdown: Markdown = None,
+    as_json: Json = False,
+) -> None:
+    """Check bundles that others sent, and exit with 1 if one is refused.
+
+    Each is unpacked safely; the schema and digest of its records, the hashes of
+    its files, its times and, where maps were sent, their figures are checked.
+    """
+    with err.status("checking", spinner="line"):
+        found = api.check_submissions(folder, require_signed=require_signed)
+    if markdown:
+        from cembench.report.document import Section
+        from cembench.report.render.markdown import append_section
+
+        append_section(markdown, Section("submissions", "Submissions", (_table(found),)))
+    if as_json:
+        print_json([asdict(one) | {"accepted": one.accepted} for one in found])
+    else:
+        out.print(_table(found))
+    if not all(one.accepted for one in found):
+        raise typer.Exit(1)
+
+
+def _table(found: Sequence[Submission]) -> Table:
+    from cembench.report.document import Column, Table, words
+
+    return Table.of(
+        "submissions",
+        f"{sum(one.accepted for one in found)} of {len(found)} bundles accepted",
+        [
+            *(Column(title, numeric=False) for title in ("bundle", "found", "machines")),
+            *(Column(title, form=",d") for title in ("cells", "maps")),
+            Column("signed by", numeric=False),
+        ],
+        [
+            [
+                one.name,
+                words("accepted", "good") if one.accepted else words("refused", "bad"),
+                ", ".join(one.machines) or "-",
+                one.cells,
+                one.maps,
+                one.signer or "-",
+            ]
+            for one in found
+        ],
+        notes=tuple(
+            f"{one.name}: {'; '.join(one.faults[:5])}"
+            + (f"; and {len(one.faults) - 5} more" if len(one.faults) > 5 else "")
+            for one in found
+            if one.faults
+        ),
+    )
+
+
+@app.command(
+    epilog="Examples:  cembench publish results/may results/june -o site  ·  "
+    "cembench publish submissions -o site"
+)
+def publish(
+    runs: Annotated[
+        list[Path], typer.Argument(help="Runs' folders, bundles, and folders of bundles.")
+    ],
+    *,
+    output: Annotated[Path, typer.Option("-o", "--output", help="Where the site goes.")],
+    require_signed: RequireSigned = None,
+    as_json: Json = False,
+) -> None:
+    """Write a static site of several runs: leaderboard, machines, ratios, reports.
+
+    It needs no network and no server: open index.html, or put the folder on a web server.
+    Bundles (see `cembench submit`) are checked first, and none is published that is refused.
+    """
+    from dataclasses import asdict
+
+    from cembench.api.submissions import accepted, bundles_in, is_bundle
+    from cembench.report.site import publish as write_site
+    from cembench.results.store import Store
+    from cembench.results.verify import Depth, sound_records
+
+    refuse_inputs(output, runs, force=False)
+    sent = [bundle for path in runs if is_bundle(path) for bundle in bundles_in(path)]
+    own = [path for path in runs if not is_bundle(path)]
+    for run in own:
+        sound_records(Store(run), Depth.sample)
+
+    def progress(words: str, done: int, total: int) -> None:
+        err.print(f"[{done}/{total}] {words}", markup=False, style="dim")
+
+    with accepted(sent) as unpacked:
+        signers = check_signed([*own, *unpacked], require_signed)
+        found = write_site([*own, *unpacked], output, progress, signers)
+    if as_json:
+        print_json({"output": str(output), "runs": [asdict(one) for one in found]})
+    else:
+        out.print(f"{len(found)} runs in {output / 'index.html'}", soft_wrap=True)
+
+
+@app.command(epilog="Example:  cembench sign results/may --key ~/.ssh/id_ed25519")
+def sign(
+    run: Annotated[Path, typer.Argument(help="The run's folder.")],
+    *,
+    key: Annotated[Path, typer.Option("--key", help="Your SSH key.")],
+) -> None:
+    """Sign a run with your SSH key, so that others know who measured it.
+
+    The signature is in RUN/signature, over all its files; sign again after the
+    run has changed. `merge` and `publish` check it with --require-signed.
+    """
+    from cembench.results.signing import sign as signed
+
+    out.print(f"signed: {signed(run, key.expanduser())}", soft_wrap=True)
+
+
+def check_signed(runs: Iterable[Path], signers: Path | None) -> dict[Path, str]:
+    """Return who signed each run, and print it; raise if one is not as ``--require-signed`` asks.
+
+    Without that, nothing is known.
+    """
+    from cembench.results.signing import signer
+
+    found = {} if signers is None else {run: signer(run, signers) for run in runs}
+    for run, name in found.items():
+        err.print(f"{run}: signed by {name}", markup=False, style="dim", soft_wrap=True)
+    return found

@@ -1,0 +1,69 @@
+"""A validation as the summary of a job and as JUnit's XML."""
+
+from xml.etree import ElementTree as Xml
+
+import pytest
+
+from cembench.core.errors import ParameterError
+from cembench.validation.finding import ValidationFinding
+from cembench.validation.requirement import Requirement
+from cembench.validation.summaries import append_markdown, write_junit
+from cembench.validation.verdict import Validation
+
+FAULT = ValidationFinding(
+    stage="contract",
+    name="returns a map",
+    ok=False,
+    measured="uv is <complex64> & \x1b[31m",
+    allowed="complex128",
+    remedy="convert it",
+)
+
+
+def validation(*findings, **more):
+    about = {"algorithm": "a", "title": "A", "target": "disk", "source": "a.py", "parameters": {}}
+    return Validation(**about, command="", environment="e", findings=findings, **more)
+
+
+def test_junit_has_checks_skipped_stages_and_requirements(tmp_path):
+    path = tmp_path / "j.xml"
+    good = FAULT.model_copy(update={"ok": True, "name": "mesh untouched"})
+    skipped = {"quality": "not examined, because of a fault in contract"}
+    write_junit(validation(FAULT, good, skipped=skipped), path)
+    root = Xml.parse(path).getroot()
+    contract = root.find("testsuite[@name='a: contract']")
+    assert [contract.get(name) for name in ("tests", "failures", "skipped")] == ["2", "1", "0"]
+    (failure,) = root.findall(".//failure")
+    assert failure.get("message") == "uv is <complex64> & \ufffd[31m"
+    assert failure.text == "allowed: complex128\nto do: convert it"
+    assert root.find("testsuite[@name='a: quality']").get("skipped") == "1"
+    write_junit(validation(good, unmet=(Requirement.faster,)), path)
+    assert [case.get("name") for case in Xml.parse(path).getroot().findall(".//testcase")] == [
+        "mesh untouched",
+        "faster",
+    ]
+
+
+def test_another_s_file_is_not_replaced(tmp_path):
+    path = tmp_path / "j.xml"
+    path.write_text("<testsuites name='mine'/>")
+    with pytest.raises(ParameterError, match="was not written by `cembench validate`"):
+        write_junit(validation(), path)
+    assert path.read_text() == "<testsuites name='mine'/>"
+
+
+def test_a_summary_is_appended_and_links_to_nothing(tmp_path):
+    path = tmp_path / "s.md"
+    path.write_text("# Mine\n")
+    append_markdown(validation(FAULT), path)
+    text = path.read_text()
+    assert text.startswith("# Mine\n\n## ❌ A: did not pass\n\ninvalid: returns a map: ")
+    assert "](" not in text
+    assert "<complex64>" not in text, "it is escaped"
+
+
+def test_the_command_checks_the_file_before_it_works(cli):
+    (cli.folder / "j.xml").write_text("mine")
+    code, _, err = cli("validate", "cem", "--checks-only", "--junit", "j.xml")
+    assert code == 2
+    assert "was not written by" in err
