@@ -102,8 +102,8 @@ def validate(
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, distribute_parameters, plan_cells
     from cembench.validation.examine import ValidationHooks, ValidationOptions, examine
-    from cembench.validation.requirement import Requirement
     from cembench.validation.solver import Solver, in_a_process, load_solver
+    from cembench.validation.verdict import Requirement
 
     if output is not None:
         extras.require(extras.Extra.REPORT, f"the page in {output}")

@@ -68,7 +68,7 @@ def validate(
     if as_json:
         print_json(_as_json(found, written))
     else:
-        from cembench.validation.terminal import validation_text
+        from cembench.validation.document import validation_text
 
         out.print(validation_text(found))
         for path in written.values():

@@ -97,7 +97,7 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
     net = _Net.of(mesh)
     points = list(dict.fromkeys(through))
     if net.is_sphere and len(points) < 2:
-        points = net.extremities(points)
+        points = net.far_points(points, 2)
     marks = frozenset(points)
     graph = min((net.cut_graph(root, marks) for root in net.roots(points)), key=net.length)
     graph = _without_ears(net, _shortened(net, graph, marks), marks)
@@ -155,10 +155,8 @@ class _Net:
 
     def numbers(self, path: Indices) -> list[int]:
         """Return the edges between successive vertices of a path."""
-        ends = np.sort(np.stack([path[:-1], path[1:]], axis=1), axis=1)
-        keys = self.edges[:, 0] * self.n + self.edges[:, 1]
-        found: list[int] = np.searchsorted(keys, ends[:, 0] * self.n + ends[:, 1]).tolist()
-        return found
+        edges: list[int] = self._between(path[:-1], path[1:]).tolist()
+        return edges
 
     def roots(self, points: list[int]) -> list[int]:
         """Return the vertices at which trees of shortest paths may start."""
@@ -167,10 +165,6 @@ class _Net:
         if self.loops:
             return [int(loop[0]) for loop in self.loops[:_ROOTS]]
         return self.far_points([], _ROOTS)
-
-    def extremities(self, points: list[int]) -> list[int]:
-        """Return two points far from each other; the first may be given."""
-        return self.far_points(points, 2)
 
     def far_points(self, points: list[int], count: int) -> list[int]:
         """Add vertices, each as far as possible from the previous ones."""

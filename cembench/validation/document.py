@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cembench.report.document import (
     Column,
@@ -31,6 +32,9 @@ from cembench.validation.quality import BaselineComparison, Pair, PairedComparis
 from cembench.validation.scaling import Growth, GrowthComparison
 from cembench.validation.verdict import STAGES, Validation, sentence
 
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
 _CLOCKS = {
     "cpu": "Seconds are of the processor, except those of a phase, which are wall clock.",
     "wall": "Seconds are wall clock.",
@@ -44,6 +48,17 @@ _TITLES = {
 #: The ends of an interval, and why it may have none.
 _TOO_FEW = "too few surfaces or rounds"
 _ENDS = tuple(Column(end, "95 % interval", form=".3f", lacking=_TOO_FEW) for end in ("low", "high"))
+
+
+def validation_text(validation: Validation) -> RenderableType:
+    """Return the findings, the figures, and the verdict at the end, for a terminal."""
+    from rich.console import Group
+    from rich.text import Text as RichText
+
+    sections = [section for section in stage_sections(validation, {}) if section.items]
+    style = "bold green" if validation.passed else "bold red"
+    verdict = RichText(f"{validation.title}: {sentence(validation)}.", style=style)
+    return Group(*(part for section in sections for part in (section, "")), verdict)
 
 
 def document_of(validation: Validation, runs: Path, folder: Path) -> Report:

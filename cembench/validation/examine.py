@@ -31,7 +31,6 @@ from cembench.validation.quality import (
     together,
     without_map,
 )
-from cembench.validation.requirement import Requirement
 from cembench.validation.scaling import (
     FIRST_ROUNDS,
     growth_of,
@@ -42,7 +41,7 @@ from cembench.validation.scaling import (
     sizes,
 )
 from cembench.validation.solver import Solver
-from cembench.validation.verdict import Validation, unmet
+from cembench.validation.verdict import Requirement, Validation, unmet
 
 #: Default baseline for each target.
 _USUAL_BASELINE = {"disk": "cem", "free boundary": "lscm", "circular holes": "koebe-cem"}

@@ -6,6 +6,7 @@ The figures are data (:class:`Validation`); :func:`sentence` is the one place th
 from __future__ import annotations
 
 from collections.abc import Sequence
+from enum import StrEnum
 from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict
@@ -13,10 +14,19 @@ from pydantic import BaseModel, ConfigDict
 from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
-from cembench.validation.requirement import Requirement
 from cembench.validation.scaling import GrowthAnswer, GrowthComparison
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
+
+
+class Requirement(StrEnum):
+    """Requirements that ``--require`` can add to validity, for every baseline."""
+
+    faster = "faster"
+    not_slower = "not-slower"
+    better = "better"
+    not_worse = "not-worse"
+    no_folds = "no-folds"
 
 
 class Validation(BaseModel):

@@ -3,9 +3,9 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
+from cembench.validation.document import validation_text
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
-from cembench.validation.terminal import validation_text
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
 
 

@@ -52,7 +52,7 @@ def _table(evidence: Evidence, policy: str) -> Table:
     if evidence.series_of("qiem"):
         notes.append(
             "QIEM's steps, and with them its factorisations, follow from rules for the time step "
-            "and the stop that the paper leaves open and this suite decides (docs/readings.md)"
+            "and the stop that the paper leaves open and this suite decides (docs/algorithms.md)"
         )
     columns = [COLUMNS[name] for name in _COUNTS]
     ratios = Footer(
