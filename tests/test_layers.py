@@ -78,8 +78,8 @@ BUDGETS = {
     "report": 7_900,
     "validation": 2_250,
     "morphing": 1_750,
-    "api": 6_000,
-    "commands": 2_950,
+    "api": 6_050,
+    "commands": 2_700,
 }
 
 
