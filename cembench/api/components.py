@@ -12,10 +12,18 @@ from numpy.typing import NDArray
 from cembench.conformal.laplacian import corner_products
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
+from cembench.mesh.files import read_soup
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
-from cembench.registry import Algorithm
-from cembench.running.surfaces import SurfaceFile, kinds_of, prepared
+from cembench.registry import Algorithm, Registry
+from cembench.running.surfaces import (
+    SurfaceFile,
+    generate_surface,
+    is_generated,
+    kinds_of,
+    prepared,
+    soup_of,
+)
 
 Ints = NDArray[np.int64]
 Complex = NDArray[np.complex128]
@@ -82,13 +90,13 @@ def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
 
 def read_shells(
     path: Path,
-    soup: Soup,
+    registry: Registry,
     algorithms: Sequence[Algorithm],
     *,
     mend: bool = False,
     cut: bool = False,
 ) -> Shells:
-    """Part the polygons of a file into its surfaces, each of a kind that the algorithms take.
+    """Read the surfaces of a file, or generate one, each of a kind that the algorithms take.
 
     Triangles that are connected, even at a single vertex, are one surface. With `mend`, only the
     largest surface is kept.
@@ -96,10 +104,12 @@ def read_shells(
     Raises
     ------
     MeshError
-        One of the surfaces is not of such a kind.
+        The file cannot be read, or one of its surfaces is not of such a kind.
 
     """
-    kinds = kinds_of(algorithms)
+    kinds, name = kinds_of(algorithms), str(path)
+    generated = is_generated(name, registry)
+    soup = soup_of(generate_surface(registry, name)) if generated else read_soup(path)
     if mend:
         return _alone(prepared(soup, kinds, path, repair=True, cut=cut))
     try:

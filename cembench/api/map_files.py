@@ -152,16 +152,18 @@ def map_files(
     (True, 'flat_uv.obj')
 
     """
+    from dataclasses import replace
     from pathlib import Path
 
+    from cembench.api.components import read_shells
     from cembench.api.map_outputs import (
-        Extras,
-        check_extras,
+        check_options,
         check_shells,
         check_takes_disks,
         output_files,
+        picture_files,
     )
-    from cembench.api.map_surfaces import FileJobs, Maps, jobs_of, local_files, with_pictures
+    from cembench.api.map_surfaces import FileJobs, Maps, local_files, tasks_of
     from cembench.api.write_maps import FileOptions, beside
     from cembench.core.overwriting import refuse_inputs, refuse_present
     from cembench.running.options import Options
@@ -178,11 +180,13 @@ def map_files(
         check_takes_disks(candidates)
     given, target = [Path(mesh) for mesh in meshes], path_of(output)
     outputs = output_files(given, target)
-    file_options = FileOptions(uv, checker, path_of(bake), equal_parts)
-    extras = Extras(path_of(geometry_image), path_of(remesh), side, uv, path_of(html))
-    check_extras(given, outputs, file_options, extras)
+    file_options = FileOptions(
+        *(uv, checker, path_of(bake), equal_parts),
+        *(path_of(geometry_image), path_of(remesh), path_of(html), side),
+    )
+    check_options(given, outputs, file_options)
     is_atlas = any(a.target == "atlas" for a in candidates)
-    if is_atlas and (extras.files or bake or len(given) > 1):
+    if is_atlas and (file_options.extras or bake or len(given) > 1):
         raise ParameterError.about(
             "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
             "{html} and {bake}, which need one UV per vertex.",
@@ -192,30 +196,29 @@ def map_files(
     written = list(dict.fromkeys(path for path in outputs if path is not None))
     others = [path for file in written for path in beside(file, file_options)]
     inputs = [*sources, *([file_options.bake] if file_options.bake else [])]
-    for path in (*written, *others, *extras.files):
+    for path in (*written, *others, *file_options.extras.values()):
         refuse_inputs(path, inputs, force=overwrite)
     refuse_present(others if target in outputs else [*written, *others], force=overwrite)
     together = target if len(given) > 1 and target in outputs else None
     files = []
     for source, place in zip(sources, outputs, strict=True):
         with reporter.busy(f"reading {source}"):
-            shells, jobs = jobs_of(
-                *(source, registry, candidates, parameters or {}, settings, plugins),
-                repair=repair,
-                cut=cut,
-            )
-        check_shells(len(shells.parts), source, file_options, extras)
-        files.append(FileJobs(shells, jobs, None if together else place))
+            shells = read_shells(source, registry, candidates, mend=repair, cut=cut)
+        check_shells(len(shells.parts), source, file_options)
+        tasks = tasks_of(shells, registry, candidates, parameters or {}, settings, plugins)
+        files.append(FileJobs(shells, tasks, None if together else place))
     if preview and is_atlas:
         reporter.note(
             "no picture was drawn: the islands of an atlas have no fixed positions in the plane"
         )
     elif preview:
-        files = with_pictures(files, overwrite=overwrite)
+        chosen = [file.tasks[0].algorithm for file in files]
+        pictures = picture_files(sources, chosen, [f.output for f in files], overwrite=overwrite)
+        files = [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
     for folder in {path.parent for path in written}:
         folder.mkdir(exist_ok=True)
     return Maps(
-        *(files, options, file_options, extras, together, reporter),
+        *(files, options, file_options, together, reporter),
         keep_invalid=keep_invalid,
         certificate=certificate,
         apart=timeout != Options.timeout or memory_bytes is not None,

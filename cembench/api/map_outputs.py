@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.api.components import Shells, areas_of
-from cembench.api.settings import Placement
-from cembench.api.write_maps import FileOptions, check_file_options, save_map
+from cembench.api.write_maps import FileOptions, save_map
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
@@ -25,117 +23,81 @@ from cembench.registry import Algorithm
 from cembench.results.records import Record
 
 
-@dataclass(frozen=True)
-class Extras:
-    """Extra files to write with a map.
-
-    Parameters
-    ----------
-    samples : Path, optional
-        Path of a geometry image: NPY, EXR or PNG.
-    remeshed : Path, optional
-        Path of the surface remeshed through the map.
-    side : int
-        Samples along a side, for both files.
-    place : "unit" or "disk"
-        Placement of the texture coordinates of the new mesh.
-    page : Path, optional
-        Path of an interactive page with surface and map.
-
-    """
-
-    samples: Path | None = None
-    remeshed: Path | None = None
-    side: int = 129
-    place: Placement = "unit"
-    page: Path | None = None
-
-    @property
-    def files(self) -> list[Path]:
-        """The files to write."""
-        return list(self.named.values())
-
-    @property
-    def named(self) -> dict[str, Path]:
-        """The files to write, by kind."""
-        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
-        return {what: path for what, path in named.items() if path is not None}
-
-
 def write_extras(
-    extras: Extras, mesh: TriangleMesh, z: NDArray[np.complex128], record: Record
+    options: FileOptions, mesh: TriangleMesh, z: NDArray[np.complex128], record: Record
 ) -> tuple[Notice, ...]:
-    """Write the files; return notices about triangles that rounding folds in the new mesh."""
+    """Write the extra files; return notices of triangles that rounding folds in the new mesh."""
     told: tuple[Notice, ...] = ()
-    if extras.samples is not None:
+    if options.samples is not None:
         from cembench.api.geometry_images import write_geometry_image
 
-        write_geometry_image(extras.samples, mesh, z, extras.side)
-    if extras.remeshed is not None:
+        write_geometry_image(options.samples, mesh, z, options.side)
+    if options.remeshed is not None:
         from cembench.conformal.resample import regular_remesh
 
-        new, new_z = regular_remesh(mesh, z, extras.side)
-        told = save_map(extras.remeshed, new, new_z, FileOptions(extras.place))
-    if extras.page is not None:
+        new, new_z = regular_remesh(mesh, z, options.side)
+        told = save_map(options.remeshed, new, new_z, FileOptions(options.place))
+    if options.page is not None:
         from cembench.api.view import map_page
         from cembench.report.render.view_page import write_view_page
 
-        write_view_page(extras.page, map_page(mesh, z, record.outcome, record.title))
+        write_view_page(options.page, map_page(mesh, z, record.outcome, record.title))
     return told
 
 
-def check_extras(
-    meshes: Sequence[Path],
-    outputs: Sequence[Path | None],
-    file_options: FileOptions,
-    extras: Extras,
+def check_options(
+    meshes: Sequence[Path], outputs: Sequence[Path | None], options: FileOptions
 ) -> None:
     """Raise the errors of textures and extra files before anything is mapped."""
-    check_file_options(meshes, file_options)
-    if file_options.textured and None in outputs:
+    if options.checker and options.bake:
+        raise ParameterError.about("{checker} and {bake} each give a texture; choose one.")
+    if options.bake and len(meshes) > 1:
+        raise ParameterError.about("{bake} works with one surface; map them one by one.")
+    if options.bake:
+        from cembench.drawing.texture import read_texture
+
+        read_texture(options.bake)
+    if options.textured and None in outputs:
         raise ParameterError.about(
             "{checker} and {bake} need a file that uses the texture: add {output}."
         )
-    if len(set(outputs)) < len(outputs) and outputs[0] and file_options.place != "unit":
+    if len(set(outputs)) < len(outputs) and outputs[0] and options.place != "unit":
         raise ParameterError.about("surfaces in one file share the unit square: leave out {uv}.")
-    if extras.files and len(meshes) > 1:
+    if options.extras and len(meshes) > 1:
         raise ParameterError.about(
             "{geometry_image}, {remesh} and {html} take one surface; map them one by one."
         )
-    if extras.page is not None and extras.page.suffix.lower() not in (".html", ".htm"):
+    if options.page is not None and options.page.suffix.lower() not in (".html", ".htm"):
         raise ParameterError.about(
-            "{page}: {html} writes a web page; use the suffix .html.", page=extras.page
+            "{page}: {html} writes a web page; use the suffix .html.", page=options.page
         )
-    if extras.page is not None and not extras.page.parent.is_dir():
-        raise MeshError(f"{extras.page}: there is no folder {extras.page.parent}. Make it first.")
-    if extras.samples is not None:
+    if options.page is not None and not options.page.parent.is_dir():
+        raise MeshError(f"{options.page}: there is no folder {options.page.parent}. Make it first.")
+    if options.samples is not None:
         from cembench.api.geometry_images import check_image_format
 
-        check_image_format(extras.samples)
-    if extras.remeshed is not None:
-        check_writable_format(extras.remeshed, with_uv=True)
+        check_image_format(options.samples)
+    if options.remeshed is not None:
+        check_writable_format(options.remeshed, with_uv=True)
 
 
-def check_shells(surfaces: int, path: Path, file_options: FileOptions, extras: Extras) -> None:
+def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
     """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
-    if surfaces < 2:
-        return
-    if extras.files:
+    each = Advice(
+        f"`cembench.repair({str(path)!r}, components='all').meshes`",
+        f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
+    )
+    holds = {"path": path, "surfaces": surfaces, "each": each}
+    if surfaces > 1 and options.extras:
         raise ParameterError.about(
             "{path} holds {surfaces} surfaces; {geometry_image}, {remesh} and {html} take one. "
             "{each} gives each alone.",
-            path=path,
-            each=Advice(
-                f"`cembench.repair({str(path)!r}, components='all').meshes`",
-                f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
-            ),
-            surfaces=surfaces,
+            **holds,
         )
-    if file_options.place != "unit":
+    if surfaces > 1 and options.place != "unit":
         raise ParameterError.about(
             "{path} holds {surfaces} surfaces, which share the unit square: leave out {uv}.",
-            path=path,
-            surfaces=surfaces,
+            **holds,
         )
 
 
@@ -151,14 +113,20 @@ def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
 
 
 def picture_files(
-    sources: Sequence[Path], chosen: Sequence[Algorithm], outputs: Sequence[Path | None]
+    sources: Sequence[Path],
+    chosen: Sequence[Algorithm],
+    outputs: Sequence[Path | None],
+    *,
+    overwrite: bool,
 ) -> list[Path]:
-    """Return the path of each surface's picture: beside its output, or in the current folder.
+    """Return the path of each file's picture: beside its output, or in the current folder.
 
     Raises
     ------
     ParameterError
         Two pictures would have the same path.
+    RenderError
+        A file that is not one of our pictures would be overwritten.
 
     """
     pictures = [
@@ -172,6 +140,11 @@ def picture_files(
         raise ParameterError(
             f"two pictures would be written to {twice[0]}; draw them one at a time."
         )
+    if not overwrite:
+        from cembench.drawing.replaceable_pictures import check_replaceable
+
+        for picture in pictures:
+            check_replaceable(picture)
     return pictures
 
 

@@ -10,39 +10,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.api.components import Shells, read_shells
-from cembench.api.map_outputs import Extras, draw_maps, picture_files, write_extras
+from cembench.api.components import Shells
+from cembench.api.map_outputs import draw_maps, write_extras
 from cembench.api.write_maps import FileOptions, write_shells, write_together
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
 from cembench.mesh import datasets
-from cembench.mesh.files import read_soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.in_this_process import map_here, may_run_here
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, plan_cells, provenance_of
-from cembench.running.surfaces import (
-    SurfaceFile,
-    file_named,
-    generate_surface,
-    is_generated,
-    soup_of,
-)
+from cembench.running.surfaces import SurfaceFile, file_named, is_generated
 
 Complex = NDArray[np.complex128]
 #: Notices, each with the file it is about.
 Told = tuple[tuple[Path, Notice], ...]
-
-
-@dataclass(frozen=True)
-class Job:
-    """A surface and the measurement that maps it."""
-
-    surface: SurfaceFile
-    task: Task
 
 
 @dataclass(frozen=True)
@@ -53,8 +38,8 @@ class FileJobs:
     ----------
     shells : Shells
         The surfaces.
-    jobs : tuple of Job
-        One job per surface.
+    tasks : tuple of Task
+        The measurement that maps each.
     output : Path, optional
         File for the surfaces with their maps.
     picture : Path, optional
@@ -63,7 +48,7 @@ class FileJobs:
     """
 
     shells: Shells
-    jobs: tuple[Job, ...]
+    tasks: tuple[Task, ...]
     output: Path | None = None
     picture: Path | None = None
 
@@ -115,51 +100,21 @@ def local_files(
     ]
 
 
-def jobs_of(
-    source: Path,
+def tasks_of(
+    shells: Shells,
     registry: Registry,
     candidates: Sequence[Algorithm],
     parameters: Mapping[str, Any],
     settings: MeasurementSettings,
     plugins: Sequence[str],
-    *,
-    repair: bool,
-    cut: bool,
-) -> tuple[Shells, tuple[Job, ...]]:
-    """Return the surfaces of a file, and a job for each with the first algorithm that takes it."""
-    generated = is_generated(str(source), registry)
-    soup = soup_of(generate_surface(registry, str(source))) if generated else read_soup(source)
-    shells = read_shells(source, soup, candidates, mend=repair, cut=cut)
-    jobs = []
-    for surface in shells.parts:
-        mesh = surface.mesh
+) -> tuple[Task, ...]:
+    """Return a measurement of each surface of a file, by the first algorithm that takes it."""
+    tasks: list[Task] = []
+    for mesh in (part.mesh for part in shells.parts):
         taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
         role = {mesh.name: provenance_of(registry, mesh)}
-        (task,) = plan_cells([taken], [mesh], parameters, settings, plugins, role)
-        jobs.append(Job(surface, task))
-    return shells, tuple(jobs)
-
-
-def with_pictures(files: Sequence[FileJobs], *, overwrite: bool) -> list[FileJobs]:
-    """Return the files with a path for a picture of each, beside its output.
-
-    Raises
-    ------
-    ParameterError
-        Two pictures would have the same path.
-    RenderError
-        A file that is not one of our pictures would be overwritten.
-
-    """
-    sources = [file.shells.path for file in files]
-    chosen = [file.jobs[0].task.algorithm for file in files]
-    pictures = picture_files(sources, chosen, [file.output for file in files])
-    if not overwrite:
-        from cembench.drawing.replaceable_pictures import check_replaceable
-
-        for picture in pictures:
-            check_replaceable(picture)
-    return [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
+        tasks += plan_cells([taken], [mesh], parameters, settings, plugins, role)
+    return tuple(tasks)
 
 
 @dataclass
@@ -181,7 +136,6 @@ class Maps:
     files: Sequence[FileJobs]
     options: Options
     file_options: FileOptions
-    extras: Extras
     output: Path | None = None
     reporter: Reporter = SILENT
     keep_invalid: bool = False
@@ -192,15 +146,15 @@ class Maps:
     missing: list[Path] = field(default_factory=list)
 
     def __len__(self) -> int:
-        return sum(len(file.jobs) for file in self.files)
+        return sum(len(file.tasks) for file in self.files)
 
     def __iter__(self) -> Iterator[Mapped]:
         for file in self.files:
             own: list[Mapped] = []
-            for job in file.jobs:
-                mapped = self._mapped(file, job)
+            for surface, task in zip(file.shells.parts, file.tasks, strict=True):
+                mapped = self._mapped(file, surface, task)
                 own.append(mapped)
-                if len(own) == len(file.jobs):
+                if len(own) == len(file.tasks):
                     mapped = replace(mapped, told=(*mapped.told, *self._write(file, own)))
                 self.done.append(mapped)
                 yield mapped
@@ -225,32 +179,34 @@ class Maps:
         told: tuple[Notice, ...] = ()
         maps = self._maps(own, file.output)
         if maps and file.output is not None:
-            told = write_shells(file.output, file.shells, maps, self.file_options)
+            atlas = own[0].record.target == "atlas"
+            told = write_shells(file.output, file.shells, maps, self.file_options, atlas=atlas)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
                 equal = self.file_options.equal
                 draw_maps(file.shells, maps, file.picture, own[0].record, equal=equal)
         return tuple((file.output or file.shells.path, notice) for notice in told)
 
-    def _mapped(self, file: FileJobs, job: Job) -> Mapped:
-        mesh, algorithm = job.surface.mesh, job.task.algorithm
+    def _mapped(self, file: FileJobs, surface: SurfaceFile, task: Task) -> Mapped:
+        mesh, algorithm = surface.mesh, task.algorithm
         with self.reporter.busy(f"{algorithm.title} on {mesh.name}, {mesh.m:,} triangles"):
-            if self.apart or not may_run_here(job.task):
+            if self.apart or not may_run_here(task):
                 from cembench.running.local import map_once
 
-                record, uv = map_once(job.task, self.options)
+                record, uv = map_once(task, self.options)
             else:
-                record, uv = map_here(job.task)
+                record, uv = map_here(task)
         proof = _certificate(mesh, uv, record) if self.certificate and uv is not None else ""
-        mapped = Mapped(job.surface, record, uv, {}, certificate=proof)
+        mapped = Mapped(surface, record, uv, {}, certificate=proof)
         if uv is None or not self.writes(mapped):
             return mapped
         told: Told = ()
-        files = {"output": file.output, **self.extras.named, "preview": file.picture}
-        if self.extras.files:
+        extras = self.file_options.extras
+        files = {"output": file.output, **extras, "preview": file.picture}
+        if extras:
             with self.reporter.busy("writing"):
-                notices = write_extras(self.extras, mesh, uv, record)
-            told = tuple((self.extras.remeshed or job.surface.path, one) for one in notices)
+                notices = write_extras(self.file_options, mesh, uv, record)
+            told = tuple((self.file_options.remeshed or surface.path, one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
         return replace(mapped, written=written, told=told)
 

@@ -41,6 +41,11 @@ class FileOptions:
         A texture for the file's own coordinates, to be repainted for the new ones.
     equal : bool
         Whether several surfaces get equal parts of the unit square, not parts by their areas.
+    samples, remeshed, page : Path, optional
+        Files for a geometry image, for the surface remeshed through the map, and for a page with a
+        view of both.
+    side : int
+        Samples along a side, for the first two.
 
     """
 
@@ -48,11 +53,21 @@ class FileOptions:
     checker: bool = False
     bake: Path | None = None
     equal: bool = False
+    samples: Path | None = None
+    remeshed: Path | None = None
+    page: Path | None = None
+    side: int = 129
 
     @property
     def textured(self) -> bool:
         """Whether a texture file is written beside formats that cannot hold one."""
         return self.checker or self.bake is not None
+
+    @property
+    def extras(self) -> dict[str, Path]:
+        """The files besides the surfaces with their maps, by kind."""
+        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
+        return {what: path for what, path in named.items() if path is not None}
 
 
 def beside(output: Path, file_options: FileOptions) -> list[Path]:
@@ -78,28 +93,6 @@ def beside(output: Path, file_options: FileOptions) -> list[Path]:
         output_file=output,
         suffix=suffix,
     )
-
-
-def check_file_options(meshes: Sequence[Path], file_options: FileOptions) -> None:
-    """Raise the texture errors of :func:`write_map` before anything is mapped.
-
-    Raises
-    ------
-    ParameterError
-        Both a checkerboard and a texture, or a texture for several surfaces, are requested.
-    RenderError
-        The texture cannot be read.
-
-    """
-    if file_options.bake is None:
-        return
-    from cembench.drawing.texture import read_texture
-
-    if file_options.checker:
-        raise ParameterError.about("{checker} and {bake} each give a texture; choose one.")
-    if len(meshes) > 1:
-        raise ParameterError.about("{bake} works with one surface; map them one by one.")
-    read_texture(file_options.bake)
 
 
 def save_map(
@@ -135,22 +128,27 @@ def save_map(
 
 
 def write_shells(
-    output: Path, shells: Shells, maps: Sequence[Complex], options: FileOptions
+    output: Path,
+    shells: Shells,
+    maps: Sequence[Complex],
+    options: FileOptions,
+    *,
+    atlas: bool = False,
 ) -> tuple[Notice, ...]:
     """Write the surfaces of a file with their maps, as :func:`save_map` does.
 
     The maps of several surfaces lie side by side in the unit square. An OBJ file that was not
     repaired keeps its content and gets the coordinates. A surface that was cut is written uncut,
-    with coordinates per corner, as an atlas is.
+    with coordinates per corner; an `atlas` has an image for each corner anyway.
     """
     if len(maps) > 1:
         moved = packed(maps, areas_of(shells.parts), equal=options.equal)
-    elif len(maps[0]) == 3 * len(shells.F):
+    elif atlas:
         mesh = shells.parts[0].mesh
-        atlas = cut_map(mesh, maps[0].reshape(-1, 3))
-        uv = placed(atlas.uv, options.place)
-        soup = Soup.of_triangles(mesh.V, mesh.F, uv, atlas.surface.F, name=mesh.name)
-        return _save(output, [soup], atlas.uv, options)
+        found = cut_map(mesh, maps[0].reshape(-1, 3))
+        uv = placed(found.uv, options.place)
+        soup = Soup.of_triangles(mesh.V, mesh.F, uv, found.surface.F, name=mesh.name)
+        return _save(output, [soup], found.uv, options)
     else:
         moved = [placed(maps[0], options.place)]
     uv, corners = shells.joined(moved)

@@ -27,7 +27,6 @@ from cembench.core.reporter import Reporter
 
 if TYPE_CHECKING:
     from cembench.mesh.triangle_mesh import TriangleMesh
-    from cembench.registry import Registry
     from cembench.results.records import Record
 
 #: Control codes are replaced by visible symbols; tabs and line ends are kept.
@@ -220,13 +219,6 @@ class Shown(Reporter):
 
 
 SHOWN = Shown()
-
-
-def registry_with(plugins: Sequence[str]) -> Registry:
-    """Load the registry with the user's plug-ins, behind a spinner that names them."""
-    from cembench.api.settings import registry_with as loaded
-
-    return loaded(plugins, SHOWN)
 
 
 def split(names: list[str]) -> list[str]:

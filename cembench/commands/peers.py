@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cembench.api.benchmark import benchmark
+from cembench.api.settings import registry_with
 from cembench.commands.app import app
 from cembench.commands.console import (
     SHOWN,
@@ -15,7 +16,6 @@ from cembench.commands.console import (
     failures,
     out,
     print_json,
-    registry_with,
     split,
 )
 from cembench.commands.external import Command, Settings, declared_command
@@ -76,7 +76,7 @@ def peers(
     given = call.keywords
     declared, named = declared_command(command, program)
     plugins = [*given["plugins"], *declared]
-    registry = registry_with(plugins)
+    registry = registry_with(plugins, SHOWN)
     asked = list(given["algorithms"] or ())
     wanted = [registry.algorithm(name) for name in [*asked, *named]]
     chosen = wanted if asked else [*_usual(registry), *wanted]

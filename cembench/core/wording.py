@@ -20,10 +20,7 @@ class Setting:
         return f"{self.name}={self.value}" if self.value else f"`{self.name}`"
 
     def in_shell(self, options: Mapping[str, str]) -> str:
-        """Return it as an option; `options` names those that do not follow from the argument.
-
-        A name without a dash is that of a word at its place, not of an option.
-        """
+        """Return it as an option; `options` has irregular ones, and words without a dash."""
         option = options.get(self.name, f"--{self.name.replace('_', '-')}")
         value = self.value.strip("'\"")
         if not option.startswith("-"):
