@@ -139,6 +139,8 @@ class Algorithm(_Registered):
     mesh_type: type[TriangleMesh] = DiskMesh
     source: str = ""
     steps: Steps | None = None
+    #: Gives its map on a refinement of the mesh, if it has one: `mesh`, `uv` and `extras`.
+    refinement: Callable[..., Any] | None = None
     usual: bool = True
     #: Whether its maps converge to conformal ones under refinement; `validate` checks that.
     conformal: bool = True
@@ -169,6 +171,7 @@ def algorithm(
     source: str = "",
     notes: str = "",
     steps: Steps | None = None,
+    refinement: Callable[..., Any] | None = None,
     usual: bool = True,
     conformal: bool = True,
     library: Library | None = None,
@@ -195,6 +198,9 @@ def algorithm(
         first line).
     steps : callable, optional
         Takes a mesh, `sweeps` and `outer`, and yields every :class:`MapStep` on the way to the map.
+    refinement : callable, optional
+        Takes what the algorithm takes, and returns its map on a refinement of the mesh: an object
+        with `mesh`, whose first vertices are those of the given one, `uv` and `extras`.
     usual : bool
         Whether a run measures it when no algorithms are named.
     conformal : bool
@@ -235,6 +241,7 @@ def algorithm(
         "source": source,
         "notes": notes,
         "steps": steps,
+        "refinement": refinement,
         "library": library,
         "usual": usual,
         "conformal": conformal,

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,9 @@ from cembench.registry import algorithm
 from .flat_metric import SHORTER, UPHILL
 from .triangle_map import K, disk_of_triangle
 
+if TYPE_CHECKING:
+    from .overlay import RefinedMap
+
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Indices = NDArray[np.int64]
@@ -38,12 +43,20 @@ NEARLY = 1e-6
 KEPT = 1e-3
 
 
+def _overlay(mesh: DiskMesh, **parameters: Any) -> RefinedMap:
+    """Return the map on the common refinement of the mesh and the flipped triangulation."""
+    from .overlay import refined_map  # which needs this module
+
+    return refined_map(mesh, **parameters)
+
+
 @algorithm(
     "cetm-flips",
     title="CETM, flips",
     target="disk",
     source="Gu, Luo, Sun & Wu 2018; Gillespie, Springborn & Crane 2021; Campen et al. 2021",
     usual=False,
+    refinement=_overlay,
 )
 @with_last_resort
 def cetm_flips(
@@ -73,18 +86,13 @@ def cetm_flips(
     and their lengths after laying them out triangle by triangle. The map consists of the images of
     the vertices. The surface's own triangles, between straight edges, differ from the flipped ones:
     those that fold are counted (`folded_before_repair`) and repaired as in CEM (`fold_repairs`).
-    `last_resort` makes the map valid in any case.
+    `last_resort` makes the map valid in any case. ``parameterize(..., overlay=True)`` returns it on
+    the common refinement of both triangulations instead.
     """
     b = mesh.boundary
-    cones = _cones(mesh, BorderedLaplacian(mesh, laplacian(mesh, delaunay=True), (b,)))
-    double = doubled(mesh)
-    with phase("flips"):
-        T = Triangulation.doubled(mesh.F, mesh.V, double.mirror)
-        T.make_delaunay(np.zeros(double.size), flat=True)
-    u, residual, iterations = _flattened(T, double.half, cones, tolerance, max_iterations)
+    flat = uniformised(mesh, tolerance, max_iterations)
     with phase("layout"):
-        z, off = _laid_out(T, u, cones, mesh.n)
-        uv = disk_of_triangle(z)
+        uv = disk_of_triangle(flat.z)
     if not np.isfinite(uv).all():
         raise AlgorithmFailed("a vertex is mapped to the wrong side of the boundary")
     uv[b] /= np.abs(uv[b])
@@ -92,13 +100,73 @@ def cetm_flips(
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
     uv, told = accepted_repair(mesh, uv, repair=repair)
-    told |= {
+    return Parameterization(uv, flat.iterations, extras=told | flat.told)
+
+
+@dataclass(frozen=True)
+class Uniformised:
+    """A disk flattened to an equilateral triangle.
+
+    Parameters
+    ----------
+    T : Triangulation
+        The flipped triangulation of the surface and its mirror copy.
+    u : float (size,)
+        The scale of its vertices.
+    P : complex (m', 3)
+        Images of the corners of its triangles, which may lie in mirror images of the equilateral
+        triangle of `disk_of_triangle`.
+    z : complex (n,)
+        Images of the surface's vertices.
+    iterations : int
+        Newton steps.
+    told : dict
+        Further results of cetm-flips.
+
+    """
+
+    T: Triangulation
+    u: Real
+    P: Complex
+    z: Complex
+    iterations: int
+    told: dict[str, Any]
+
+
+def uniformised(
+    mesh: DiskMesh,
+    tolerance: float,
+    max_iterations: int,
+    watch: Callable[[Triangulation], object] = lambda T: None,
+) -> Uniformised:
+    """Flatten a disk to an equilateral triangle.
+
+    `watch` is called with the triangulation before all flips, and once it is Delaunay.
+
+    Raises
+    ------
+    AlgorithmFailed
+        Newton's method or the layout fails.
+
+    """
+    b = mesh.boundary
+    cones = _cones(mesh, BorderedLaplacian(mesh, laplacian(mesh, delaunay=True), (b,)))
+    double = doubled(mesh)
+    with phase("flips"):
+        T = Triangulation.doubled(mesh.F, mesh.V, double.mirror)
+        watch(T)
+        T.make_delaunay(np.zeros(double.size), flat=True)
+        watch(T)
+    u, residual, iterations = _flattened(T, double.half, cones, tolerance, max_iterations)
+    with phase("layout"):
+        P, z, off = _laid_out(T, u, cones, mesh.n)
+    told = {
         "curvature": residual,
         "flips": T.flips,
         "layout": off,
         "corners": cones.tolist(),
     }
-    return Parameterization(uv, iterations, extras=told)
+    return Uniformised(T, u, P, z, iterations, told)
 
 
 def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:
@@ -179,8 +247,10 @@ def _flattened(
     )
 
 
-def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Complex, float]:
-    """Return the positions of the surface's vertices (n,) in the triangle of `disk_of_triangle`.
+def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Complex, Complex, float]:
+    """Return the positions of corners (m, 3) and the surface's vertices (n,).
+
+    They are those in the triangle of `disk_of_triangle`.
 
     Triangles are unfolded in turn, starting from the largest. A vertex beyond an edge of the
     equilateral triangle lies in a mirror image of it, whose corners belong to a lattice.
@@ -212,9 +282,10 @@ def _laid_out(T: Triangulation, u: Real, cones: Indices, n: int) -> tuple[Comple
         reached[front] = True
     off = np.abs(np.abs(np.roll(P, -1, axis=1) - P) / sides - 1)
     to_disk = _to_corners(T, P, cones)
+    P = to_disk[0] * (P - to_disk[1])
     z = np.empty(u.shape, dtype=np.complex128)
-    z[T.F.ravel()] = to_disk[0] * (P.ravel() - to_disk[1])
-    return z[:n], float(off[np.isfinite(off)].max())
+    z[T.F.ravel()] = P.ravel()
+    return P, z[:n], float(off[np.isfinite(off)].max())
 
 
 def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, complex]:

@@ -7,7 +7,7 @@ import html
 import os
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -21,12 +21,14 @@ from cembench.api.settings import Placement
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
+from cembench.core.parameterization import Parameterization
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
-from cembench.results.records import Outcome
-from cembench.running.map_checks import figures
-from cembench.running.measure import check_cell
+from cembench.results.records import Cell, Outcome
+from cembench.running.map_checks import figures, judged_check
+from cembench.running.map_promises import Promise
+from cembench.running.measure import call_cell, check_cell
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import SurfaceInput, load_surface
 
@@ -369,6 +371,7 @@ def parameterize(
     algorithm: str | None = None,
     keep_invalid: bool = False,
     check: Check = "full",
+    overlay: bool = False,
     plugins: Iterable[str] = (),
     **parameters: Any,
 ) -> Result:
@@ -390,6 +393,10 @@ def parameterize(
     check : {"full", "fast"}
         With "fast" only the promises of the map's class are checked, such as no folds: there are
         no notices on its quality, and :attr:`Result.metrics` are computed when asked for.
+    overlay : bool
+        Whether the map is on a refinement of the surface, without folds by construction; then
+        :attr:`Result.mesh` is that. ``"cetm-flips"`` has it: the mesh cut along the edges of the
+        flipped triangulation.
     plugins : iterable of str
         Python files or ``module:name`` with more algorithms.
     **parameters
@@ -407,7 +414,8 @@ def parameterize(
     RegistryError
         The algorithm is unknown.
     ParameterError
-        A parameter or a check is unknown, a value is out of range, or two algorithms are named.
+        A parameter or a check is unknown, a value is out of range, two algorithms are named, or
+        there is no `overlay` of the algorithm.
     AlgorithmFailed
         No map was found, or the map is not valid and `keep_invalid` is False.
 
@@ -439,7 +447,33 @@ def parameterize(
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
     full = check == "full"
-    outcome, z = check_cell(chosen, task.mesh, task.cell, memory=False, figures=full)
+    if overlay:
+        outcome, mesh, z = _refined(chosen, task.mesh, task.cell, full)
+    else:
+        outcome, z = check_cell(chosen, task.mesh, task.cell, memory=False, figures=full)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)
+
+
+def _refined(
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, full: bool
+) -> tuple[Outcome, TriangleMesh, NDArray[np.complex128] | None]:
+    """Map a surface by an algorithm's refinement; return the outcome, that mesh and its map."""
+    refinement = algorithm.refinement
+    if refinement is None:
+        raise ParameterError(
+            f"{algorithm.name} has no overlay: its map is on the surface's own triangles. Use "
+            "cetm-flips."
+        )
+    kept: list[Any] = []
+
+    def at_given_vertices(mesh: TriangleMesh, **parameters: Any) -> Parameterization:
+        kept.append(refinement(mesh, **parameters))
+        return Parameterization(kept[-1].uv[: mesh.n].copy(), extras=kept[-1].extras)
+
+    called, z = call_cell(replace(algorithm, function=at_given_vertices), mesh, cell, memory=False)
+    if z is None:
+        return called, mesh, None
+    fine, uv = kept[-1].mesh, kept[-1].uv
+    return judged_check(Promise.of(algorithm), fine, called, uv, figures=full), fine, uv

@@ -41,6 +41,8 @@ class Triangulation:
         Equal for twins.
     flips : int
         Number of flips so far.
+    log : list of int64 arrays, optional
+        If there is one, the half-edges that were flipped are added to it, a round at a time.
 
     """
 
@@ -48,6 +50,7 @@ class Triangulation:
     twin: Indices
     log_length: Real
     flips: int = 0
+    log: list[Indices] | None = None
 
     @classmethod
     def doubled(cls, F: Indices, V: Real, mirror: Indices) -> Triangulation:
@@ -130,6 +133,8 @@ class Triangulation:
 
         Half-edges of the triangles that change are found at other places after that.
         """
+        if self.log is not None:
+            self.log.append(h)
         g = self.twin[h]
         t, s = h // 3, g // 3
         n1, n2 = (3 * t + (h + d) % 3 for d in (1, 2))

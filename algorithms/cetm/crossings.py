@@ -1,0 +1,212 @@
+"""Where the edges of a mesh cross those of the triangulation that flips make of it.
+
+Each given edge is a path on the flipped triangulation: the list of its edges that it crosses, with
+no detour, since both are geodesics of one hyperbolic metric. A flip of the edge ij of the quad
+i l j k to kl changes only the crossings inside the quad, and in integers alone: a path crosses kl
+if it comes in on the side of i and leaves on that of j.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Indices = NDArray[np.int64]
+
+#: No crossing: a path begins or ends at a vertex.
+END = -1
+
+
+@dataclass
+class Crossings:
+    """Paths of given edges over a triangulation, updated flip by flip.
+
+    Edges have an orientation, that of their first half-edge; a given edge has its own, that of its
+    first half-edge before all flips.
+
+    Parameters
+    ----------
+    F, twin : lists of int
+        The triangulation, by half-edges (3 m).
+    edge, sign : lists of int
+        Each half-edge's edge, and 1 if it runs the same way, else -1.
+
+    """
+
+    F: list[int]
+    twin: list[int]
+    edge: list[int]
+    sign: list[int]
+    #: The crossings on each edge, along it; and, for an edge that is a given one, that and 1 if it
+    #: runs the same way, else -1.
+    on_edge: list[list[int]] = field(default_factory=list)
+    along: dict[int, tuple[int, int]] = field(default_factory=dict)
+    #: The first and the last crossing of each given edge.
+    first: list[int] = field(default_factory=list)
+    last: list[int] = field(default_factory=list)
+    #: Of each crossing: the one before and after on its given edge, that, and 1 if the given edge
+    #: comes from the left of the other one, else -1.
+    before: list[int] = field(default_factory=list)
+    after: list[int] = field(default_factory=list)
+    given: list[int] = field(default_factory=list)
+    side: list[int] = field(default_factory=list)
+
+    @classmethod
+    def none(cls, F: Indices, twin: Indices) -> Crossings:
+        """Return the paths before the first flip: every edge is a given one."""
+        h = np.arange(len(twin))
+        own = np.minimum(h, twin)
+        edge = np.unique(own, return_inverse=True)[1]
+        count = int(edge.max()) + 1
+        return cls(
+            F.ravel().tolist(),
+            twin.tolist(),
+            edge.tolist(),
+            np.where(h == own, 1, -1).tolist(),
+            on_edge=[[] for _ in range(count)],
+            along={e: (e, 1) for e in range(count)},
+            first=[END] * count,
+            last=[END] * count,
+        )
+
+    @property
+    def first_half_edge(self) -> list[int]:
+        """The half-edge along each edge."""
+        found = [END] * len(self.on_edge)
+        for h, (e, sign) in enumerate(zip(self.edge, self.sign, strict=True)):
+            if sign > 0:
+                found[e] = h
+        return found
+
+    def flip_all(self, rounds: Iterable[Indices]) -> None:
+        """Flip edges that are given by half-edges, in rounds that share no triangle."""
+        for some in rounds:
+            for h in some.tolist():
+                self.flip(h)
+
+    def path(self, given: int) -> list[int]:
+        """Return the crossings of a given edge, along it."""
+        found, at = [], self.first[given]
+        while at != END:
+            found.append(at)
+            at = self.after[at]
+        return found
+
+    def _along(self, h: int) -> list[int]:
+        """Return the crossings on a half-edge, along it."""
+        there = self.on_edge[self.edge[h]]
+        return there if self.sign[h] > 0 else there[::-1]
+
+    def _inside(self, x: int, h: int) -> int:
+        """Return the next crossing on the path of x into the triangle of a half-edge with x."""
+        return self.before[x] if self.side[x] == self.sign[h] else self.after[x]
+
+    def _leaves(self, x: int, y: int, sides: Sequence[int]) -> int:
+        """Return the half-edge, of two, by which a path from x leaves a triangle at y."""
+        for h in sides:
+            if self.on_edge[self.edge[h]] and self._inside(y, h) == x and y in self._along(h):
+                return h
+        raise AssertionError("a path leaves a triangle nowhere")
+
+    def flip(self, h: int) -> None:
+        """Flip the edge of a half-edge, as :class:`cembench.mesh.intrinsic.Triangulation` does."""
+        g = self.twin[h]
+        t, s = h // 3, g // 3
+        n1, n2 = (3 * t + (h + d) % 3 for d in (1, 2))
+        m1, m2 = (3 * s + (g + d) % 3 for d in (1, 2))
+        e = self.edge[h]
+        crossing = self._across(h, g, (n1, n2), (m1, m2))
+        own, runs = self.along.pop(e, (END, 0))
+        from_i = runs == self.sign[h]
+        for x in self.on_edge[e]:
+            self._remove(x, h, e)
+        i, j, k, ell = (self.F[x] for x in (h, g, n2, m2))
+        old, now = (n2, m1, m2, n1), (3 * t, 3 * t + 1, 3 * s, 3 * s + 1)
+        to = dict(zip(old, now, strict=True))
+        partners = [to.get(self.twin[x], self.twin[x]) for x in old]
+        kept = [(self.edge[x], self.sign[x]) for x in old]
+        for x, partner, (edge, sign) in zip(now, partners, kept, strict=True):
+            self.twin[x], self.twin[partner] = partner, x
+            self.edge[x], self.sign[x] = edge, sign
+        self.F[3 * t : 3 * t + 3], self.F[3 * s : 3 * s + 3] = [k, i, ell], [ell, j, k]
+        self.twin[3 * t + 2], self.twin[3 * s + 2] = 3 * s + 2, 3 * t + 2
+        self.edge[3 * t + 2] = self.edge[3 * s + 2] = e
+        self.sign[3 * t + 2], self.sign[3 * s + 2] = 1, -1
+        self.on_edge[e] = [
+            self._insert(*(one if one[3] != END else (END, END, from_i, own))) for one in crossing
+        ][::-1]
+
+    def _across(
+        self, h: int, g: int, one: tuple[int, int], other: tuple[int, int]
+    ) -> list[tuple[int, int, bool, int]]:
+        """Return the paths that cross the new edge kl, in order from k.
+
+        Each as its crossings on the side of i and on that of j, whether the former comes first, and
+        its given edge. An edge ij that is itself a given one is marked by the given edge END.
+        """
+        (n1, n2), (m1, m2) = one, other
+        found: list[tuple[int, int, bool, int]] = []
+
+        def comes_first(x: int, half: int) -> bool:
+            """Whether the path of x, on the side of i, goes into the quad after x."""
+            return self.side[x] != self.sign[half]
+
+        for x in self._along(n2):
+            y = self._inside(x, n2)
+            if y != END and self._leaves(x, y, (h, n1)) == h:
+                x_in, y = y, self._inside(y, g)
+                if y == END or self._leaves(x_in, y, (m1, m2)) == m1:
+                    continue
+            found.append((x, y, comes_first(x, n2), self.given[x]))
+        for y in self._along(n1)[::-1]:
+            if self._inside(y, n1) == END:
+                found.append((END, y, self.side[y] == self.sign[n1], self.given[y]))
+        if self.edge[h] in self.along:
+            found.append((END, END, True, END))
+        for y in self._along(m2)[::-1]:
+            if self._inside(y, m2) == END:
+                found.append((END, y, self.side[y] == self.sign[m2], self.given[y]))
+        for x in self._along(m1):
+            y = self._inside(x, m1)
+            if y != END and self._leaves(x, y, (g, m2)) == g:
+                x_in, y = y, self._inside(y, h)
+                if y == END or self._leaves(x_in, y, (n1, n2)) == n2:
+                    continue
+            found.append((x, y, comes_first(x, m1), self.given[x]))
+        return found
+
+    def _remove(self, x: int, h: int, e: int) -> None:
+        """Take a crossing with the flipped edge out of its path."""
+        before, after, given = self.before[x], self.after[x], self.given[x]
+        if before == after == END:  # from k to l or back: the new edge runs from l to k
+            self.along[e] = given, -1 if self.side[x] == self.sign[h] else 1
+        self._join(before, after, given)
+
+    def _join(self, x: int, y: int, given: int) -> None:
+        """Let y follow x on a given edge; END for its ends."""
+        if x == END:
+            self.first[given] = y
+        else:
+            self.after[x] = y
+        if y == END:
+            self.last[given] = x
+        else:
+            self.before[y] = x
+
+    def _insert(self, x: int, y: int, x_first: bool, given: int) -> int:
+        """Add a crossing between x, on the side of i, and y; return it."""
+        new = len(self.before)
+        for values, value in (
+            (self.before, END),
+            (self.after, END),
+            (self.given, given),
+            (self.side, 1 if x_first else -1),
+        ):
+            values.append(value)
+        x, y = (x, y) if x_first else (y, x)
+        self._join(x, new, given)
+        self._join(new, y, given)
+        return new
