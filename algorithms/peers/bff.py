@@ -23,7 +23,7 @@ _REMEDY = (
 def bff(mesh: DiskMesh) -> None:
     """Map a disk by boundary first flattening with a free boundary.
 
-    Untested: written from the program's usage text. The program writes six digits.
+    The program writes six decimals, so its image is scaled by a million.
     """
 
 
@@ -40,6 +40,6 @@ def bff(mesh: DiskMesh) -> None:
 def bff_disk(mesh: DiskMesh) -> None:
     """Map a disk by boundary first flattening with the disk as target.
 
-    Untested: written from the program's usage text. The program writes six digits, so its boundary
-    may be 1e-5 off the circle.
+    The program sets the curvature of the boundary and closes the curve: it lies within about 1e-3
+    of a circle, which is fitted.
     """

@@ -73,7 +73,9 @@ def fdm_program(mesh: DiskMesh) -> None:
     target="disk",
     source="Choi & Lui 2018",
     **declaration(
-        "CEMBENCH_LDM_PROGRAM", "linear_disk_map", "the authors (https://www.math.cuhk.edu.hk/~ptchoi)"
+        "CEMBENCH_LDM_PROGRAM",
+        "linear_disk_map",
+        "the authors (https://www.math.cuhk.edu.hk/~ptchoi)",
     ),
 )
 def ldm_program(mesh: DiskMesh) -> None:

@@ -95,6 +95,8 @@ def printed(evidence: Evidence, *_: Any) -> pd.DataFrame:
     import pandas as pd
 
     paper, rows = evidence.paper, []
+    if not _figures(paper):
+        return evidence.frame.iloc[:0].assign(measured=False)
     there = {surface.paper_row for surface in evidence.models}
     for place, model in enumerate(paper.models):
         for k, algorithm in enumerate(paper.algorithms):

@@ -1,4 +1,4 @@
-"""The two surfaces of OpenABF's benchmark, by the formulas of `examples/src/BenchmarkFlattening.cpp`.
+"""The two surfaces of OpenABF's benchmark, by its formulas (`BenchmarkFlattening.cpp`).
 
 Given the benchmark's targets, 50,000 to 1,000,000, they have its counts of triangles.
 """

@@ -24,7 +24,7 @@ from cembench.results.columns import COLUMNS, DERIVED, family_of
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
-from cembench.results.papers import NO_PAPER, Paper, papers
+from cembench.results.papers import Paper, papers, usual_paper
 from cembench.results.records import REFERENCE, Cell, MeshOrigin, Record
 from cembench.results.store import Store
 
@@ -142,7 +142,7 @@ class Evidence:
         def rows(paper: Paper) -> int:
             return sum(held[model] for model in paper.models)
 
-        return self.asked or max(papers().values(), key=rows, default=NO_PAPER)
+        return self.asked or max((usual_paper(), *papers().values()), key=rows)
 
     @property
     def reference(self) -> str:

@@ -245,8 +245,6 @@ def _paper_summary(run: _Run) -> Section:
 def _tables(run: _Run) -> Section | None:
     """Return the paper's tables, each comparison of seconds with its averages and certainty."""
     evidence, printed = run.evidence, run.evidence.paper.printed
-    if not printed:
-        return None
     items: list[Item] = []
     for number in sorted(printed):
         if printed[number].compares:
@@ -255,8 +253,9 @@ def _tables(run: _Run) -> Section | None:
             items += printed_tables(evidence, number)
         if any(figure.column == "seconds" for figure in printed[number].figures):
             items += work_tables(evidence)
-    numbers = sorted(evidence.paper.tables)
-    return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
+    numbers = sorted(number for number, table in printed.items() if table.figures)
+    title = f"Tables {numbers[0]} to {numbers[-1]}" if numbers else ""
+    return Section("tables", title, tuple(items)) if items else None
 
 
 #: Plots of time, and tables of what does not compare with the rest.

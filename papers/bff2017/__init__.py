@@ -1,0 +1,1 @@
+"""Boundary first flattening, 2017, with its authors' program."""

@@ -1,0 +1,1 @@
+"""Discrete conformal equivalence of polyhedral surfaces, 2021."""

@@ -1,0 +1,1 @@
+"""The linear disk conformal map of 2018."""
