@@ -332,7 +332,8 @@ _OF_OWN_SURFACES: tuple[_Maker, ...] = (
 )
 _OVER_MANY: tuple[_Maker, ...] = (
     lambda run: machines_section(run.evidence),
-    lambda run: many_surfaces.many_section(run.evidence, run.shown, run.seen, run.folder),
+    lambda run: many_surfaces.many_section(run.evidence, run.folder),
+    lambda run: many_surfaces.hard_section(run.evidence, run.shown, run.seen),
     _costs,
 )
 
