@@ -46,9 +46,12 @@ def nearest_real(sets: Sequence[str], *, made: bool = False) -> Section:
         registry,
         [registry.algorithm(MAPPED_BY)],
     )
-    real = {mesh.name: one for mesh in progress(found.meshes) if (one := facts(mesh, registry))}
+    known = {d.mesh_hash: d.name for d in registry.datasets.values() if d.mesh_hash}
+    meshes = [mesh.renamed(known.get(mesh.hash, mesh.name)) for mesh in found.meshes]
+    real = {mesh.name: one for mesh in progress(meshes) if (one := facts(mesh, registry))}
     stand_ins = {row: facts(mesh, registry) for row, mesh in progress(list(kept(registry, made)))}
-    own = {role.paper_row: name for name, role in found.roles.items() if role.paper_row}
+    own = {d.paper_row: d.name for d in registry.datasets.values() if d.paper_row}
+    own = {row: name for row, name in own.items() if name in real}
     rows = []
     for row in CEM_PAPER.models:
         wanted, stand_in = printed(row), stand_ins.get(row)
@@ -64,9 +67,9 @@ def nearest_real(sets: Sequence[str], *, made: bool = False) -> Section:
             }
         )
     about = (
-        f"Nearest of {len(real)} real disks of {len({found.roles[n].family for n in real})} "
-        "families. Obtuse: triangles with an angle above 120 degrees. Crowding: the 99 over the 1 "
-        "percentile of image length over length along the boundary, in the common gauge."
+        f"Nearest of {len(real)} real disks. Obtuse: triangles with an angle above 120 degrees. "
+        "Crowding: the 99 over the 1 percentile of image length over length along the boundary, in "
+        "the common gauge."
     )
     return Section([about, Table(rows, LAYOUT)], "docs/surfaces.md")
 
