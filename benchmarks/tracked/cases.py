@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from cembench.conformal.beltrami import (
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
+from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
@@ -32,6 +34,12 @@ DISKS = ("spherical-cap", "hemi-ellipsoid")
 MORE_DISKS = (*DISKS, "swiss-roll", "catenoid-sheet")
 HOLED = ("catenoid-ring",)
 MORE_HOLED = (*HOLED, "holed-cap")
+
+#: Real disks, which are tracked where they are at hand: a scan of a face, and of a bust, of whose
+#: edges 5 and 0.1 % are not Delaunay.
+REAL = ("human_face.obj", "demosthenes.off")
+#: Environment variable for their folder.
+MESHES_VARIABLE = "CEMBENCH_TEST_MESHES"
 
 FACES = (2_000, 20_000)
 MORE_FACES = (*FACES, 80_000, 320_000)
@@ -48,10 +56,33 @@ def surface(name: str, faces: int) -> TriangleMesh:
     return generate_surface(load_registry(), name, faces)
 
 
+def real_disks() -> list[str]:
+    """The names of the real disks that are at hand."""
+    folder = os.environ.get(MESHES_VARIABLE)
+    return [name for name in REAL if folder and (Path(folder) / name).is_file()]
+
+
+@lru_cache(maxsize=2)
+def real_disk(name: str) -> TriangleMesh:
+    """The real disk of this name; the same one at every call."""
+    return read_mesh(Path(os.environ[MESHES_VARIABLE]) / name)
+
+
 def algorithm_names(mesh_type: type[TriangleMesh]) -> list[str]:
     """The usual algorithms that take this kind of surface."""
     algorithms = load_registry().algorithms.values()
     return sorted(a.name for a in algorithms if a.usual and issubclass(mesh_type, a.mesh_type))
+
+
+def field_names() -> list[str]:
+    """The other algorithms of the field that take a disk, which runs measure if they are named."""
+    found = load_registry().algorithms.values()
+    choose = ("best", "best-holes")  # they call the others
+    return sorted(
+        a.name
+        for a in found
+        if not a.usual and a.name not in choose and issubclass(DiskMesh, a.mesh_type)
+    )
 
 
 def mapping(algorithm: str, mesh: TriangleMesh) -> Callable[[], Any]:

@@ -316,7 +316,7 @@ def benchmark(
     mesh_dir : sequence of paths
         All mesh files in a folder but NPZ; those that cannot be used are left out.
     sets : sequence of str
-        Many surfaces: real-disks, real-holes, closed, stress, ict-faces, ict-faces-holes,
+        Many surfaces: real-disks, real-holes, closed, stress, corpus, ict-faces, ict-faces-holes,
         thingi10k, a folder, or an archive. One round each, unless `rounds` or `precision` is given.
     limit : int, optional
         Surfaces of each of the `sets`, at most.

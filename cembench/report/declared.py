@@ -12,9 +12,10 @@ Its rows are records, or algorithms with figures over their records::
       { title = "median", unit = "degrees", value = "median(angle_error_mean_deg)", form = ".2f" },
     ]
 
-Columns of records name a column of the frame (:mod:`cembench.results.columns`); those of algorithms
-are expressions (:mod:`cembench.results.frame`). Every entry keeps its record's key, its origin, and
-why it has no number.
+With ``rows = "cause"`` a row has the records on the surfaces that are hard for one reason
+(:mod:`cembench.report.content.causes`). Columns of records name a column of the frame
+(:mod:`cembench.results.columns`); the others are expressions (:mod:`cembench.results.frame`). Every
+entry keeps its record's key, its origin, and why it has no number.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from pydantic import Field, model_validator
 
 from cembench.core.names import slug
+from cembench.report.content.causes import by_cause
 from cembench.report.content.evidence import DISK, Evidence
 from cembench.report.declarations import Declaration, filled, own, parsed, read
 from cembench.report.document import (
@@ -139,7 +141,7 @@ class DeclaredTable(Declaration):
 
     title: str
     columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
-    rows: Literal["record", "algorithm"] = "record"
+    rows: Literal["record", "algorithm", "cause"] = "record"
     where: str = ""
     #: "first": the run's first linear-algebra policy; "all".
     policy: Literal["first", "all"] = "first"
@@ -151,9 +153,9 @@ class DeclaredTable(Declaration):
 
     @model_validator(mode="after")
     def _fits(self) -> DeclaredTable:
-        wrong = [c for c in self.columns if bool(c.value) != (self.rows == "algorithm")]
+        wrong = [c for c in self.columns if bool(c.value) == (self.rows == "record")]
         if wrong:
-            what = "expressions (value)" if self.rows == "algorithm" else "columns (column)"
+            what = "columns (column)" if self.rows == "record" else "expressions (value)"
             raise ValueError(f'rows = "{self.rows}" takes {what}, not {wrong[0].title!r}')
         return self
 
@@ -270,8 +272,12 @@ def _columns(
         made = [[_entry(evidence, row, one) for row in chosen] for one in spec.columns]
     else:
         frame = _frame_of(evidence, chosen).sort_values("series", kind="stable")
-        groups = list(frame.groupby("label", sort=False))
-        first = [(Column("algorithm", numeric=False), [words(str(label)) for label, _ in groups])]
+        groups = (
+            by_cause(evidence, frame)
+            if spec.rows == "cause"
+            else list(frame.groupby("label", sort=False))
+        )
+        first = [(Column(spec.rows, numeric=False), [words(str(label)) for label, _ in groups])]
         made = [[_aggregate(one, group) for _, group in groups] for one in spec.columns]
     return first + [
         (one.heading, values)

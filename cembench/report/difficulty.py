@@ -1,4 +1,4 @@
-"""Difficulty of surfaces (size, thin triangles, crowding) and its effect on maps."""
+"""Difficulty of surfaces (thin and coarse triangles, chords, seams, crowding) for maps."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.laplacian import half_cotangents
 from cembench.conformal.metrics import in_common_gauge, is_disk_map
 from cembench.core.errors import AlgorithmFailed
+from cembench.mesh.side_lengths import side_lengths
+from cembench.mesh.topology import undirected_edges
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.surface_facts import factor_spans
+
+#: An angle of a triangle above this, in degrees, counts as obtuse.
+OBTUSE = 120.0
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,62 @@ class Difficulty:
 
     span: float
     crowding: float
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What of a triangulation makes maps hard, whatever map is taken.
+
+    Parameters
+    ----------
+    obtuse_share : float
+        Share of triangles with an angle above :data:`OBTUSE`.
+    chord_share : float
+        Number of interior edges with both ends on the boundary, over that of boundary vertices.
+    angle_defect : float
+        Mean curvature that a vertex of the interior holds, |2 pi - sum of its angles|, in degrees:
+        how coarse the surface is.
+    boundary_excess : float
+        Length of the boundary over that of a flat disk of the same area, 2 sqrt(pi A): large for
+        surfaces with seams, cuts that follow a tree.
+
+    """
+
+    obtuse_share: float
+    chord_share: float
+    angle_defect: float
+    boundary_excess: float
+
+
+def shape(mesh: TriangleMesh) -> Shape:
+    """Return what of a triangulation makes maps hard.
+
+    >>> import cembench
+    >>> flat = shape(cembench.surface("flat-disk", 500))
+    >>> round(flat.boundary_excess, 1), flat.chord_share, flat.angle_defect < 1e-6
+    (1.0, 0.0, True)
+    """
+    angles = np.degrees(np.arctan2(1, 2 * half_cotangents(mesh.V, mesh.F)))
+    angles = np.where(angles < 0, angles + 180, angles)
+    on_boundary = np.zeros(mesh.n, dtype=bool)
+    on_boundary[np.concatenate(mesh.loops)] = True
+    edges, _ = undirected_edges(mesh.F)
+    around = sum(len(loop) for loop in mesh.loops)  # as many edges as vertices
+    chords = int(on_boundary[edges].all(axis=1).sum()) - around
+    total = np.bincount(mesh.F.ravel(), angles.ravel(), mesh.n)[~on_boundary]
+    sides = side_lengths(mesh.V, mesh.F)
+    p = sides.sum(axis=1) / 2
+    area = float(np.sqrt(np.maximum(p * np.prod(p[:, None] - sides, axis=1), 0)).sum())
+    length = sum(
+        float(np.linalg.norm(mesh.V[np.roll(loop, -1)] - mesh.V[loop], axis=1).sum())
+        for loop in mesh.loops
+    )
+    return Shape(
+        float((angles.max(axis=1) > OBTUSE).mean()),
+        chords / around,
+        float(np.abs(360 - total).mean()) if len(total) else 0.0,
+        length / (2 * np.sqrt(np.pi * area)),
+    )
 
 
 def difficulty(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> Difficulty | None:

@@ -9,6 +9,7 @@ import pytest
 from benchmarks.tracked import algorithms, cases
 from benchmarks.tracked import kernels as kernels_module
 from cembench.mesh.triangle_mesh import DiskMesh
+from tests.real_meshes import real_mesh
 
 ROOT = Path(__file__).parents[2]
 
@@ -30,6 +31,23 @@ def test_every_disk_algorithm_is_tracked_by_its_energy_angles_and_folds(algorith
     assert bench.track_folds(*case) == 0
     assert 0 < bench.track_conformal_energy(*case) < 0.1
     assert 0 < bench.track_angle_error(*case) < 10
+
+
+def test_the_fields_algorithms_are_tracked_and_real_disks_where_they_are_at_hand(monkeypatch):
+    assert {"bff", "cetm-flips", "scp"} <= set(cases.field_names())
+    assert not {"best", "cem"} & set(cases.field_names())
+    assert algorithms.Field.params[0] == cases.field_names()
+    folder = real_mesh("demosthenes.off").parent
+    for there, names in ((str(folder), cases.REAL), ("nowhere", ())):
+        monkeypatch.setenv(cases.MESHES_VARIABLE, there)
+        monkeypatch.delitem(sys.modules, algorithms.__name__)
+        found = importlib.import_module(algorithms.__name__)
+        assert hasattr(found, "RealDisks") == bool(names)
+        if names:
+            assert found.RealDisks.params[1] == list(names)
+            bench = found.RealDisks()
+            bench.setup("direct-cem", "demosthenes.off")
+            assert bench.track_folds("direct-cem", "demosthenes.off") == 0
 
 
 def test_versions_are_pinned_so_that_an_edit_does_not_drop_history():

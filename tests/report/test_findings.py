@@ -128,7 +128,7 @@ def test_the_papers_own_claim_has_intervals_over_enough_models(evidence):
     mean, low, high = re.search(r"here not measured, (\S+) \((\S+) to (\S+)\), -0.5", told).groups()
     assert float(mean) == pytest.approx(2.75, abs=0.06)
     assert float(low) < float(mean) < float(high)
-    assert told.endswith("here over 6 of its models, with 95 % intervals over models and rounds.")
+    assert told.endswith("here over 6 of its models, with 95 % intervals over models.")
 
 
 def with_angles(evidence, **angles):
@@ -158,15 +158,15 @@ def test_smallest_is_said_only_of_an_interval_without_one(evidence):
     assert head.startswith("On 9 surfaces, FDM and CEM have equally good angle errors; CEM's are ")
     assert "median 1.009)" in head
     assert (
-        "CEM has the smallest angle errors on 1 of 9 surfaces and is within 1 % of the best on 5"
-        in counts
+        "CEM has the smallest angle errors in 11 % of 9 families (95 % interval 2 to 43) and is "
+        "within 1 % of the best in 56 %" in counts
     )
     worse = with_angles(evidence, cem=[1.1 + k / 100 for k in range(9)], fdm=[1.0] * 9)
     head = words_of(findings(worse, {}, []))[0]
     assert head.startswith(
         "On 9 surfaces, FDM has the smallest angle errors; CEM's are 1.140 times "
     )
-    low, high = re.search(r"over surfaces (\S+) to (\S+);", head).groups()
+    low, high = re.search(r"over 9 families (\S+) to (\S+);", head).groups()
     assert 1.1 < float(low) < 1.14 < float(high) < 1.18
 
 
@@ -182,7 +182,7 @@ def test_an_algorithm_with_one_wrecked_map_is_not_shown_to_be_worse(evidence):
 def test_few_surfaces_have_no_interval_and_nobody_is_the_best(evidence):
     head = words_of(findings(with_angles(evidence, cem=[1.1] * 5, fdm=[1.0] * 5), {}, []))[0]
     assert "equally good" in head
-    assert "too few surfaces for an interval" in head
+    assert "too few families for an interval: 5" in head
     far = words_of(findings(with_angles(evidence, cem=[3.0] * 5, fdm=[1.0] * 5), {}, []))
     assert far[0].startswith("On 5 surfaces, FDM has the lowest angle errors on average; ")
     assert far[2].startswith("No two algorithms have angle errors of at most 1.25 times")

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.report.content import causes
+from cembench.report.content.causes import Cause
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.findings import many_findings
 from cembench.report.content.many_surfaces import HARDEST, hardest
 from cembench.report.content.pairwise_wins import pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
-from cembench.report.difficulty import boundary_crowding
+from cembench.report.difficulty import boundary_crowding, shape
 from cembench.report.document import plain
 from cembench.report.run_tables import many_table
 from cembench.report.write_report import write_report
@@ -143,12 +146,18 @@ def test_the_report_has_a_page_for_the_hardest_alone(run, tmp_path, quick_drawin
     )
     report = write_report(run, tmp_path / "report", "cembench report run")
     names = [section.name for section in report.sections]
-    assert names == ["many", "costs", "exhibit-surface-set", "not-ok", "surfaces"]
+    assert names == ["many", "hard", "costs", "exhibit-surface-set", "not-ok", "surfaces"]
     pages = next(s for s in report.sections if s.title == "Surfaces")
     assert len(pages.sections) == HARDEST
     text = (tmp_path / "report" / "index.html").read_text()
-    for words in ("Success rates", "Performance profiles of accuracy", "Who is faster", "hardest"):
-        assert words in text
+    wanted = (
+        "Success rates",
+        "profiles of accuracy",
+        "Who is faster",
+        "Who fails where",
+        "hardest",
+    )
+    assert [words for words in wanted if words not in text] == []
     assert (tmp_path / "report" / "tables" / "success.csv").is_file()
 
 
@@ -171,6 +180,51 @@ def test_what_is_found_counts_all_surfaces(evidence):
     cells, *_, worst = found.figures
     assert cells.number == f"{100 * 101 / 104:.1f} %"
     assert worst.words.startswith("the worst mean angle error of a valid map: ")
+
+
+def test_a_table_by_cause_has_every_surface_and_who_fails_there(evidence, monkeypatch):
+    declared = {
+        "steep": Cause(title="steep", where="place < 3", help="Flatten it."),
+        "large": Cause(title="large", where="place > 20", help="Wait."),
+        "never": Cause(title="never", where="chord_share > 1e9", help=""),
+    }
+    monkeypatch.setattr(causes, "causes", lambda: declared)
+    rows = by_label(declared_table(evidence, "who-fails-where"))
+    assert list(rows) == ["steep", "large", causes.NONE]
+    assert [row[1].number for row in rows.values()] == [3, 5, 18]
+    assert rows["steep"][3].number == pytest.approx(25)
+    assert rows["steep"][4].text == "CEM 3"
+    assert rows["large"][3].number == 0
+    assert rows["steep"][-1].text == "Flatten it."
+    worst = causes.worst_table(evidence, evidence.surfaces[:1])
+    assert [entry.text for entry in worst.rows[0]][-2:] == ["steep", "Flatten it."]
+
+
+def test_every_declared_cause_can_be_evaluated_and_says_what_helps(evidence):
+    found = causes.with_causes(evidence, evidence.frame)
+    assert len(found) == len(evidence.frame)
+    assert {name for row in found["causes"] for name in row} <= set(causes.causes())
+    assert all(one.help and one.title for one in causes.causes().values())
+    assert found["boundary_crowding"].notna().all()
+    assert found["angle_defect"].notna().all()
+
+
+def test_shapes_are_those_of_surfaces_known_in_closed_form():
+    """Eight triangles about the centre of a square, flat and raised; two with a chord."""
+    V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0], [-1, -1, 0]]
+    V += [[0, -1, 0], [1, -1, 0]]
+    fan = DiskMesh.from_arrays(V, [[0, k, k % 8 + 1] for k in range(1, 9)])
+    found = shape(fan)
+    assert found.boundary_excess == pytest.approx(8 / (2 * np.sqrt(np.pi * 4)))
+    assert (found.obtuse_share, found.chord_share) == (0, 0)
+    assert found.angle_defect == pytest.approx(0, abs=1e-9)
+    raised = DiskMesh.from_arrays([[0, 0, 1], *V[1:]], fan.F)
+    corner = np.degrees(np.arccos(2 / np.sqrt(2 * 3)))
+    assert shape(raised).angle_defect == pytest.approx(360 - 8 * corner)
+    flat = DiskMesh.from_arrays(
+        [[0, 0, 0], [9, -1, 0], [18, 0, 0], [9, 1, 0]], [[0, 1, 3], [1, 2, 3]]
+    )
+    assert (shape(flat).obtuse_share, shape(flat).chord_share) == (0, 1 / 4)
 
 
 @pytest.fixture(scope="module")

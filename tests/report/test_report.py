@@ -11,7 +11,7 @@ from cembench.core.errors import RecordError
 from cembench.report import plots
 from cembench.report.content import inspection
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.report import facts
+from cembench.report.content.report import facts, stand_ins_words
 from cembench.report.document import (
     Claim,
     Gap,
@@ -77,6 +77,18 @@ def test_exhibits_are_sections_with_their_pictures_and_tables(written):
     assert (folder / figure.files[0]).is_file()
     (table,) = (i for i in section.items if hasattr(i, "rows"))
     assert [v.number for row in table.rows for v in row] == [1, 0.1, 2, None]
+
+
+def test_stand_ins_are_said_to_stand_for_counts_and_not_for_difficulty(small_run):
+    evidence = Evidence.of(small_run)
+    words = stand_ins_words(evidence)
+    assert words.startswith("2 of 2 surfaces are stand-ins")
+    low, high = re.search(
+        r"E_C by CEM is (\S+) to (\S+) times the printed one, and 0 of 2", words
+    ).groups()
+    assert 0 < float(low) < float(high)
+    own = tuple(r for r in evidence.records if not r.mesh.paper_row)
+    assert stand_ins_words(replace(evidence, records=own)) == ""
 
 
 def test_what_did_not_end_ok_and_what_is_missing_are_listed(written):

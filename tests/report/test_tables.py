@@ -217,7 +217,7 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
     assert counted.number == 2
 
 
-def test_how_sure_the_speedups_are_alone_together_and_over_surfaces(evidence):
+def test_how_sure_the_speedups_are_alone_together_and_over_families(evidence):
     tables = by_name(rates_tables(evidence, 2))
     table = tables["sure-speedups"]
     by_title = {
@@ -236,7 +236,7 @@ def test_how_sure_the_speedups_are_alone_together_and_over_surfaces(evidence):
     surfaces = by_title["", "surfaces"][place].number
     assert sum(alone) == sum(both) == surfaces >= 2
     assert both[0] <= alone[0]
-    assert by_title["over surfaces", "sign test"][place].number == 2 * 0.5**surfaces
-    assert by_title["over surfaces", "95 % interval"][place].why == "fewer than 6 surfaces"
+    assert by_title["over families", "sign test"][place].number == 2 * 0.5**surfaces
+    assert by_title["over families", "95 % interval"][place].why == "fewer than 6 families"
     assert "Holm" in table.caption
     assert "written to deceive is not detected" in table.caption

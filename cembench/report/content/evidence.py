@@ -17,7 +17,7 @@ from cembench.core.errors import RecordError
 from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.difficulty import Difficulty, difficulty
+from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import record_rows
 from cembench.results.columns import COLUMNS, DERIVED, family_of
@@ -219,6 +219,12 @@ class Evidence:
             if mesh is not None and uv is not None and (one := difficulty(mesh, uv)):
                 found[str(of_surface)] = one
         return found
+
+    @cached_property
+    def shapes(self) -> dict[str, Shape]:
+        """What makes each surface's triangulation hard to map, by its hash, if it was saved."""
+        meshes = ((s.mesh_hash, self.mesh(s)) for s in self.surfaces)
+        return {key: shape(mesh) for key, mesh in meshes if mesh is not None}
 
     @cached_property
     def by_key(self) -> dict[str, Record]:

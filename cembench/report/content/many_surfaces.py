@@ -7,6 +7,7 @@ from math import inf
 from pathlib import Path
 
 from cembench.report.content.by_surface import hardest_table
+from cembench.report.content.causes import worst_table
 from cembench.report.content.evidence import ANGLE, Evidence, MeasuredSurface
 from cembench.report.content.findings import surfaces_words
 from cembench.report.content.inspection import Inspection
@@ -56,13 +57,21 @@ def is_many(evidence: Evidence) -> bool:
     return len(evidence.surfaces) > MANY
 
 
-def many_section(
+def hard_section(
     evidence: Evidence,
     shown: Sequence[MeasuredSurface],
     inspections: Mapping[str, Inspection],
-    folder: Path,
 ) -> Section:
-    """Return success rates, profiles, pairwise wins, and the hardest surfaces, as a section."""
+    """Return who fails where, and the hardest surfaces with their causes and pictures."""
+    table = declared_table(evidence, "who-fails-where")
+    items: list[Item] = [table] if table else []
+    items += [worst_table(evidence, shown), hardest_table(evidence, evidence.policies[0], shown)]
+    gallery = hardest_gallery(evidence, shown, inspections)
+    return Section("hard", "Who fails where", (*items, *([gallery] if gallery else [])))
+
+
+def many_section(evidence: Evidence, folder: Path) -> Section:
+    """Return success rates, profiles and pairwise wins, as a section."""
     policy = evidence.policies[0]
     items: list[Item] = []
     if len(evidence.policies) > 1:
@@ -72,9 +81,5 @@ def many_section(
     plots = (declared_plot(evidence, name) for name in names)
     items += drawn(plots, folder)
     items += pairwise_wins(evidence, policy)
-    items.append(hardest_table(evidence, policy, shown))
-    gallery = hardest_gallery(evidence, shown, inspections)
-    if gallery:
-        items.append(gallery)
     over = surfaces_words(len(evidence.surfaces), evidence.families)
     return Section("many", f"Over {over}", tuple(items))

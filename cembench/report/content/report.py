@@ -11,7 +11,7 @@ from pathlib import Path
 from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
-from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.evidence import Evidence, MeasuredSurface, figure_of
 from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.exponents import exponents_table
 from cembench.report.content.findings import findings, many_findings, surfaces_words
@@ -230,16 +230,51 @@ def _paper_summary(run: _Run) -> Section:
             f"{marks}. A dagger marks a misprint, an exclamation mark an unstable time."
         )
     ]
-    if not any(s.origin == "model" for s in evidence.models):
-        items.append(
-            Text(
-                "No model of the paper is in this run. Its rows are measured on stand-ins with the "
-                "same number of triangles and boundary vertices: times are similar, but energies "
-                "and angles belong to other surfaces."
-            )
-        )
+    if said := stand_ins_words(evidence):
+        items.append(Text(said))
     items.append(not_ok(evidence))
     return Section("summary", "What this is", tuple(items))
+
+
+def stand_ins_words(evidence: Evidence) -> str:
+    """Return what the run's stand-ins stand for, and what not; "" if it has none."""
+    standing = [s for s in evidence.models if s.origin == "stand-in"]
+    if not standing:
+        return ""
+    thin = sum(s.non_delaunay_share > 0 for s in standing)
+    ratios = _energies_over_printed(evidence, standing)
+    energy = (
+        f"E_C by {evidence.reference.upper()} is {min(ratios):.2g} to {max(ratios):.2g} times the "
+        "printed one, and "
+        if ratios
+        else ""
+    )
+    return (
+        f"{len(standing)} of {len(evidence.models)} surfaces are stand-ins for models that are not "
+        "public. They stand in for the models' counts, triangles and boundary vertices, and so for "
+        f"seconds; not for their difficulty: {energy}{thin} of {len(standing)} have edges that are "
+        "not Delaunay. Their energies and angles belong to other surfaces. docs/surfaces.md names "
+        "the real surface nearest to each row in counts and difficulty."
+    )
+
+
+def _energies_over_printed(evidence: Evidence, surfaces: Sequence[MeasuredSurface]) -> list[float]:
+    """Return E_C by the reference over that printed for the model, where both are known."""
+    paper, series = evidence.paper, evidence.series_of(evidence.reference)
+    printed = {
+        s.paper_row: paper.tables[number][s.paper_row].get(one.printed.format(evidence.reference))
+        for number, table in paper.printed.items()
+        for one in table.figures
+        for s in surfaces
+        if one.column == "conformal_energy" and s.paper_row in paper.tables[number]
+    }
+    found = []
+    for surface in surfaces:
+        record = evidence.find(surface, series) if series else None
+        known = printed.get(surface.paper_row)
+        if record is not None and known and record.outcome.status == "ok":
+            found.append(figure_of(record, "conformal_energy") / known)
+    return found
 
 
 def _tables(run: _Run) -> Section | None:
@@ -333,7 +368,8 @@ _OF_OWN_SURFACES: tuple[_Maker, ...] = (
 )
 _OVER_MANY: tuple[_Maker, ...] = (
     lambda run: machines_section(run.evidence),
-    lambda run: many_surfaces.many_section(run.evidence, run.shown, run.seen, run.folder),
+    lambda run: many_surfaces.many_section(run.evidence, run.folder),
+    lambda run: many_surfaces.hard_section(run.evidence, run.shown, run.seen),
     _costs,
 )
 

@@ -1,0 +1,111 @@
+"""Who fails where: surfaces by what makes them hard to map, with what a user can do about it.
+
+The causes are declared in ``causes.toml``. A surface without any is in a group of its own, which
+shows how much of what fails has another reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from functools import cache
+from typing import TYPE_CHECKING
+
+from cembench.report.content.evidence import ANGLE, DISK, Evidence, MeasuredSurface
+from cembench.report.declarations import Declaration, own, parsed
+from cembench.report.document import Column, Table
+from cembench.results.frame import evaluate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+#: What a surface without a cause is called.
+NONE = "none of these"
+
+
+class Cause(Declaration):
+    """What makes surfaces hard to map; `where` is an expression, true on such surfaces."""
+
+    title: str
+    where: str
+    #: What a user can do about it.
+    help: str
+
+
+@cache
+def causes() -> Mapping[str, Cause]:
+    """Return the declared causes by name."""
+    return parsed(own("causes.toml"), Cause, "causes.toml")
+
+
+def with_causes(evidence: Evidence, frame: pd.DataFrame) -> pd.DataFrame:
+    """Return a part of a run's frame with what makes its surfaces hard.
+
+    The columns are those of :class:`~cembench.report.difficulty.Shape`, `boundary_crowding`,
+    `causes` (lists of names, empty for none), `best_error` (the smallest mean angle error on the
+    surface), `failing` (the algorithm's label in a list if it has no valid map) and `poor` (whether
+    a map to the disk is valid, but much worse than the best).
+    """
+    import pandas as pd
+
+    shapes = {key: asdict(one) for key, one in evidence.shapes.items()}
+    crowding = {key: one.crowding for key, one in evidence.difficulties.items()}
+    facts = pd.DataFrame.from_dict(shapes, orient="index", dtype=float)
+    names = ["obtuse_share", "chord_share", "angle_defect", "boundary_excess"]
+    found = frame.join(facts.reindex(columns=names), on="mesh_hash")
+    valid = found[ANGLE].where(found["ok"])
+    found = found.assign(
+        boundary_crowding=found["mesh_hash"].map(crowding).astype(float),
+        best_error=valid.groupby(found["place"]).transform("min"),
+        failing=[
+            [] if ok else [label] for ok, label in zip(found["ok"], found["label"], strict=True)
+        ],
+        poor=found["ok"] & (found["target"] == DISK) & ~found["as_good"],
+    )
+    held = {name: evaluate(one.where, found).astype(bool) for name, one in causes().items()}
+    return found.assign(
+        causes=[[name for name in held if held[name].loc[row]] for row in found.index]
+    )
+
+
+def by_cause(evidence: Evidence, frame: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
+    """Return the title of each cause and the rows of its surfaces, and at last those of none.
+
+    A group has what helps in its column `help`.
+    """
+    found = with_causes(evidence, frame)
+    groups = [
+        (one.title, found[[name in row for row in found["causes"]]].assign(help=one.help))
+        for name, one in causes().items()
+    ]
+    groups.append((NONE, found[[not row for row in found["causes"]]].assign(help="-")))
+    return [(title, group) for title, group in groups if len(group)]
+
+
+def worst_table(evidence: Evidence, surfaces: Sequence[MeasuredSurface]) -> Table:
+    """Return the causes of surfaces, e.g. the hardest, and what a user can do about each."""
+    frame = with_causes(evidence, evidence.frame)
+    first = frame.drop_duplicates("mesh_hash").set_index("mesh_hash")
+    rows = []
+    for surface in surfaces:
+        row = first.loc[surface.mesh_hash]
+        chosen = [causes()[name] for name in row["causes"]]
+        known = row["best_error"] == row["best_error"]
+        rows.append(
+            [
+                *(surface.title, surface.family, surface.faces),
+                row["best_error"] if known else None,
+                ", ".join(one.title for one in chosen) or NONE,
+                " ".join(one.help for one in chosen) or "-",
+            ]
+        )
+    texts = dict.fromkeys(("surface", "family", "causes", "what helps"))
+    headings = ("surface", "family", "triangles", "best map", "causes", "what helps")
+    forms = {"triangles": ",.0f", "best map": ".2f"}
+    return Table.of(
+        "worst-causes",
+        f"Why the {len(surfaces)} hardest surfaces are hard",
+        [Column(name, numeric=name not in texts, form=forms.get(name, "")) for name in headings],
+        rows,
+        caption="Best map: the smallest mean angle error of a valid map, in degrees.",
+    )
