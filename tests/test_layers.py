@@ -72,14 +72,14 @@ BUDGETS = {
     "linear_algebra": 1_500,
     "conformal": 5_550,
     "registry": 950,
-    "results": 4_200,
+    "results": 4_600,
     "running": 7_300,
     "drawing": 1_600,
-    "report": 7_900,
-    "validation": 2_250,
+    "report": 8_200,
+    "validation": 2_350,
     "morphing": 1_750,
-    "api": 6_000,
-    "commands": 2_950,
+    "api": 6_300,
+    "commands": 3_100,
 }
 
 

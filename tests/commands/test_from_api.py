@@ -65,6 +65,10 @@ def without_times(rows):
     return {f"{k}-{key}": row[key] for k, row in enumerate(rows) for key in row.keys() - CLOCKED}
 
 
+def measured(folder, cap):
+    return cembench.benchmark([cap], ["cem"], rounds=1, out=folder).folder
+
+
 #: What a clock tells.
 CLOCKED = {"seconds", "phases"}
 SAME = {
@@ -89,6 +93,10 @@ SAME = {
         without_times(
             said(cli, "holes", "catenoid-ring", "--faces", 200, "--sweeps", 2, "--run", "r")
         ),
+    ),
+    "submit": lambda cli, cap: (
+        {"cells": cembench.submit(measured("one", cap), "one.zip").cells},
+        said(cli, "submit", measured("two", cap), "-o", "two.zip"),
     ),
     "repair": lambda cli, cap: (
         {"steps": dict(cembench.repair(cap).steps)},
