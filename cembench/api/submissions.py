@@ -40,6 +40,12 @@ class Submission:
     signer : str
         Who signed it, if that was asked for.
 
+    Examples
+    --------
+    >>> from cembench import Submission
+    >>> Submission("mine", faults=("it holds no record",)).accepted
+    False
+
     """
 
     name: str

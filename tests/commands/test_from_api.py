@@ -69,6 +69,10 @@ def report_of(cap):
     return cembench.benchmark([cap], ["lscm"], rounds=1, output="measured").report("own")
 
 
+def measured(folder, cap):
+    return cembench.benchmark([cap], ["cem"], rounds=1, output=folder).folder
+
+
 #: What a clock tells.
 CLOCKED = {"seconds", "phases"}
 SAME = {
@@ -102,6 +106,10 @@ SAME = {
         without_times(
             said(cli, "holes", "catenoid-ring", "--faces", 200, "--sweeps", 2, "--run", "r")
         ),
+    ),
+    "submit": lambda cli, cap: (
+        {"cells": cembench.submit(measured("one", cap), "one.zip").cells},
+        said(cli, "submit", measured("two", cap), "-o", "two.zip"),
     ),
     "repair": lambda cli, cap: (
         {"steps": dict(cembench.repair(cap).steps)},
