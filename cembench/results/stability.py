@@ -106,8 +106,6 @@ def _why(records: Sequence[Record]) -> str:
 
 
 def _reason(record: Record) -> str:
-    if record.outcome.ended is None and record.cell.precision is not None:
-        return "the record is older and does not say why it ended"
     if record.outcome.ended == "precise" and all(r.together for r in record.outcome.rounds):
         return "only ratios, within shared processes, had to be precise"
     return _ENDED[record.outcome.ended]

@@ -79,7 +79,7 @@ class Store:
         if path is None:
             return None
         record = read_record(path)
-        if is_as_written(json.loads(read_bytes(path, self.folder))) is False:
+        if not is_as_written(json.loads(read_bytes(path, self.folder))):
             raise RecordError(
                 f"{path} was changed after it was written: its digest differs. Delete it and run "
                 "again."
@@ -143,6 +143,7 @@ class Store:
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
     ) -> None:
         """Write the environment, the map and then the record, so a record always has its map."""
+        run_folder.claim(self.folder)
         about = self.folder / "environments" / f"{file_name(record.environment)}.json"
         if not about.exists():
             write_text(about, json.dumps(environment, indent=2))
@@ -289,10 +290,7 @@ class Store:
         return FileLock(lock_path(self.folder))
 
     def _found(self, path: Path, cell: Cell) -> Path | None:
-        """Return a cell's file by its name or else by its key; None if there is none.
-
-        A mesh may have been renamed, and older versions did not clean names.
-        """
+        """Return a cell's file by its name, or by its key if the mesh was renamed; else None."""
         if is_there(path):
             return path
         pattern = f"*--{cell.key[:12]}{path.suffix}"
