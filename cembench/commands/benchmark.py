@@ -66,9 +66,9 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
     from cembench.report.content.evidence import Evidence
     from cembench.report.content.many_surfaces import MANY
     from cembench.report.run_tables import machine_lines, many_table, results_table, speedups_table
-    from cembench.results.outliers import outlier_lines
-    from cembench.results.record_rows import rows
+    from cembench.results.columns import rows
     from cembench.results.records import REFERENCE
+    from cembench.results.stability import outlier_lines
     from cembench.results.store import Store
 
     records, folder, reference = list(run.asked), run.folder, reference or REFERENCE

@@ -45,7 +45,7 @@ def drawing_jobs() -> int:
 
 def show_report(report: Report, folder: Path) -> None:
     """Print the paper's tables, the verdicts on its claims, and the report's path."""
-    from cembench.report.render.terminal_report import paper_tables
+    from cembench.report.render.terminal import paper_tables
 
     out.print(paper_tables(report))
     verdicts = summary(report, folder)["verdicts"]

@@ -322,7 +322,7 @@ class Report:
     command: str
     facts: tuple[tuple[str, str], ...]
     sections: tuple[Section, ...]
-    #: Records by key, as rows (cembench.results.record_rows), that the values link to.
+    #: Records by key, as rows (cembench.results.columns), that the values link to.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
     paper: Paper | None = None

@@ -16,7 +16,7 @@ Rows = Sequence[dict[str, Any]]
 
 
 def export_rows(rows: Rows, path: Path, form: Format) -> None:
-    """Write the rows of :func:`cembench.results.record_rows.rows` to a file.
+    """Write the rows of :func:`cembench.results.columns.rows` to a file.
 
     In CSV, lists and dictionaries are written as JSON. In Parquet, lists stay lists; dictionaries,
     whose keys differ from row to row, are written as JSON. No partial file is left.

@@ -20,13 +20,13 @@ from cembench.report.document import (
     entry,
     words,
 )
+from cembench.results.columns import marks_explained
 from cembench.results.comparison import (
     Comparison,
     circumstances,
     compare,
     references,
 )
-from cembench.results.external_words import marks_explained
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.multiple_testing import corrected

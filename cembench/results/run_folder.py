@@ -23,6 +23,7 @@ PLAN, LOCK, MACHINES, SIGNATURE = "plan.json", "lock", "machines.json", "signatu
 #: Adapter for the cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 
+
 def check(folder: Path) -> None:
     """Raise :class:`RecordError` if a run must not write to a folder; nothing is changed."""
     folders.check(folder, "run")

@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.results.comparison import circumstances
+from cembench.results.intervals import is_look, next_look
 from cembench.results.records import Ended, Outcome, Record, Round
-from cembench.results.sequential_checks import is_look, next_look
 from cembench.results.store import Store
 from cembench.running.background_load import counters, neighbours
 from cembench.running.environment import describe_environment

@@ -9,13 +9,12 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.findings import many_findings
-from cembench.report.content.many_surfaces import HARDEST, hardest
-from cembench.report.content.pairwise_wins import _wins, pairwise_wins
+from cembench.report.content.many_surfaces import HARDEST, _wins, hardest, pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
-from cembench.report.difficulty import boundary_crowding
 from cembench.report.document import plain
 from cembench.report.run_tables import many_table
+from cembench.report.surface_facts import boundary_crowding
 from cembench.report.write_report import write_report
 from cembench.results.exhibits import Exhibit, write_exhibit
 from cembench.results.frame import share_interval

@@ -21,7 +21,7 @@ from cembench.report.document import (
     sections_of,
     tables_of,
 )
-from cembench.report.render.terminal_report import paper_tables
+from cembench.report.render.terminal import paper_tables
 from cembench.report.write_report import write_report
 from cembench.results.merging import merge
 from cembench.results.store import Store

@@ -4,7 +4,7 @@ from scipy.stats import binomtest
 
 from benchmarks import noise, precision
 from cembench.results.comparison import compare_ratios
-from cembench.results.intervals import ERROR
+from cembench.results.intervals import ERROR, share
 from cembench.results.multiple_testing import (
     arithmetic,
     average_interval,
@@ -14,7 +14,6 @@ from cembench.results.multiple_testing import (
     rate_interval,
     sign_test,
 )
-from cembench.results.sequential_checks import share
 
 
 def test_holm_multiplies_by_what_is_left_and_keeps_the_order():

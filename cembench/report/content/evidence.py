@@ -17,9 +17,9 @@ from cembench.core.errors import RecordError
 from cembench.core.loading import damaged
 from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.difficulty import Difficulty, difficulty
 from cembench.report.palette import SeriesStyle, series_styles
-from cembench.results import record_rows
+from cembench.report.surface_facts import Difficulty, difficulty
+from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
@@ -147,10 +147,16 @@ class Evidence:
         """The algorithm that the others are compared with: the paper's, or the usual one."""
         return self.paper.reference or REFERENCE
 
+    @property
+    def reference_label(self) -> str:
+        """What :attr:`reference` is called in this run."""
+        series = self.series_of(self.reference)
+        return series.label if series else self.reference.upper()
+
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
-        return {row["key"]: row for row in record_rows.rows(self.records, self.reference)}
+        return {row["key"]: row for row in columns.rows(self.records, self.reference)}
 
     @cached_property
     def frame(self) -> pd.DataFrame:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Column, Table, Value, count, missing, words
-from cembench.report.plot_rows import printed
-from cembench.report.plot_statistics import FEWEST, Fit, fit
+from cembench.report.plot_rows import FEWEST, Fit, fit, printed
 from cembench.report.plots import Point
 
 if TYPE_CHECKING:

@@ -2,26 +2,185 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp, inf, log
+from statistics import median
 
-from cembench.report.content.by_surface import own_table
-from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, Evidence
-from cembench.report.content.inspection import Inspection
-from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
-from cembench.report.content.standings import (
-    NEAR,
-    AngleRatio,
-    Field,
-    Standing,
-    compare_angles,
-    compare_seconds,
-    field_of,
-    listed,
+import numpy as np
+
+from cembench.report.content.claims import under
+from cembench.report.content.evidence import (
+    ANGLE,
+    AS_GOOD,
+    DEGREES,
+    AlgorithmSeries,
+    Evidence,
+    figure_of,
 )
-from cembench.report.document import Claim, Figure, Finding, Findings, Sentence
-from cembench.results.comparison import Comparison
-from cembench.results.outliers import outlier_lines
-from cembench.results.stability import scatter_words, stability_words
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.printed_tables import MEAN_RATE, measured_rates
+from cembench.report.content.speedup_significance import paired_rounds
+from cembench.report.declared import declared_table
+from cembench.report.document import VERDICTS, Claim, Figure, Finding, Findings, Sentence
+from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
+from cembench.results.intervals import DEFAULT_ROUNDS, Interval
+from cembench.results.multiple_testing import (
+    FEWEST_SURFACES,
+    arithmetic,
+    average_interval,
+    geometric,
+    rate_interval,
+)
+from cembench.results.records import Record
+from cembench.results.stability import outlier_lines, scatter_words, stability_words
+
+#: An algorithm takes part with maps of at least this share of the surfaces that most mapped.
+SHARE = 0.9
+#: Smaller mean angle errors, in degrees, count as this: their ratios are of rounding.
+FLOOR = 0.01
+#: An angle error within this share of the smallest one of a surface counts as equal to it.
+NEAR = 0.01
+
+
+def as_good(angles: Sequence[float], best: Sequence[float]) -> bool:
+    """Whether maps are about as good as the best ones on every surface.
+
+    Both are mean angle errors in degrees, one per surface.
+    """
+    return all(a <= max(AS_GOOD * b, b + DEGREES) for a, b in zip(angles, best, strict=True))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An algorithm's records on the common surfaces."""
+
+    series: AlgorithmSeries
+    records: tuple[Record, ...]
+
+    @property
+    def label(self) -> str:
+        """The algorithm's name in this run."""
+        return self.series.label
+
+    @property
+    def seconds(self) -> float:
+        """The geometric mean of the seconds."""
+        return exp(float(np.mean([log(r.outcome.median_seconds or 1.0) for r in self.records])))
+
+    @property
+    def angles(self) -> list[float]:
+        """The mean angle errors in degrees by surface, none below :data:`FLOOR`."""
+        return [max(FLOOR, figure_of(r, ANGLE)) for r in self.records]
+
+    @property
+    def angle(self) -> float:
+        """The geometric mean of the mean angle errors."""
+        return float(geometric(np.array(self.angles)))
+
+
+@dataclass(frozen=True)
+class AngleRatio:
+    """The angle errors of an algorithm over those of another on the same surfaces.
+
+    The interval is over surfaces (bootstrap); None for fewer than six.
+    """
+
+    mean: float
+    median: float
+    interval: Interval | None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the interval shows that the other's are smaller."""
+        return self.interval is not None and self.interval.low > 1
+
+
+@dataclass(frozen=True)
+class Field:
+    """The algorithms that are compared, those with the smallest angle errors first."""
+
+    standings: tuple[Standing, ...]
+    #: Number of surfaces that an algorithm for disks mapped.
+    surfaces: int
+    #: Labels of the algorithms that mapped too few of them.
+    left_out: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of surfaces that all of them mapped."""
+        return len(self.standings[0].records)
+
+    @property
+    def smallest(self) -> list[float]:
+        """The smallest mean angle error on each surface."""
+        return [min(column) for column in zip(*(s.angles for s in self.standings), strict=True)]
+
+    @property
+    def good(self) -> list[Standing]:
+        """The algorithms that are as good as the best one on every surface, the fastest first."""
+        kept = [s for s in self.standings if as_good(s.angles, self.smallest)]
+        return sorted(kept, key=lambda s: s.seconds)
+
+    def near(self, standing: Standing, share: float) -> int:
+        """Return on how many surfaces the angle error is within a share of the smallest."""
+        pairs = zip(standing.angles, self.smallest, strict=True)
+        return sum(own <= (1 + share) * least for own, least in pairs)
+
+
+def field_of(evidence: Evidence, policy: str) -> Field | None:
+    """Return the main algorithms that map to the disk, on the surfaces that all of them mapped.
+
+    Those that mapped fewer than :data:`SHARE` of what others did are left out. None if there is no
+    surface.
+    """
+    held = {s: _maps(evidence, s, policy) for s in evidence.disk_series if s.main}
+    most = max(map(len, held.values()), default=0)
+    chosen = {s: maps for s, maps in held.items() if maps and len(maps) >= SHARE * most}
+    common = set.intersection(*map(set, chosen.values())) if chosen else set()
+    if not common:
+        return None
+    order = [s.mesh_hash for s in evidence.surfaces if s.mesh_hash in common]
+    standings = [Standing(s, tuple(maps[key] for key in order)) for s, maps in chosen.items()]
+    return Field(
+        tuple(sorted(standings, key=lambda s: s.angle)),
+        len({key for maps in held.values() for key in maps}),
+        tuple(s.label for s in held if s not in chosen),
+    )
+
+
+def _maps(evidence: Evidence, series: AlgorithmSeries, policy: str) -> dict[str, Record]:
+    """Return the records of an algorithm that have seconds and angles, by surface."""
+    found = {s.mesh_hash: evidence.find(s, series, policy) for s in evidence.surfaces}
+    return {
+        key: record
+        for key, record in found.items()
+        if record is not None and record.outcome.median_seconds and figure_of(record, ANGLE) < inf
+    }
+
+
+def compare_angles(other: Standing, best: Standing) -> AngleRatio:
+    """Return the geometric mean over surfaces of other / best, with its interval and the median."""
+    ratios = [a / b for a, b in zip(other.angles, best.angles, strict=True)]
+    interval = average_interval([[ratio] for ratio in ratios], geometric)
+    return AngleRatio(float(geometric(np.array(ratios))), median(ratios), interval)
+
+
+def compare_seconds(slower: Standing, faster: Standing) -> Comparison | None:
+    """Compare two algorithms by the geometric mean over surfaces of the ratios in each round."""
+    ratios = [paired_ratios(a, b) for a, b in zip(slower.records, faster.records, strict=True)]
+    rounds = min(map(len, ratios))
+    if not rounds:
+        return None
+    together = np.log([found[:rounds] for found in ratios]).mean(axis=0)
+    return compare_ratios(np.exp(together).tolist())
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as "a, b and c"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def findings(
@@ -48,7 +207,7 @@ def findings(
     return Findings(
         tuple(sentences),
         tuple(outlier_lines(evidence.records)),
-        None if claims else own_table(evidence),
+        None if claims else declared_table(evidence, "own-surfaces"),
         (*(field_figures(field) if field else ()), _ended(evidence)),
         _picture(evidence, inspections, best),
     )
@@ -216,3 +375,61 @@ def many_findings(evidence: Evidence) -> Findings:
         tuple(outlier_lines(evidence.records)),
         figures=tuple(figures),
     )
+
+
+#: Verdicts whose claims are named in the count.
+_NAMED = ("does not hold here", "holds in part")
+
+
+def claim_of_the_paper(evidence: Evidence) -> str:
+    """Return the paper's average rates of speedup beside those of this run, as a sentence.
+
+    A measured rate has its 95 % interval over models and rounds in brackets where there are enough
+    of both (:func:`cembench.results.multiple_testing.rate_interval`).
+    """
+    paper = evidence.paper
+    names = ", ".join(algorithm.upper() for algorithm in paper.compared)
+    printed = ", ".join(f"{paper.stated['rate'][algorithm]:.1f}" for algorithm in paper.compared)
+    told = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
+    here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
+    origins = Counter(surface.origin for surface in evidence.one_per_model)
+    models, others = origins["model"], origins["stand-in"]
+    over = [f"{models} of its models"] if models else []
+    over += [f"{others} stand-in{'s' if others > 1 else ''}"] if others else []
+    intervals = (
+        "with 95 % intervals over models and rounds"
+        if any(sure for _, (_, sure) in told)
+        else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_SURFACES} models)"
+    )
+    return (
+        f"{paper.reference.upper()} against {names}: printed {printed}; here {here}. This is "
+        f"{paper.rate}, averaged over the models; here over {' and '.join(over)}, {intervals}."
+    )
+
+
+def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
+    """Return the measured averages as text, and whether one of them has an interval."""
+    told, sure = [], False
+    for algorithm in evidence.paper.compared:
+        rates = list(measured_rates(evidence, algorithm, policy).values())
+        series, interval = evidence.series_of(algorithm), None
+        if rates and series is not None:
+            rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
+            interval = rate_interval([ratios for _, ratios in rounds], arithmetic)
+        between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
+        told.append(f"{MEAN_RATE.of(rates):.1f}{between}" if rates else "not measured")
+        sure = sure or interval is not None
+    return ", ".join(told), sure
+
+
+def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
+    """Return the numbers of all verdicts, failing ones first and with links to their claims."""
+    parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
+    for verdict, (one, several) in VERDICTS.items():
+        found = [claim for claim in claims if claim.verdict == verdict]
+        if found:
+            parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
+            parts.append(one if len(found) == 1 else several)
+        for k, claim in enumerate(found if verdict in _NAMED else ()):
+            parts += [", " if k else ": ", claim]
+    return (*parts, ".")

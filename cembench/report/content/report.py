@@ -12,15 +12,17 @@ from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.exponents import exponents_table
 from cembench.report.content.findings import findings, many_findings
 from cembench.report.content.inspection import Inspection, inspect_surface
-from cembench.report.content.linear_algebra_work import work_tables
 from cembench.report.content.machines import machines_section
-from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
+from cembench.report.content.paper_figures import (
+    OF_MODELS,
+    exhibit_sections,
+    figures_section,
+    paper_plot,
+)
 from cembench.report.content.printed_tables import printed_tables
-from cembench.report.content.rates import rates_tables
 from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table, own_tables
@@ -246,12 +248,9 @@ def _tables(run: _Run) -> Section:
     evidence, printed = run.evidence, run.evidence.paper.printed
     items: list[Item] = []
     for number in sorted(printed):
-        if printed[number].compares:
-            items += rates_tables(evidence, number)
-        else:
-            items += printed_tables(evidence, number)
+        items += printed_tables(evidence, number)
         if any(figure.column == "seconds" for figure in printed[number].figures):
-            items += work_tables(evidence)
+            items += policies.work_tables(evidence)
     numbers = sorted(evidence.paper.tables)
     return Section("tables", f"Tables {numbers[0]} to {numbers[-1]}", tuple(items))
 
@@ -300,7 +299,7 @@ def _own_results(run: _Run) -> Section:
         figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
         for surface in evidence.surfaces
     ]
-    items += work_tables(evidence)
+    items += policies.work_tables(evidence)
     items += (*run.plots(*_TIMES), *_certain(run), *_policies(run), *_beside(run))
     of_models = [paper_plot(evidence, name, run.seen) for name in reversed(OF_MODELS)]
     items += (*drawn(of_models, run.folder), *run.plots("cost-by-faces"))

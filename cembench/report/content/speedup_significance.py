@@ -8,8 +8,8 @@ from itertools import islice
 
 import numpy as np
 
+from cembench.report.by_surface import in_policy, policy_suffix
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
 from cembench.results.multiple_testing import (
