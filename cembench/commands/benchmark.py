@@ -78,7 +78,7 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
     if as_json:
         print_json(rows(records, reference))
     elif many:
-        out.print(many_table(records))
+        out.print(many_table(evidence))
         for words in (*machine_lines(evidence.machines), *suspects):
             out.print(words)
     else:

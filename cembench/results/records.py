@@ -391,9 +391,7 @@ class Outcome(BaseModel):
     @property
     def solve_seconds(self) -> float | None:
         """The median over the rounds of :attr:`Round.solve_seconds`; None if a round has none."""
-        found = [r.solve_seconds for r in self.rounds]
-        known = [seconds for seconds in found if seconds is not None]
-        return lower_median(known) if known and len(known) == len(found) else None
+        return _median_of_all([r.solve_seconds for r in self.rounds])
 
     @property
     def start_seconds(self) -> float | None:
@@ -415,13 +413,12 @@ class Outcome(BaseModel):
     @property
     def median_seconds(self) -> float | None:
         """The cell's figure: the median over its rounds."""
-        return lower_median(self.seconds) if self.rounds else None
+        return _median_of_all(self.seconds)
 
     @property
     def cpu_seconds(self) -> float | None:
         """The median over the rounds of the CPU seconds; None if a round has none."""
-        known = [r.cpu_seconds for r in self.rounds if r.cpu_seconds is not None]
-        return lower_median(known) if known and len(known) == len(self.rounds) else None
+        return _median_of_all([r.cpu_seconds for r in self.rounds])
 
     @property
     def phases(self) -> dict[str, float]:
@@ -439,6 +436,12 @@ def not_ok(status: Status, *faults: Fault, **more: Any) -> Outcome:
 def lower_median(values: Sequence[float]) -> float:
     """Return the middle value, or the lower of two: a measured one, so its phases are known."""
     return sorted(values)[(len(values) - 1) // 2]
+
+
+def _median_of_all(values: Sequence[float | None]) -> float | None:
+    """Return the middle value; None if one is missing, or all."""
+    known = [value for value in values if value is not None]
+    return lower_median(known) if known and len(known) == len(values) else None
 
 
 class Record(BaseModel):

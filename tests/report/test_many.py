@@ -186,7 +186,7 @@ def test_the_terminal_has_a_line_an_algorithm(evidence):
     from rich.console import Console
 
     console = Console(width=80, record=True, file=io.StringIO())
-    console.print(many_table(evidence.records))
+    console.print(many_table(evidence))
     text = console.export_text()
     assert all(len(line.rstrip()) <= 80 for line in text.splitlines())
     line = next(line for line in text.splitlines() if line.startswith("cem"))

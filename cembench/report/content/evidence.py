@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -56,8 +56,6 @@ class AlgorithmSeries:
     label: str
     #: Whether most cells of the run have this choice of parameters; tables show that one.
     main: bool = True
-    #: The parameters of the variant, by name.
-    parameters: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def name(self) -> str:
@@ -301,12 +299,10 @@ class Evidence:
         """Every algorithm of the run: the paper's in the paper's order, then others by name."""
         variants: dict[str, Counter[Variant]] = {}
         about: dict[str, Record] = {}
-        parameters: dict[tuple[str, Variant], Mapping[str, Any]] = {}
         for record in self.records:
             name = record.cell.algorithm
             choice = self._variants[record.cell.key]
             variants.setdefault(name, Counter())[choice] += 1
-            parameters.setdefault((name, choice), record.cell.parameters)
             about[name] = record
         titles = Counter(record.title for record in about.values())
         found = []
@@ -317,10 +313,7 @@ class Evidence:
                 if titles[title] > 1:
                     title = f"{title} ({name})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
-                given = parameters[name, choice]
-                found.append(
-                    AlgorithmSeries(name, title, target, choice, label, k == 0, parameters=given)
-                )
+                found.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(found)
 
     def _place(self, algorithm: str) -> int:

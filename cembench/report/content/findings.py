@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import exp, inf, log
 from statistics import median
 
 import numpy as np
@@ -15,9 +14,9 @@ from cembench.report.content.evidence import (
     ANGLE,
     AS_GOOD,
     DEGREES,
+    DISK,
     AlgorithmSeries,
     Evidence,
-    figure_of,
 )
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.printed_tables import MEAN_RATE, measured_rates
@@ -54,30 +53,22 @@ def as_good(angles: Sequence[float], best: Sequence[float]) -> bool:
 
 @dataclass(frozen=True)
 class Standing:
-    """An algorithm's records on the common surfaces."""
+    """An algorithm's records on the common surfaces.
+
+    `angles` are their mean angle errors in degrees, none below :data:`FLOOR`, and `angle` and
+    `seconds` geometric means.
+    """
 
     series: AlgorithmSeries
     records: tuple[Record, ...]
+    angles: list[float]
+    angle: float
+    seconds: float
 
     @property
     def label(self) -> str:
         """The algorithm's name in this run."""
         return self.series.label
-
-    @property
-    def seconds(self) -> float:
-        """The geometric mean of the seconds."""
-        return exp(float(np.mean([log(r.outcome.median_seconds or 1.0) for r in self.records])))
-
-    @property
-    def angles(self) -> list[float]:
-        """The mean angle errors in degrees by surface, none below :data:`FLOOR`."""
-        return [max(FLOOR, figure_of(r, ANGLE)) for r in self.records]
-
-    @property
-    def angle(self) -> float:
-        """The geometric mean of the mean angle errors."""
-        return float(geometric(np.array(self.angles)))
 
 
 @dataclass(frozen=True)
@@ -135,29 +126,25 @@ def field_of(evidence: Evidence, policy: str) -> Field | None:
     Those that mapped fewer than :data:`SHARE` of what others did are left out. None if there is no
     surface.
     """
-    held = {s: _maps(evidence, s, policy) for s in evidence.disk_series if s.main}
-    most = max(map(len, held.values()), default=0)
-    chosen = {s: maps for s, maps in held.items() if maps and len(maps) >= SHARE * most}
-    common = set.intersection(*map(set, chosen.values())) if chosen else set()
-    if not common:
+    frame = evidence.frame
+    disks = frame[(frame["target"] == DISK) & frame["main"] & (frame["solves"] == policy)]
+    maps = disks[disks["ok"] & (disks["seconds"] > 0) & disks[ANGLE].notna()]
+    keys = maps.pivot(index="place", columns="label", values="key")
+    number = keys.notna().sum()
+    series = [s for s in evidence.disk_series if s.main]
+    chosen = [s for s in series if number.get(s.label, 0) >= SHARE * max(number, default=1)]
+    common = keys[[s.label for s in chosen]].dropna()
+    if common.empty:
         return None
-    order = [s.mesh_hash for s in evidence.surfaces if s.mesh_hash in common]
-    standings = [Standing(s, tuple(maps[key] for key in order)) for s, maps in chosen.items()]
-    return Field(
-        tuple(sorted(standings, key=lambda s: s.angle)),
-        len({key for maps in held.values() for key in maps}),
-        tuple(s.label for s in held if s not in chosen),
-    )
-
-
-def _maps(evidence: Evidence, series: AlgorithmSeries, policy: str) -> dict[str, Record]:
-    """Return the records of an algorithm that have seconds and angles, by surface."""
-    found = {s.mesh_hash: evidence.find(s, series, policy) for s in evidence.surfaces}
-    return {
-        key: record
-        for key, record in found.items()
-        if record is not None and record.outcome.median_seconds and figure_of(record, ANGLE) < inf
-    }
+    standings, rows = [], maps.set_index("key")
+    for s in chosen:
+        own = rows.loc[common[s.label]]
+        angles = own[ANGLE].astype(float).clip(lower=FLOOR)
+        means = (float(geometric(x.to_numpy(float))) for x in (angles, own["seconds"]))
+        records = tuple(evidence.by_key[key] for key in own.index)
+        standings.append(Standing(s, records, angles.tolist(), *means))
+    left_out = tuple(s.label for s in series if s not in chosen)
+    return Field(tuple(sorted(standings, key=lambda s: s.angle)), len(keys), left_out)
 
 
 def compare_angles(other: Standing, best: Standing) -> AngleRatio:

@@ -9,7 +9,6 @@ from cembench.core.atomic import write_bytes
 from cembench.core.loading import damaged, is_there, read_bytes
 from cembench.core.names import digest, distinct_slugs
 from cembench.report.content.evidence import Evidence, model_surface
-from cembench.report.content.exponents import exponents_table
 from cembench.report.content.inspection import Inspection
 from cembench.report.declared_plots import declared_plot, own_plots
 from cembench.report.document import (
@@ -24,6 +23,7 @@ from cembench.report.document import (
     Text,
 )
 from cembench.report.pictures import pixel_suffix
+from cembench.report.plot_rows import exponents_table
 from cembench.report.plots import Plot, drawn
 from cembench.results.exhibits import Exhibit, ExhibitTable, place_of
 from cembench.results.papers import Picture
@@ -86,8 +86,9 @@ def _gap(evidence: Evidence, seen: Inspections, model: str, figure: str) -> Gap:
     )
     return Gap(
         title,
-        f"no map of {model} by CEM: {why}.",
-        f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
+        f"no map of {model} by {evidence.reference_label}: {why}.",
+        f"cembench run --surfaces {model_surface(model)} -a {evidence.reference} "
+        f"-o {evidence.store.folder}",
     )
 
 
@@ -107,7 +108,7 @@ def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> 
     return [
         Figure(
             f"{figure.lower().replace(' ', '-')}-{k + 1}",
-            f"{model} ({surface.origin}) and its map by CEM: {picture.title}",
+            f"{model} ({surface.origin}) and its map by {series.label}: {picture.title}",
             picture.files,
             picture.caption,
             alternative=picture.alternative,

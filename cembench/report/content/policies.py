@@ -8,13 +8,10 @@ from cembench.report.content.printed_tables import GEOMETRIC_RATE, MEAN_RATE, me
 from cembench.report.declared import declared_table
 from cembench.report.document import Column, Gap, Table, count, words
 from cembench.results.columns import COLUMNS, FrameColumn, counted
+from cembench.results.frame import filled
 from cembench.results.records import Record
 
 REUSE, BACKSLASH = BOTH = tuple(POLICIES)
-_OWN_ORDER = (
-    "own order of work (solves that pass a part of the factor, and the boundary's neighbours "
-    "eliminated last)"
-)
 
 
 def has_both_policies(evidence: Evidence) -> bool:
@@ -62,10 +59,10 @@ def policies_table(evidence: Evidence) -> Table:
 
 
 def speedups_table(evidence: Evidence) -> Table:
-    """Return a table of CEM's average rates of speedup under both policies."""
+    """Return a table of the reference's average rates of speedup under both policies."""
     titles = ("mean rate", "geometric mean - 1", "n")
     columns = [Column(title, policy) for policy in BOTH for title in titles]
-    rows = []
+    rows, label = [], evidence.reference_label
     for s in evidence.disk_series:
         if s.algorithm == evidence.reference or not s.main:
             continue
@@ -78,8 +75,8 @@ def speedups_table(evidence: Evidence) -> Table:
         rows.append(tuple(cells))
     return Table(
         "speedup-by-policy",
-        "Speedup of CEM under both policies: the algorithm, and the reuse of factorisations",
-        (Column("CEM over", numeric=False), *columns),
+        f"Speedup of {label} under both policies: the algorithm, and the reuse of factorisations",
+        (Column(f"{label} over", numeric=False), *columns),
         tuple(rows),
         "Rates of speedup on the surfaces that are or stand in for models of the paper.",
     )
@@ -87,51 +84,19 @@ def speedups_table(evidence: Evidence) -> Table:
 
 def work_tables(evidence: Evidence) -> list[Table]:
     """Return a table of factorisations and solves for each policy whose records hold counts."""
-    tables, reference = [], evidence.series_of(evidence.reference)
+    tables = []
     for policy in evidence.policies:
         own = [record for record in evidence.records if record.cell.solves == policy]
-        if not any(map(counted, own)):
-            continue
-        notes = [own_order(evidence)] if policy == REUSE and reference else []
-        if evidence.series_of("qiem"):
-            notes.append(
-                "QIEM's steps, and with them its factorisations, follow from rules for the time "
-                "step and the stop that the paper leaves open and this suite decides "
-                "(docs/algorithms.md)"
+        if any(map(counted, own)):
+            known = {"policy": policy, **evidence.paper.functions()}
+            told = (filled(note, evidence.frame, known) for note in evidence.paper.work_notes)
+            made = declared_table(
+                evidence,
+                "linear-algebra-work",
+                keys=[record.cell.key for record in own],
+                surfaces=evidence.surfaces,
+                notes=list(filter(None, told)),
+                called=f"linear-algebra-work-{policy}",
             )
-        made = declared_table(
-            evidence,
-            "linear-algebra-work",
-            keys=[record.cell.key for record in own],
-            surfaces=evidence.surfaces,
-            notes=notes,
-            called=f"linear-algebra-work-{policy}",
-        )
-        tables += [made] if made else []
+            tables += [made] if made else []
     return tables
-
-
-def own_order(evidence: Evidence) -> str:
-    """Return a sentence on how much of CEM's lead is its order of work beside factorisations.
-
-    Under "backslash" CEM is Algorithm 1 as printed, with whole solves. So records of both policies
-    tell; those of one do not.
-    """
-    frame = evidence.frame
-    own = frame[frame["reference"] & frame["main"] & frame["ok"]]
-    names = ["counted_factorisations", "counted_columns", "seconds"]
-    under = {policy: rows.set_index("place")[names] for policy, rows in own.groupby("solves")}
-    ratios = under[REUSE] / under[BACKSLASH] if len(under) > 1 else own[names].iloc[:0]
-    known = [column.tolist() for _, column in ratios.dropna().items()]
-    if not known[0]:
-        return (
-            f"How much of CEM's lead is its {_OWN_ORDER} only a run with both policies tells: "
-            "--solves reuse,backslash"
-        )
-    factored, solved, seconds = (f"{100 * MEAN_RATIO.of(one):.0f} %" for one in known)
-    return (
-        f"CEM's {_OWN_ORDER} leaves it {solved} of the right-hand sides of Algorithm 1 "
-        f"as printed, which 'backslash' runs, and reuse {factored} of the "
-        f"factorisations; together they take {seconds} of the seconds; by that factor "
-        f"its lead is not the printed algorithm's (geometric means, n = {len(known[0])})"
-    )

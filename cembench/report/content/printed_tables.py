@@ -138,7 +138,7 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
             cells += [reading.entry(rates, "no rate to average") for rates in sets[a]]
         rows.append(tuple(cells))
     if any(work):  # the row that no machine's speed is in
-        cells = [words("factorisations over CEM's, geometric mean")]
+        cells = [words(f"factorisations over {evidence.reference_label}'s, geometric mean")]
         tenths = MEAN_RATIO.model_copy(update={"form": ".1f"})
         for ratios in work:
             cells += [missing("the paper does not count them")] * 3

@@ -12,10 +12,8 @@ from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
-from cembench.report.content.exponents import exponents_table
 from cembench.report.content.findings import findings, many_findings
 from cembench.report.content.inspection import Inspection, inspect_surface
-from cembench.report.content.machines import machines_section
 from cembench.report.content.paper_figures import (
     OF_MODELS,
     exhibit_sections,
@@ -30,18 +28,61 @@ from cembench.report.declared_plots import declared_plot
 from cembench.report.document import (
     ORIGINS,
     Claim,
+    Column,
     Figure,
     Findings,
     Item,
+    Plain,
     Report,
     Section,
     Table,
     Text,
     words,
 )
+from cembench.report.plot_rows import exponents_table
 from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
+from cembench.results.machines import machine_of, software_differences
 from cembench.results.records import MeshOrigin
+
+
+def machines_section(evidence: Evidence) -> Section | None:
+    """A line a machine, and in what their software differs; None where there is one machine."""
+    environments = evidence.store.environments()
+    marked = evidence.machines
+    differing = software_differences(evidence.records, environments)
+    if not marked.letters and not differing:
+        return None
+    items: list[Item] = [Text(words) for words in marked.explained()]
+    if marked.letters:
+        items.append(
+            Text(
+                "The letter beside a time names its machine. A surface is measured on one machine "
+                "by all algorithms, so rates of speedup, their averages, ranks and profiles are "
+                "formed within machines. Plots of seconds, and exponents, run over all of them: "
+                "part of what they show is how machines differ."
+            )
+        )
+        items.append(_table(evidence))
+    items += [Text(f"Other software than most cells have: {words}.") for words in differing]
+    return Section("machines", "Machines", tuple(items))
+
+
+def _table(evidence: Evidence) -> Table:
+    environments = evidence.store.environments()
+    rows: list[list[Plain]] = []
+    for name, letter in evidence.machines.letters.items():
+        own = [record for record in evidence.records if evidence.machines.of(record) == letter]
+        about = next(
+            (e for r in own if machine_of(e := environments.get(r.environment, {})) == name), {}
+        )
+        surfaces = len({record.cell.mesh_hash for record in own})
+        cpu = str(about.get("cpu") or "-")
+        rows.append([letter, name or "not named", cpu, surfaces, len(own)])
+    columns = [Column(title, numeric=False) for title in ("mark", "machine", "processor")]
+    columns += [Column("surfaces"), Column("cells")]
+    return Table.of("machines", "Machines of this run", columns, rows, origin="")
+
 
 #: Receives progress: a text, the number of finished steps, and their total.
 Progress = Callable[[str, int, int], None]

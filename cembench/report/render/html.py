@@ -43,9 +43,7 @@ from cembench.report.document import (
     Value,
     Verdict,
     csv_of,
-    figures_of,
-    galleries_of,
-    tables_of,
+    items_of,
 )
 from cembench.report.pictures import (
     embed_pixels,
@@ -155,15 +153,17 @@ def render(report: Report, folder: Path) -> str:
     anchors = _Anchors()
     sections = [_section(section, anchors, None) for section in report.sections]
     everything = [s for top in sections for s in _all_sections(top)]
-    figures = list(figures_of(report))
+    figures = list(items_of(report, Figure))
     pictures = _Pictures(figures, folder)
-    data = _small_files(folder, [f.data for f in figures if f.data], map(csv_of, tables_of(report)))
+    data = _small_files(
+        folder, [f.data for f in figures if f.data], map(csv_of, items_of(report, Table))
+    )
     keys = _short_keys(report.records)
     facets = facets_of(report.records)
     plots = {anchors.of(f): _plot(f.plot) for f in figures if f.plot is not None}
     script = template_text("unpack.js") + template_text("report.js")
     style = template_text("report.css")
-    if any(gallery.scene for gallery in galleries_of(report)):
+    if any(gallery.scene for gallery in items_of(report, Gallery)):
         script, style = script + template_text("view.js"), style + template_text("view.css")
     library, packed_library = _plotly() if plots else (b"", "")
     store = {
@@ -382,7 +382,7 @@ class _Pictures:
     def first_of(self, section: Section) -> Mapping[str, Any] | None:
         """Return a copy of the first picture of a page, for the list of pages."""
         one = Report(title="", command="", facts=(), sections=(section,))
-        pictures = (f for f in figures_of(one) if f.plot is None and self._files[id(f)])
+        pictures = (f for f in items_of(one, Figure) if f.plot is None and self._files[id(f)])
         first = next(pictures, None)
         return None if first is None else self.of(first, copy=True)
 

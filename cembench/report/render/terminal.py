@@ -29,10 +29,10 @@ from cembench.report.document import (
     Tone,
     Value,
     is_prose,
+    items_of,
     marked,
     of_status,
     plain,
-    tables_of,
     words,
 )
 
@@ -219,17 +219,14 @@ def folded(table: Table) -> Table:
     return replace(table, columns=columns, rows=tuple(rows))
 
 
-#: Tables that `report` and `reproduce` show, and those shown if these are missing.
-SHOWN = ("table-1", "table-2", "table-3", "table-4")
-
-
 def paper_tables(report: Report) -> RenderableType:
-    """Return the head and the paper's four tables, printed figures above measured ones.
+    """Return the head and the paper's tables, printed figures above measured ones.
 
     A run over the user's own surfaces has its own table instead.
     """
-    tables = {table.name: table for table in tables_of(report)}
-    names = (name if name in tables else f"{name}-other-surfaces" for name in SHOWN)
+    tables = {table.name: table for table in items_of(report, Table)}
+    printed = [f"table-{number}" for number in (report.paper.printed if report.paper else ())]
+    names = (name if name in tables else f"{name}-other-surfaces" for name in printed)
     chosen = [tables[name] for name in names if name in tables]
     parts = list(_head(report))
     for table in chosen:
