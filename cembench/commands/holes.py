@@ -35,7 +35,7 @@ def holes(
     """Print a table of all surfaces, and add it to the run."""
     from cembench.api.holes_exhibits import write_holes_table
     from cembench.mesh.triangle_mesh import HoledMesh
-    from cembench.report.content.paper_figures import tables_shown
+    from cembench.report.content.exhibits import tables_shown
     from cembench.results import run_folder
     from cembench.running.surfaces import load_surface
 

@@ -121,7 +121,7 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
     from cembench.morphing.exhibit import morph_tables
-    from cembench.report.content.paper_figures import exhibit_table
+    from cembench.report.content.exhibits import exhibit_table
 
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")

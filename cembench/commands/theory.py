@@ -49,7 +49,7 @@ def theory(
 
 def _show(found: TheoryFacts, run: Path) -> None:
     from cembench.api.theory_exhibit import PICTURE, theory_exhibit
-    from cembench.report.content.paper_figures import tables_shown
+    from cembench.report.content.exhibits import tables_shown
     from cembench.results.exhibits import place_of
 
     facts, exhibit = found.facts, theory_exhibit(found)

@@ -12,14 +12,10 @@ from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
+from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.findings import findings, many_findings
 from cembench.report.content.inspection import Inspection, inspect_surface
-from cembench.report.content.paper_figures import (
-    OF_MODELS,
-    exhibit_sections,
-    figures_section,
-    paper_plot,
-)
+from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
 from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
