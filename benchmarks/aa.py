@@ -32,10 +32,9 @@ from cembench.results.comparison import (
     compare_ratios,
     ratio_interval,
 )
-from cembench.results.intervals import ERROR
+from cembench.results.intervals import ERROR, LOOKS, share, share_of
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import Outcome, Record
-from cembench.results.sequential_checks import LOOKS, share, share_of
 from cembench.running.map_checks import Checked
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks import noise
 from benchmarks.pages import Section, Table
-from cembench.results.sequential_checks import LOOKS
+from cembench.results.intervals import LOOKS
 from cembench.validation.scaling import MOST_ROUNDS, GrowthAnswer, answer_of
 
 #: How much larger the larger mesh is.

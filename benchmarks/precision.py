@@ -11,9 +11,8 @@ from scipy.special import stdtr
 
 from benchmarks import noise
 from benchmarks.pages import Section, Table
-from cembench.results.intervals import ERROR
-from cembench.results.sequential_checks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
-from cembench.results.signed_rank import cut, walsh_averages
+from cembench.results.intervals import ERROR, LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
+from cembench.results.rank_tests import cut, walsh_averages
 
 LAYOUT = """
 | noise | precision | wrong verdicts | at any look | rounds: mean | median | precise |

@@ -78,11 +78,11 @@ def decoys(cli):
 
 @pytest.fixture
 def run(cli):
-    """A run with one record, as an earlier version left it: without a marker."""
-    return older_run(cli.folder / "run")
+    """A run with one record."""
+    return a_run(cli.folder / "run")
 
 
-def older_run(folder, mesh=None, algorithm="harmonic-circle", **changes):
+def a_run(folder, mesh=None, algorithm="harmonic-circle", **changes):
     mesh = mesh or flat_disk(60)
     cell = Cell(algorithm=algorithm, code_hash="c", mesh=mesh.name, mesh_hash=mesh.hash)
     facts = MeshFacts(vertices=mesh.n, faces=mesh.m, boundary_vertices=9, non_delaunay_share=0)
@@ -127,7 +127,7 @@ REFUSED = [
 
 @pytest.mark.parametrize("call", REFUSED, ids=" ".join)
 def test_a_folder_of_somebody_is_refused_and_nothing_is_changed(call, cli, decoys, run):
-    older_run(cli.folder / "run2")
+    a_run(cli.folder / "run2")
     (cli.folder / "link.obj").symlink_to("flat.obj")
     os.link(cli.folder / "flat.obj", cli.folder / "hard.obj")
     before = tree(cli.folder)
@@ -214,7 +214,7 @@ def test_a_morph_does_not_number_its_frames_over_its_surfaces(cli):
 # Runs
 
 
-def test_a_run_from_before_markers_is_resumed_and_keeps_what_else_lies_there(cli, run):
+def test_a_run_is_resumed_and_keeps_what_else_lies_there(cli, run):
     (run / "notes.txt").write_text("mine")
     (run / "scratch").mkdir()
     (run / "scratch/thesis.txt").write_text("mine")
@@ -224,18 +224,10 @@ def test_a_run_from_before_markers_is_resumed_and_keeps_what_else_lies_there(cli
         assert scratch.parent == run
         assert scratch.name not in ("scratch", "scratch-")
     after = tree(run)
-    assert set(after) - set(before) <= {Path("cembench.json"), Path("lock")}
+    assert set(after) - set(before) <= {Path("lock")}
     assert {path: after[path] for path in before} == before
     assert json.loads((run / "cembench.json").read_text())["kind"] == "run"
     assert len(Store(run).records()) == 1
-
-
-def test_a_run_that_was_begun_before_markers_is_resumed(tmp_path):
-    cell = Cell(algorithm="cem", code_hash="c", mesh="m", mesh_hash="h")
-    Store(tmp_path).save_plan([cell])
-    with Store(tmp_path).locked():
-        pass
-    assert Store(tmp_path).plan() == [cell]
 
 
 @pytest.mark.parametrize("what", ["records", "maps", "samples", "lock", "plan.json", "exhibits"])
@@ -305,7 +297,7 @@ HOSTILE = ["a/b", "../x", "../../x", "/tmp/x", "x" * 240, "caf\udce9", "nul", "a
 @pytest.mark.parametrize("name", HOSTILE)
 def test_any_name_of_an_algorithm_or_mesh_is_kept_inside_and_found_again(name, tmp_path):
     mesh = replace(flat_disk(60), name=name)
-    run = older_run(tmp_path / "up/run", mesh, name)
+    run = a_run(tmp_path / "up/run", mesh, name)
     outside = [p for p in tmp_path.rglob("*") if p.is_file() and not p.is_relative_to(run)]
     assert outside == []
     store = Store(run)
@@ -400,7 +392,7 @@ def quick_drawing(monkeypatch):
 def test_names_that_differ_in_case_or_signs_alone_get_pages_of_their_own(cli, quick_drawing):
     for k, name in enumerate(("Face", "face", "face-", "F" * 240, "F" * 241)):
         mesh = flat_disk(60)
-        older_run(cli.folder / "run", replace(mesh, V=(k + 1) * mesh.V, name=name))
+        a_run(cli.folder / "run", replace(mesh, V=(k + 1) * mesh.V, name=name))
     code, _, err = cli("report", "run")
     assert code == 0, err
     pages = list((cli.folder / "run/report/pages").iterdir())
@@ -451,7 +443,7 @@ def test_a_report_cut_short_while_it_is_moved_is_completed(cli, run, monkeypatch
         return renamed(path, target)
 
     Store(run).save_plan([])
-    older_run(run, flat_disk(90))  # another report than before
+    a_run(run, flat_disk(90))  # another report than before
     with monkeypatch.context() as patch:
         patch.setattr(Path, "replace", breaks)
         assert cli("report", "run", "-o", "out")[0] != 0

@@ -28,7 +28,7 @@ from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
 from cembench.core.wording import Advice
-from cembench.results.sequential_checks import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
+from cembench.results.intervals import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -142,7 +142,7 @@ class Run:
             The rows.
 
         """
-        from cembench.results.record_rows import rows
+        from cembench.results.columns import rows
 
         return rows(self.records(), reference)
 

@@ -105,8 +105,8 @@ def reproduce(
     from cembench.core import folders
     from cembench.registry import load_registry
     from cembench.results import run_folder
+    from cembench.results.intervals import USUAL_PRECISION
     from cembench.results.profiles import Profile, algorithms_of
-    from cembench.results.sequential_checks import USUAL_PRECISION
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
     from cembench.running.local import run_tasks

@@ -69,9 +69,9 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
     from cembench.report.content.evidence import Evidence
     from cembench.report.content.many_surfaces import MANY
     from cembench.report.run_tables import machine_lines, many_table, results_table, speedups_table
-    from cembench.results.outliers import outlier_lines
-    from cembench.results.record_rows import rows
+    from cembench.results.columns import rows
     from cembench.results.records import REFERENCE
+    from cembench.results.stability import outlier_lines
     from cembench.results.store import Store
 
     records, folder, reference = list(run.asked), run.folder, reference or REFERENCE
@@ -81,7 +81,7 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
     if as_json:
         print_json(rows(records, reference))
     elif many:
-        out.print(many_table(records))
+        out.print(many_table(evidence))
         for words in (*machine_lines(evidence.machines), *suspects):
             out.print(words)
     else:

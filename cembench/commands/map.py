@@ -65,7 +65,7 @@ def map_(
 
 
 def _print_end(maps: Maps, *, as_json: bool) -> None:
-    from cembench.results.record_rows import row
+    from cembench.results.columns import row
 
     more = {"output": str(maps.output)} if maps.output and not maps.missing else {}
     if as_json:

@@ -68,7 +68,7 @@ def peers(
     from cembench.commands.report import drawing_jobs
     from cembench.core import folders
     from cembench.results import run_folder
-    from cembench.results.record_rows import rows
+    from cembench.results.columns import rows
     from cembench.running.external.installed import missing
 
     run_folder.check(output)

@@ -50,7 +50,7 @@ def drawing_jobs() -> int:
 
 def show_report(report: Report, folder: Path) -> None:
     """Print the paper's tables, the verdicts on its claims, and the report's path."""
-    from cembench.report.render.terminal_report import paper_tables
+    from cembench.report.render.terminal import paper_tables
 
     out.print(paper_tables(report))
     verdicts = summary(report, folder)["verdicts"]
@@ -61,18 +61,9 @@ def show_report(report: Report, folder: Path) -> None:
 
 def summary(report: Report, folder: Path) -> dict[str, Any]:
     """Return a report's contents for JSON output."""
-    from cembench.report.document import (
-        VERDICTS,
-        Claim,
-        Gap,
-        figures_of,
-        plain,
-        sections_of,
-        tables_of,
-    )
+    from cembench.report.document import VERDICTS, Claim, Figure, Gap, Table, items_of, plain
 
-    items = [item for _, section in sections_of(report) for item in section.items]
-    claims = {item.name: item.verdict for item in items if isinstance(item, Claim)}
+    claims = {claim.name: claim.verdict for claim in items_of(report, Claim)}
     counts = Counter(claims.values())
     found = report.findings
     return {
@@ -84,9 +75,9 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
         "html": str(folder / "index.html"),
         "markdown": str(folder / "report.md"),
         "latex": str(folder / "report.tex"),
-        "tables": [table.name for table in tables_of(report)],
-        "figures": [figure.name for figure in figures_of(report)],
-        "gaps": {item.title: item.why for item in items if isinstance(item, Gap)},
+        "tables": [table.name for table in items_of(report, Table)],
+        "figures": [figure.name for figure in items_of(report, Figure)],
+        "gaps": {gap.title: gap.why for gap in items_of(report, Gap)},
         "claims": claims,
         "verdicts": {verdict: counts[verdict] for verdict in VERDICTS if counts[verdict]},
     }

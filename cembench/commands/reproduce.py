@@ -17,7 +17,7 @@ from cembench.commands.report import show_report, summary
 @from_api(reproduce_paper, without=("jobs", "reporter"), budget="--budget TIME")
 def reproduce(call: Call, *, as_json: Json = False) -> None:
     """Print the tables and verdicts; exit with 1 if a cell did not end ok."""
-    from cembench.results.record_rows import rows
+    from cembench.results.columns import rows
     from cembench.running.environment import usable_cores
 
     with resumable():

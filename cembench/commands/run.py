@@ -142,7 +142,7 @@ def show(
     as_json: Json = False,
 ) -> None:
     """Show everything that is recorded about a cell."""
-    from cembench.results.record_rows import row
+    from cembench.results.columns import row
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records, verify_map
 
@@ -312,7 +312,7 @@ def export(
 ) -> None:
     """Write all records of a run as one table, one row per cell."""
     from cembench.report.export import export_rows
-    from cembench.results.record_rows import rows
+    from cembench.results.columns import rows
     from cembench.results.run_folder import is_own
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records

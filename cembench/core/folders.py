@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import uuid
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Literal
@@ -44,9 +43,7 @@ class Marker(BaseModel):
     files: dict[str, tuple[str, ...]] | None = None
 
 
-def check(
-    folder: Path, kind: Kind, is_older: Callable[[Path], bool] = lambda folder: False
-) -> Marker | None:
+def check(folder: Path, kind: Kind) -> Marker | None:
     """Return the marker of a folder, or None if it may get one; change nothing.
 
     Parameters
@@ -55,8 +52,6 @@ def check(
         A folder of this kind, an empty folder, or one that does not exist.
     kind : str
         The kind of folder that is needed.
-    is_older : callable
-        Whether the folder it is given is of this kind, made before markers existed.
 
     Raises
     ------
@@ -71,7 +66,7 @@ def check(
         if MARKERS[kind] in names:
             return _read(folder, kind)
         others = [name for name in names if not _is_passing(folder / name)]
-        if not others or is_older(folder):
+        if not others:
             return None
     except OSError as error:
         raise RecordError(f"{folder} cannot be read: {error.strerror or error}.") from error
@@ -82,11 +77,9 @@ def check(
     )
 
 
-def claim(
-    folder: Path, kind: Kind, is_older: Callable[[Path], bool] = lambda folder: False
-) -> Marker:
+def claim(folder: Path, kind: Kind) -> Marker:
     """Mark a folder as ours if :func:`check` allows it, and return the marker."""
-    found = check(folder, kind, is_older)
+    found = check(folder, kind)
     if found is not None:
         return found
     now = datetime.now(UTC).isoformat(timespec="seconds")

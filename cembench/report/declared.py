@@ -1,7 +1,8 @@
 """Tables that are declared: a title, the rows, and for each column what it shows.
 
 A declaration is a part of a TOML file, ``tables.toml`` here or one that ``report --tables`` names.
-Its rows are records, or algorithms with figures over their records::
+Its rows are records, algorithms with figures over their records, or surfaces with figures of each
+algorithm::
 
     [by-target]
     title = "Angle errors by algorithm"
@@ -13,14 +14,14 @@ Its rows are records, or algorithms with figures over their records::
     ]
 
 With ``rows = "cause"`` a row has the records on the surfaces that are hard for one reason
-(:mod:`cembench.report.content.causes`). Columns of records name a column of the frame
+(:mod:`cembench.report.content.causes`). Columns of records and surfaces name a column of the frame
 (:mod:`cembench.results.columns`); the others are expressions (:mod:`cembench.results.frame`). Every
 entry keeps its record's key, its origin, and why it has no number.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -28,8 +29,16 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from pydantic import Field, model_validator
 
 from cembench.core.names import slug
+from cembench.report.by_surface import (
+    POLICIES,
+    Footer,
+    Quantity,
+    figure_entry,
+    in_policy,
+    table_beside,
+)
 from cembench.report.content.causes import by_cause
-from cembench.report.content.evidence import DISK, Evidence
+from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration, filled, own, parsed, read
 from cembench.report.document import (
     Column,
@@ -37,15 +46,19 @@ from cembench.report.document import (
     Section,
     Table,
     Text,
-    Tone,
     Value,
     entry,
     of_status,
     words,
 )
-from cembench.results.columns import COLUMNS, FrameColumn, worded
-from cembench.results.comparison import UNSTABLE_WIDTH
-from cembench.results.external_words import mark_of, marks_explained, seconds_words
+from cembench.results.columns import (
+    COLUMNS,
+    FrameColumn,
+    mark_of,
+    marks_explained,
+    seconds_words,
+    worded,
+)
 from cembench.results.frame import evaluate
 from cembench.results.records import Record
 
@@ -141,7 +154,7 @@ class DeclaredTable(Declaration):
 
     title: str
     columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
-    rows: Literal["record", "algorithm", "cause"] = "record"
+    rows: Literal["record", "algorithm", "surface", "cause"] = "record"
     where: str = ""
     #: "first": the run's first linear-algebra policy; "all".
     policy: Literal["first", "all"] = "first"
@@ -150,13 +163,18 @@ class DeclaredTable(Declaration):
     caption: str = ""
     #: What is said below the table: what marks mean, why cells did not end ok, their notices.
     notes: tuple[Literal["marks", "targets", "causes", "notices"], ...] = ()
+    #: Of surfaces: rows of aggregates below the others.
+    footers: tuple[Footer, ...] = ()
 
     @model_validator(mode="after")
     def _fits(self) -> DeclaredTable:
-        wrong = [c for c in self.columns if bool(c.value) == (self.rows == "record")]
+        takes_columns = self.rows in ("record", "surface")
+        wrong = [c for c in self.columns if bool(c.value) == takes_columns]
         if wrong:
-            what = "columns (column)" if self.rows == "record" else "expressions (value)"
+            what = "columns (column)" if takes_columns else "expressions (value)"
             raise ValueError(f'rows = "{self.rows}" takes {what}, not {wrong[0].title!r}')
+        if self.rows == "surface" and any(c.column not in COLUMNS for c in self.columns):
+            raise ValueError(f'rows = "surface" takes columns of figures: {", ".join(COLUMNS)}')
         return self
 
 
@@ -186,6 +204,8 @@ def declared_table(
     declared: DeclaredTable | None = None,
     *,
     keys: Iterable[str] | None = None,
+    surfaces: Sequence[MeasuredSurface] = (),
+    notes: Sequence[str] = (),
     called: str = "",
     **texts: str,
 ) -> Table | None:
@@ -201,6 +221,10 @@ def declared_table(
         The table; default: the one of :func:`own_tables` with this name.
     keys : iterable of str, optional
         Only these records.
+    surfaces : sequence of MeasuredSurface, optional
+        The rows of a table of surfaces, in order; default: all that have a record in it.
+    notes : sequence of str, optional
+        More notes, before those declared.
     called : str
         Another name for the table's file and anchor.
     texts : str
@@ -217,16 +241,50 @@ def declared_table(
         chosen = _selected(evidence, spec, chosen)
     if not chosen:
         return None
+    told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(chosen))}
+    told |= {"reference": evidence.reference_label, **texts}
+    below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, chosen))))
+    if spec.rows == "surface":
+        return _of_surfaces(evidence, spec, chosen, surfaces, called or name, told, below)
     columns, entries = zip(*_columns(evidence, spec, chosen), strict=True)
-    told = {"policy": policy, "n": str(len(chosen)), **texts}
-    return Table(
-        called or name,
-        filled(spec.title, told),
-        columns,
-        tuple(zip(*entries, strict=True)),
-        filled(spec.caption, told),
-        tuple(dict.fromkeys(_notes(evidence, spec, chosen))),
-    )
+    title, caption = filled(spec.title, told), filled(spec.caption, told)
+    return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
+
+
+def _of_surfaces(
+    evidence: Evidence,
+    spec: DeclaredTable,
+    chosen: Rows,
+    surfaces: Sequence[MeasuredSurface],
+    name: str,
+    told: Mapping[str, str],
+    notes: Sequence[str],
+) -> Table:
+    """Return a table of surfaces: columns by algorithm if each names it in its group."""
+    places = dict.fromkeys(row["place"] for row in chosen)
+    surfaces = surfaces or [evidence.surfaces[place] for place in places]
+    series = [evidence.series[k] for k in sorted({row["series"] for row in chosen})]
+    policies = {row["solves"] for row in chosen}
+    policy = policies.pop() if len(policies) == 1 else None
+    known = {**told, "surfaces": len(surfaces), "here": POLICIES.get(policy or "", str(policy))}
+    quantities = []
+    for one in spec.columns:
+        for s in series:
+            star = " *" * (s.target != DISK and "targets" in spec.notes)
+            texts = {**known, "algorithm": s.label + star}
+            group, title = (filled(text, texts) for text in (one.group, one.heading.title))
+            quantities.append(Quantity(group, s, COLUMNS[one.column], title=title))
+    if all("{algorithm}" in one.group for one in spec.columns):
+        quantities = [one for k in range(len(series)) for one in quantities[k :: len(series)]]
+    footers = [
+        one.model_copy(update={key: filled(getattr(one, key), known) for key in ("label", "over")})
+        for one in spec.footers
+    ]
+    title, caption = filled(spec.title, known), filled(spec.caption, known)
+    return table_beside(
+        evidence, name, title, surfaces, quantities,
+        policy=policy, caption=caption, footers=footers, notes=notes,
+    )  # fmt: skip
 
 
 def _frame_of(evidence: Evidence, rows: Rows) -> pd.DataFrame:
@@ -297,29 +355,6 @@ def _entry(evidence: Evidence, row: Mapping[str, Any], one: DeclaredColumn) -> V
     if one.words or isinstance(found, str):
         return words(str(found or "-"))
     return figure_entry(evidence, record, COLUMNS[name])
-
-
-def figure_entry(evidence: Evidence, record: Record, column: FrameColumn) -> Value:
-    """Return a figure of a record as an entry: with its origin, or why there is none."""
-    number = column.of(record)
-    key = record.cell.key
-    if number is None:
-        ended = record.outcome.status == "ok"
-        why = column.why_lacking(record) if ended else evidence.missing_reason(record)
-        return Value("-", None, "", key, why)
-    text, why = column.text(number), ""
-    if column.timed:
-        text, why = timed(evidence, record, text)
-    tone: Tone = "doubtful" if why else ""
-    return Value(text, float(number), evidence.origin_of(record), key, why, tone)
-
-
-def timed(evidence: Evidence, record: Record, text: str) -> tuple[str, str]:
-    """Return a time with its marks, and why it has one."""
-    why = ""
-    if evidence.row(record)["unstable"]:
-        why = f"unstable: its 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
-    return f"{text}{'!' if why else ''} {evidence.machines.of(record)}".rstrip(), why
 
 
 def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:

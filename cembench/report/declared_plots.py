@@ -30,8 +30,15 @@ from cembench.report.content.evidence import AS_GOOD, DEGREES, Evidence, Measure
 from cembench.report.declarations import Declaration, filled, own, parsed, read
 from cembench.report.document import Text
 from cembench.report.palette import SeriesStyle, phase_style, series_styles
-from cembench.report.plot_rows import ROWS, UNSEEN, Inspections
-from cembench.report.plot_statistics import cost_ratios, front, power_law, staircase
+from cembench.report.plot_rows import (
+    ROWS,
+    UNSEEN,
+    Inspections,
+    cost_ratios,
+    front,
+    power_law,
+    staircase,
+)
 from cembench.report.plots import Axis, Kind, Plot, PlotPanel, PlotSeries, Point
 from cembench.results.columns import COLUMNS
 from cembench.results.frame import evaluate

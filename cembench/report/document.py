@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import PurePosixPath
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
     from cembench.results.papers import Paper
 
+T = TypeVar("T")
 #: Origin of a number; a table never mixes two origins in a column without a mark.
 Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
 
@@ -322,7 +323,7 @@ class Report:
     command: str
     facts: tuple[tuple[str, str], ...]
     sections: tuple[Section, ...]
-    #: Records by key, as rows (cembench.results.record_rows), that the values link to.
+    #: Records by key, as rows (cembench.results.columns), that the values link to.
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
     paper: Paper | None = None
@@ -408,36 +409,25 @@ def tex_of(table: Table) -> PurePosixPath:
     return PurePosixPath("tables", f"{table.name}.tex")
 
 
-def sections_of(report: Report) -> Iterator[tuple[int, Section]]:
-    """Yield all sections in reading order, each with its depth from 1."""
+def sections_of(report: Report) -> Iterator[Section]:
+    """Yield all sections in reading order."""
 
-    def below(depth: int, sections: tuple[Section, ...]) -> Iterator[tuple[int, Section]]:
+    def below(sections: tuple[Section, ...]) -> Iterator[Section]:
         for section in sections:
-            yield depth, section
-            yield from below(depth + 1, section.sections)
+            yield section
+            yield from below(section.sections)
 
-    return below(1, report.sections)
-
-
-def tables_of(report: Report) -> Iterator[Table]:
-    """Yield all tables in reading order."""
-    if report.findings is not None and report.findings.table is not None:
-        yield report.findings.table
-    for _, section in sections_of(report):
-        yield from (item for item in section.items if isinstance(item, Table))
+    return below(report.sections)
 
 
-def galleries_of(report: Report) -> Iterator[Gallery]:
-    """Yield all galleries in reading order."""
-    for _, section in sections_of(report):
-        yield from (item for item in section.items if isinstance(item, Gallery))
-
-
-def figures_of(report: Report) -> Iterator[Figure]:
-    """Yield all figures in reading order, including those of galleries."""
-    for _, section in sections_of(report):
+def items_of(report: Report, kind: type[T]) -> Iterator[T]:
+    """Yield all items of a kind in reading order; the figures of galleries are figures."""
+    findings = report.findings
+    if findings is not None and isinstance(findings.table, kind):
+        yield findings.table
+    for section in sections_of(report):
         for item in section.items:
-            if isinstance(item, Figure):
+            if isinstance(item, kind):
                 yield item
             elif isinstance(item, Gallery):
-                yield from item.figures
+                yield from (figure for figure in item.figures if isinstance(figure, kind))

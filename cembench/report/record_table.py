@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping
 
 from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
 from cembench.report.document import Column, Table
-from cembench.results.columns import FIGURES
+from cembench.results.columns import FIGURES, seconds_words
 from cembench.results.comparison import is_unstable, seconds_interval
-from cembench.results.external_words import seconds_words
 from cembench.results.papers import paper_of
 from cembench.results.records import Record
 

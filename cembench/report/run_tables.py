@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from statistics import median, quantiles
+from math import isnan
 
-from cembench.report.content.evidence import Evidence
+from cembench.report.content.evidence import ANGLE, Evidence
 from cembench.report.declared import declared_table, named
 from cembench.report.document import (
     Column,
@@ -20,13 +20,13 @@ from cembench.report.document import (
     entry,
     words,
 )
+from cembench.results.columns import marks_explained
 from cembench.results.comparison import (
     Comparison,
     circumstances,
     compare,
     references,
 )
-from cembench.results.external_words import marks_explained
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.multiple_testing import corrected
@@ -187,49 +187,35 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table
     return Table.of("plan", "", [SURFACE, ALGORITHM, solves, *costs_columns, basis], rows)
 
 
-def many_table(records: Sequence[Record]) -> Table:
+def many_table(evidence: Evidence) -> Table:
     """Return valid maps, angle errors, seconds and commonest faults by algorithm."""
-    by_algorithm: dict[str, list[Record]] = {}
-    for record in records:
-        by_algorithm.setdefault(record.cell.algorithm, []).append(record)
-    causes = Counter(
-        (record.cell.algorithm, record.outcome.status, fault.kind.replace("_", " "))
-        for record in records
-        for fault in record.outcome.faults
-    )
+    frame, rows, causes = evidence.frame, [], Counter[tuple[str, str, str]]()
+    for name in dict.fromkeys(record.cell.algorithm for record in evidence.records):
+        own = frame[frame["algorithm"] == name]
+        ok = own[own["ok"]]
+        angles, seconds = (ok[column].dropna().astype(float) for column in (ANGLE, "seconds"))
+        known = [angles.median(), angles.quantile(0.9), angles.max(), seconds.median()]
+        known = [None if isnan(number) else float(number) for number in known]
+        rows.append([name, len(own), len(ok), len(ok) / len(own), *known])
+        for faults, status in zip(own["faults"], own["status"], strict=True):
+            causes.update((name, status, kind.replace("_", " ")) for kind in faults)
     notes = [
         f"{count:>6}  {name}: {status}, {kind}"
         for (name, status, kind), count in causes.most_common(MOST_CAUSES)
     ]
     if len(causes) > MOST_CAUSES:
         notes.append(f"        and {len(causes) - MOST_CAUSES} other kinds")
-    surfaces = len({record.cell.mesh_hash for record in records})
-    angles = [Column(f"{t}°", form=".2f", lacking="no map") for t in ("median", "90 %", "worst")]
+    titles = [Column(f"{t}°", form=".2f", lacking="no map") for t in ("median", "90 %", "worst")]
     return Table.of(
         "many",
-        f"Valid maps, angle errors and median seconds over {surfaces} surfaces",
+        f"Valid maps, angle errors and median seconds over {len(evidence.surfaces)} surfaces",
         [
-            *(ALGORITHM, Column("surfaces"), Column("ok"), Column("share", form=".1%"), *angles),
+            *(ALGORITHM, Column("surfaces"), Column("ok"), Column("share", form=".1%"), *titles),
             Column("seconds", form=".3g", lacking="not timed"),
         ],
-        [[name, *_over_surfaces(found)] for name, found in by_algorithm.items()],
+        rows,
         notes=tuple(notes),
     )
-
-
-def _over_surfaces(records: Sequence[Record]) -> Iterator[float | None]:
-    ok = [record.outcome for record in records if record.outcome.status == "ok"]
-    yield from (len(records), len(ok), len(ok) / len(records))
-    errors = [one.metrics.get("angle_error_mean_deg") for one in ok]
-    known = [float(error) for error in errors if error is not None]
-    ninth = (
-        quantiles(known, n=10, method="inclusive")[8]
-        if len(known) > 1
-        else max(known, default=None)
-    )
-    yield from (median(known) if known else None, ninth, max(known, default=None))
-    seconds = [one.median_seconds for one in ok if one.median_seconds is not None]
-    yield median(seconds) if seconds else None
 
 
 def machine_lines(marked: Marks) -> list[str]:

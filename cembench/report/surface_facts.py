@@ -1,7 +1,7 @@
-"""Facts of a registered surface: counts, difficulty of flattening, and a thumbnail.
+"""Facts of a registered surface: counts, metrics of its map, and a thumbnail.
 
-For a surface that is kept on disk, its facts and a thumbnail are stored with it,
-so that they are available at once the next time.
+For a registered surface that is kept on disk, its facts and a thumbnail are stored with it, so that
+they are available at once the next time.
 """
 
 from __future__ import annotations

@@ -25,12 +25,11 @@ from cembench.report.content.report import Progress, build_report
 from cembench.report.declared import further_tables
 from cembench.report.declared_plots import further_plots
 from cembench.report.document import Report
-from cembench.report.export import export_rows
+from cembench.report.export import export_rows, write_tables_csv
 from cembench.report.export_format import Format
 from cembench.report.plots import drawn
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
-from cembench.report.render.tables_csv import write_tables_csv
 from cembench.report.shared_drawing import shared_drawing
 from cembench.results.papers import Paper
 from cembench.results.records import Record

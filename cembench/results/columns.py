@@ -6,7 +6,7 @@ and nowhere else; a metric is added in :mod:`cembench.conformal.metrics`, and is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -14,9 +14,70 @@ from typing import Any
 from cembench.conformal.atlas import ATLAS_METRICS
 from cembench.conformal.metrics import METRICS, Metric
 from cembench.core.notices import NoticeKind, of_kind
-from cembench.results.comparison import is_unstable, seconds_interval
-from cembench.results.external_words import solve_words
-from cembench.results.records import LinearAlgebraWork, Outcome, Record
+from cembench.results.comparison import (
+    Comparison,
+    circumstances,
+    compare,
+    compare_cpu,
+    is_unstable,
+    paired_ratios,
+    references,
+    seconds_interval,
+)
+from cembench.results.multiple_testing import corrected
+from cembench.results.records import REFERENCE, LinearAlgebraWork, Outcome, Record
+
+#: Marks of algorithms that are not cembench's code, in tables.
+PROGRAM_MARK, LIBRARY_MARK = "†", "‡"
+
+
+def mark_of(record: Record) -> str:
+    """Return the mark of an algorithm in a table; "" for cembench's own and plug-ins."""
+    if record.external is None:
+        return ""
+    return PROGRAM_MARK if record.external.kind == "program" else LIBRARY_MARK
+
+
+def marks_explained(records: list[Record]) -> list[str]:
+    """Return one line for each mark used in a table of these records."""
+    marks = {mark_of(record) for record in records}
+    lines = []
+    if PROGRAM_MARK in marks:
+        lines.append(
+            f"{PROGRAM_MARK} external program: its seconds are the wall clock of a process, with "
+            "its start and its files; comparisons take its solve time, and a verdict needs the "
+            "wall clock less its start to agree with the time that it prints"
+        )
+    if LIBRARY_MARK in marks:
+        lines.append(
+            f"{LIBRARY_MARK} a library of others, called in the process: it solves its systems "
+            "in its own way"
+        )
+    return lines
+
+
+def solve_words(record: Record) -> str:
+    """Return the origin of a program's solve time."""
+    return "by its own word" if record.outcome.own_seconds is not None else "wall less start"
+
+
+def seconds_words(record: Record) -> str:
+    """Return the times of an external program in one line; "" for anything else."""
+    outcome = record.outcome
+    if not record.is_program or outcome.median_seconds is None:
+        return ""
+    parts = [f"wall clock of the process {outcome.median_seconds:.3f} s"]
+    start, solve = outcome.start_seconds, outcome.solve_seconds
+    parts.append("start unknown" if start is None else f"on a small mesh {start:.3f} s")
+    if solve is not None:
+        parts.append(f"solve {solve:.3f} s ({solve_words(record)})")
+    if outcome.program is not None:
+        sizes = outcome.program.input_bytes, outcome.program.output_bytes
+        parts.append("files {:,.0f} kB in, {:,.0f} kB out".format(*(s / 1000 for s in sizes)))
+        if outcome.program.version:
+            parts.append(f"version: {outcome.program.version}")
+    return "; ".join(parts)
+
 
 MIB, MILLION = 2**20, 1e6
 #: The metrics of maps, those of atlases last.
@@ -49,7 +110,7 @@ class FrameColumn:
     heading, unit : str
         How a table heads it.
     form : str
-        Format of a number, "significant" for three significant digits, or "tenths".
+        Format of a number, "significant" for three significant digits, "tenths", or "percent".
     lacking : str or function of a record
         Why a record that ended ok has no value.
     timed : bool
@@ -82,6 +143,8 @@ def worded(number: float, form: str) -> str:
         return significant(number)
     if form == "tenths":
         return f"{round(number, 1):g}"
+    if form == "percent":
+        return f"{100 * number:.0f} %"
     return format(int(number) if form.endswith("d") else number, form)
 
 
@@ -284,3 +347,74 @@ DERIVED = (
 COLUMNS: Mapping[str, FrameColumn] = MappingProxyType(
     {column.name: column for column in (*EXPORTED, *DERIVED)}
 )
+
+
+_METRICS = frozenset(metric.name for metric in FIGURES)
+
+
+def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str, Any]]:
+    """Return all records of a run as flat rows, each compared with the reference on its surface.
+
+    `verdict` is for each comparison alone; `verdict_corrected` is corrected for all rows (Holm),
+    and so is `p`. `ratios` are those to the reference's seconds that decide, one for each round.
+    """
+    compared = against_reference(records, reference)
+    together = iter(corrected([found for _, found in compared if found is not None]))
+    told = []
+    for record, (base, found) in zip(records, compared, strict=True):
+        cpu = compare_cpu(record, base) if base is not None and found is not None else None
+        both = next(together) if found is not None else None
+        ratios = paired_ratios(record, base) if base is not None and found is not None else []
+        told.append(row(record) | _compared(base, found, both, cpu) | {"ratios": ratios})
+    return told
+
+
+def against_reference(
+    records: Sequence[Record], reference: str = REFERENCE
+) -> list[tuple[Record | None, Comparison | None]]:
+    """Return the reference and the comparison for each record; None if there is none."""
+    known = references(records, reference)
+    told: list[tuple[Record | None, Comparison | None]] = []
+    for record in records:
+        base = known.get(circumstances(record.cell))
+        other = base is not None and base.cell.algorithm != record.cell.algorithm
+        told.append((base, compare(record, base) if other and base is not None else None))
+    return told
+
+
+def _compared(
+    reference: Record | None,
+    found: Comparison | None,
+    together: Comparison | None,
+    cpu: Comparison | None,
+) -> dict[str, Any]:
+    """Return the columns of the speedup of the reference and its verdicts."""
+    interval = found.speedup_interval if found else None
+    cpu_interval = cpu.interval if cpu else None
+    return {
+        "reference": reference.cell.algorithm if found and reference else None,
+        "speedup": found.speedup if found else None,
+        "speedup_low": interval.low if interval else None,
+        "speedup_high": interval.high if interval else None,
+        "verdict": found.verdict if found else None,
+        "verdict_corrected": together.verdict if together else None,
+        "p": together.p if together else None,
+        "cpu_ratio": cpu.ratio if cpu else None,
+        "cpu_ratio_low": cpu_interval.low if cpu_interval else None,
+        "cpu_ratio_high": cpu_interval.high if cpu_interval else None,
+    }
+
+
+def row(record: Record) -> dict[str, Any]:
+    """Return a record as a flat row (:mod:`cembench.results.columns`).
+
+    A metric that the record does not have is left out; one that is infinite is None. `seconds_raw`
+    holds the figure of each round, `seconds_calls` every timed call by round.
+    """
+    metrics = record.outcome.metrics
+    found = {
+        column.name: column.of(record)
+        for column in EXPORTED
+        if column.name in metrics or column.name not in _METRICS
+    }
+    return found | metrics

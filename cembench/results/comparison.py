@@ -3,9 +3,9 @@
 The ratios compared are of times from the same round, each in a fresh process, in random order:
 whatever slows the machine for a while slows both. If both had the same cost, either would be the
 slower one of a round by the same amount with the same probability. The logarithm of the ratio is
-then symmetric about 0, and the signed-rank interval (:mod:`cembench.results.signed_rank`) is exact
+then symmetric about 0, and the signed-rank interval (:mod:`cembench.results.rank_tests`) is exact
 under any noise: "faster" is wrong in at most 5 % of all comparisons, even if rounds continued until
-the interval was narrow (:mod:`cembench.results.sequential_checks`). Where the algorithms of a
+the interval was narrow (:mod:`cembench.results.intervals`). Where the algorithms of a
 round shared a process too (:mod:`cembench.running.pairing`), the ratios within it decide, unless
 those between separate processes show that one algorithm disturbed the other; then a verdict must
 hold for both,
@@ -21,11 +21,9 @@ from math import exp, log
 from statistics import median
 from typing import Literal
 
-from cembench.results.intervals import ERROR, Interval
+from cembench.results.intervals import ERROR, USUAL_PRECISION, Interval, share_of
+from cembench.results.rank_tests import centre_interval, paired_p
 from cembench.results.records import Cell, Record, Round
-from cembench.results.sequential_checks import USUAL_PRECISION, share_of
-from cembench.results.signed_rank import centre_interval
-from cembench.results.t_test import paired_p
 
 #: "undecided": the interval contains 1. "too few rounds": there is no interval. "not side by side":
 #: no round of one sitting measured both.
@@ -55,8 +53,8 @@ class Comparison:
     interval: Interval | None
     verdict: Verdict
     rounds: int
-    #: p-value of the difference (:mod:`cembench.results.t_test`), corrected for the looks taken;
-    #: corrections for many comparisons use it. 1 without an interval.
+    #: p-value of the difference (:mod:`cembench.results.rank_tests`), corrected for the looks
+    #: taken; corrections for many comparisons use it. 1 without an interval.
     p: float = 1.0
     #: Whether the ratios are those within shared processes.
     together: bool = False

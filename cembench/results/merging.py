@@ -14,7 +14,6 @@ from typing import Any
 
 from cembench.core.loading import check_no_link, files_in
 from cembench.core.names import file_name
-from cembench.results import run_folder
 from cembench.results.comparison import circumstances
 from cembench.results.machines import machine_of_record
 from cembench.results.records import Record
@@ -141,8 +140,6 @@ def _leaders(best: Mapping[tuple[str, str], Held]) -> dict[str, str]:
 def _copy(held: Held, into: Store) -> None:
     if held.run.folder == into.folder:
         return
-    into.folder.mkdir(parents=True, exist_ok=True)
-    run_folder.claim(into.folder)
     environments = held.run.environments()
     environment = environments.get(held.record.environment, {"id": held.record.environment})
     into.save(held.record, held.run.uv(held.record.cell), environment)

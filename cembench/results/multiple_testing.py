@@ -45,8 +45,8 @@ def corrected(found: Sequence[Comparison]) -> list[Comparison]:
     """Return comparisons with verdicts that are all correct with probability 95 %.
 
     A verdict is kept if its own exact interval shows it, and if its p-value is also significant
-    among so many (:mod:`cembench.results.t_test`). The intervals stay single ones: each holds its
-    ratio with 95 %, not all of them at once.
+    among so many (:mod:`cembench.results.rank_tests`). The intervals stay single ones: each
+    holds its ratio with 95 %, not all of them at once.
     """
     tested = [one.p for one in found if one.interval is not None]
     if len(tested) < 2:

@@ -91,11 +91,6 @@ class PlottedFigure(_Part):
     figure: str = ""
     models: tuple[str, ...] = ()
 
-    @property
-    def anchor(self) -> str:
-        """Its name for files and links, e.g. "figure-8"."""
-        return self.figure.lower().replace(" ", "-")
-
 
 class ExpectedExhibit(_Part):
     """A figure that a command of cembench adds to a run, as an exhibit of this kind.
@@ -241,6 +236,8 @@ class Paper(_Part):
     stated: Mapping[Literal["rate", "saving"], Mapping[str, float]] = {}
     #: Models that are registered surfaces, at the printed number of triangles, or public meshes.
     surfaces: Mapping[str, str] = {}
+    #: Notes on the table of factorisations and solves, with expressions over the frame in braces.
+    work_notes: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
     plots: Mapping[str, PlottedFigure] = {}
     exhibits: tuple[ExpectedExhibit, ...] = ()

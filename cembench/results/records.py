@@ -24,7 +24,7 @@ from pydantic import (
 )
 
 from cembench.core.names import file_name, printable
-from cembench.core.notices import Notice, notice_of_old
+from cembench.core.notices import Notice
 from cembench.results.intervals import DEFAULT_ROUNDS as DEFAULT_ROUNDS
 
 #: Raised when the meaning of records changes; runs do not resume from other versions.
@@ -47,11 +47,6 @@ def _escaped(value: object) -> object:
 
 #: Text from outside, such as file names; unprintable characters are escaped.
 Printable = Annotated[str, BeforeValidator(_escaped)]
-
-#: A notice; plain texts in older records, from before notices had kinds, become notices.
-KeptNotice = Annotated[
-    Notice, BeforeValidator(lambda v: notice_of_old(v) if isinstance(v, str) else v)
-]
 
 #: "not_comparable": the map is valid, but its seconds cannot be used; see docs/cheating.md.
 Status = Literal["ok", "failed", "timeout", "out_of_memory", "invalid", "skipped", "not_comparable"]
@@ -204,7 +199,7 @@ class MeshFacts(BaseModel):
     faces: Count
     boundary_vertices: Count
     non_delaunay_share: Annotated[float, Field(ge=0, le=1)]
-    notices: tuple[KeptNotice, ...] = ()
+    notices: tuple[Notice, ...] = ()
     #: The model of a paper that the surface is or stands in for, if any.
     paper_row: str = ""
     origin: MeshOrigin = "surface"
@@ -238,12 +233,11 @@ class Round(BaseModel):
     calls: Annotated[tuple[CallSeconds, ...], Field(min_length=1)]
     #: Wall-clock seconds of the reference kernel, measured once per round with all its cells.
     kernel_seconds: CallSeconds | None = None
-    #: None in older records.
     neighbours: Neighbours | None = None
     #: Seconds by phase of the median call; they add up to the round's figure.
     phases: dict[str, Seconds] = Field(default_factory=dict)
     #: CPU seconds of the process and its children for the median call; None if the system does not
-    #: report them, and in older records.
+    #: report them.
     cpu_seconds: Seconds | None = None
     #: Wall-clock seconds of the warm-up call; None if the first call is timed.
     cold_seconds: CallSeconds | None = None
@@ -251,15 +245,11 @@ class Round(BaseModel):
     #: compared with; empty without one.
     together: tuple[CallSeconds, ...] = ()
     #: Key from which the motion of the surface for each call is derived
-    #: (:mod:`cembench.running.rigid_motion`); empty in older records.
+    #: (:mod:`cembench.running.rigid_motion`).
     motions: str = ""
     #: Whether a call agreed to rounding with another process's call on the same moved surface;
     #: None if nothing was compared.
     repeated: bool | None = None
-    #: Only in older records: SHA-256 of the last call's map, and for each timed call whether its
-    #: map has the same bits as the checked one.
-    uv_hash: str | None = None
-    same_bits: tuple[bool, ...] = ()
     #: For an external program, whose `calls` are the wall clock of its process: its seconds on a
     #: small mesh (None if it failed there), and the solve time it printed in each call (empty if
     #: it prints none).
@@ -361,14 +351,14 @@ class Outcome(BaseModel):
     status: Status
     #: Why the status is not "ok"; None otherwise.
     cause: str | None = None
-    #: The same as data; empty if the status is "ok", and in older records.
+    #: The same as data; empty if the status is "ok".
     faults: tuple[Fault, ...] = ()
     #: The algorithm raised AlgorithmFailed.
     gave_up: bool = False
     traceback: str | None = None
     #: The rounds in order; empty if no call was timed.
     rounds: tuple[Round, ...] = ()
-    #: None for a fixed number of rounds, and in older records.
+    #: None for a fixed number of rounds.
     ended: Ended | None = None
     #: Figures computed by the harness (cembench.conformal.metrics); null if infinite.
     metrics: dict[str, Figure] = Field(default_factory=dict)
@@ -383,10 +373,10 @@ class Outcome(BaseModel):
     #: The same, less the resident memory before the call.
     memory_increase_bytes: Whole | None = None
     #: Notices for the user about the measurement.
-    notes: tuple[KeptNotice, ...] = ()
+    notes: tuple[Notice, ...] = ()
     #: For an external program or library.
     program: ProgramRun | None = None
-    #: None for an external program, and in older records.
+    #: None for an external program.
     work: LinearAlgebraWork | None = None
 
     @property
@@ -404,9 +394,7 @@ class Outcome(BaseModel):
     @property
     def solve_seconds(self) -> float | None:
         """The median over the rounds of :attr:`Round.solve_seconds`; None if a round has none."""
-        found = [r.solve_seconds for r in self.rounds]
-        known = [seconds for seconds in found if seconds is not None]
-        return lower_median(known) if known and len(known) == len(found) else None
+        return _median_of_all([r.solve_seconds for r in self.rounds])
 
     @property
     def start_seconds(self) -> float | None:
@@ -428,13 +416,12 @@ class Outcome(BaseModel):
     @property
     def median_seconds(self) -> float | None:
         """The cell's figure: the median over its rounds."""
-        return lower_median(self.seconds) if self.rounds else None
+        return _median_of_all(self.seconds)
 
     @property
     def cpu_seconds(self) -> float | None:
         """The median over the rounds of the CPU seconds; None if a round has none."""
-        known = [r.cpu_seconds for r in self.rounds if r.cpu_seconds is not None]
-        return lower_median(known) if known and len(known) == len(self.rounds) else None
+        return _median_of_all([r.cpu_seconds for r in self.rounds])
 
     @property
     def phases(self) -> dict[str, float]:
@@ -454,6 +441,12 @@ def lower_median(values: Sequence[float]) -> float:
     return sorted(values)[(len(values) - 1) // 2]
 
 
+def _median_of_all(values: Sequence[float | None]) -> float | None:
+    """Return the middle value; None if one is missing, or all."""
+    known = [value for value in values if value is not None]
+    return lower_median(known) if known and len(known) == len(values) else None
+
+
 class Record(BaseModel):
     """A cell, its surface, its outcome and where it was measured: one JSON file."""
 
@@ -468,9 +461,9 @@ class Record(BaseModel):
     environment: NamePart
     started_at: str
     #: SHA-256 of the files behind `cell.code_hash`, by their paths relative to the folder or
-    #: package of the file that declares the algorithm; empty in older records.
+    #: package of the file that declares the algorithm.
     sources: dict[str, str] = Field(default_factory=dict)
-    #: The external code, if the algorithm is not cembench's or a plug-in's; None in older records.
+    #: The external code, if the algorithm is not cembench's or a plug-in's.
     external: External | None = None
 
     @property
@@ -484,7 +477,7 @@ class Environment(BaseModel):
 
     model_config = ConfigDict(extra="allow")
 
-    #: What the machine is called; None in records older than this field.
+    #: What the machine is called.
     machine: Printable | None = None
     cpu: str | None = None
     cores: Count | None = None
@@ -500,9 +493,9 @@ def signed(record: Record) -> bytes:
     return text.encode()
 
 
-def is_as_written(content: Mapping[str, Any]) -> bool | None:
-    """Whether a record's JSON still matches its digest; None if it has no digest."""
-    return content["digest"] == digest(content) if "digest" in content else None
+def is_as_written(content: Mapping[str, Any]) -> bool:
+    """Whether a record's JSON still matches its digest."""
+    return bool(content.get("digest") == digest(content))
 
 
 def digest(content: Mapping[str, Any]) -> str:

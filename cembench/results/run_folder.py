@@ -6,19 +6,15 @@ A run writes only to these names, and deletes only files under names that it gav
 
 from __future__ import annotations
 
-import json
-import re
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 from cembench.core import folders
-from cembench.core.atomic import clear_drafts, is_draft
+from cembench.core.atomic import clear_drafts
 from cembench.core.errors import RecordError
-from cembench.core.loading import read_bytes
-from cembench.results.records import Cell, Record
+from cembench.results.records import Cell
 
 #: Folders of a run.
 FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits", "others")
@@ -27,19 +23,17 @@ PLAN, LOCK, MACHINES, SIGNATURE = "plan.json", "lock", "machines.json", "signatu
 #: Adapter for the cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 
-_RECORD = re.compile(r".*--[0-9a-f]{12}\.json")
-
 
 def check(folder: Path) -> None:
     """Raise :class:`RecordError` if a run must not write to a folder; nothing is changed."""
-    folders.check(folder, "run", is_older_run)
+    folders.check(folder, "run")
     _check_names(folder)
 
 
 def claim(folder: Path) -> folders.Marker:
-    """Return the marker of a run's folder; write it if the folder is new or of an older version."""
+    """Return the marker of a run's folder; write it if the folder is new."""
     check(folder)
-    return folders.claim(folder, "run", is_older_run)
+    return folders.claim(folder, "run")
 
 
 def is_own(folder: Path, path: Path) -> bool:
@@ -67,42 +61,6 @@ def empty_scratch(folder: Path) -> Path:
         if not place.is_symlink():
             clear_drafts(place)
     return scratch
-
-
-def is_older_run(folder: Path) -> bool:
-    """Whether a folder is a run from before runs had markers.
-
-    Such a folder has a record, a plan or an exhibit, and no files of other formats among them.
-    """
-    if any(folders.is_link_or_not_folder(folder / name) for name in FOLDERS):
-        return False
-    records = [path for path in (folder / "records").glob("*.json") if not is_draft(path)]
-    if not all(_RECORD.fullmatch(path.name) for path in records):
-        return False
-    plan = folder / PLAN
-    if plan.exists() and not _holds(plan, CELLS.validate_json, folder):
-        return False
-    exhibits = folder.glob("exhibits/*/exhibit.json")
-    return (
-        plan.exists()
-        or any(_holds(path, Record.model_validate_json, folder) for path in records)
-        or any(_holds(path, _exhibit, folder) for path in exhibits)
-    )
-
-
-def _exhibit(content: bytes) -> None:
-    """Raise ValueError if this does not describe an exhibit."""
-    found = json.loads(content)
-    if not isinstance(found, dict) or not {"name", "title", "command", "origin"} <= set(found):
-        raise ValueError("not an exhibit")
-
-
-def _holds(path: Path, parse: Callable[[bytes], object], root: Path) -> bool:
-    try:
-        parse(read_bytes(path, root))
-    except (RecordError, ValueError, ValidationError):
-        return False
-    return True
 
 
 def _check_names(folder: Path) -> None:

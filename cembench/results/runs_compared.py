@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from math import exp, log
 from statistics import median
 
-from cembench.results import rank_sum
 from cembench.results.comparison import Comparison, circumstances, verdict_of
-from cembench.results.intervals import ERROR, Interval
+from cembench.results.intervals import ERROR, Interval, share_of
+from cembench.results.rank_tests import shift_interval, unpaired_p
 from cembench.results.records import Record, Round
-from cembench.results.sequential_checks import share_of
-from cembench.results.t_test import unpaired_p
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,7 @@ def _change(before: Record, after: Record) -> Change:
     ours, theirs = (_logs(rounds, corrected=drift is not None) for rounds in (new, old))
     ratio = exp(median(ours) - median(theirs))
     share = min(share_of(len(new), after.cell), share_of(len(old), before.cell))
-    found = rank_sum.shift_interval(ours, theirs, ERROR * share)
+    found = shift_interval(ours, theirs, ERROR * share)
     interval = (
         None if found is None else Interval(min(exp(found.low), ratio), max(exp(found.high), ratio))
     )

@@ -75,11 +75,11 @@ class Store:
             The record is damaged or was changed; a run must not resume from it.
 
         """
-        path = self._found(self._record_path(cell), cell)
+        path = self._found(self.record_file(cell), cell)
         if path is None:
             return None
         record = read_record(path)
-        if is_as_written(json.loads(read_bytes(path, self.folder))) is False:
+        if not is_as_written(json.loads(read_bytes(path, self.folder))):
             raise RecordError(
                 f"{path} was changed after it was written: its digest differs. Delete it and run "
                 "again."
@@ -95,7 +95,7 @@ class Store:
         environment = self.environments().get(record.environment, {"id": record.environment})
         self.save(renamed, self.uv(record.cell), environment)
         if not keep:
-            for path_of in (self._record_path, self._map_path):
+            for path_of in (self.record_file, self.map_file):
                 before, now = path_of(record.cell), path_of(cell)
                 # On a case-insensitive file system both names may be the same file.
                 if before.exists() and not (now.exists() and now.samefile(before)):
@@ -143,24 +143,25 @@ class Store:
         self, record: Record, uv: NDArray[np.complex128] | None, environment: dict[str, Any]
     ) -> None:
         """Write the environment, the map and then the record, so a record always has its map."""
+        run_folder.claim(self.folder)
         about = self.folder / "environments" / f"{file_name(record.environment)}.json"
         if not about.exists():
             write_text(about, json.dumps(environment, indent=2))
         if uv is not None:
-            write(self._map_path(record.cell), lambda file: np.savez_compressed(file, uv=uv))
+            write(self.map_file(record.cell), lambda file: np.savez_compressed(file, uv=uv))
         else:
-            self._map_path(record.cell).unlink(missing_ok=True)
-        path = self._record_path(record.cell)
+            self.map_file(record.cell).unlink(missing_ok=True)
+        path = self.record_file(record.cell)
         text = signed(record)
         write(path, lambda file: file.write(text))
-        for folder in (self._map_path(record.cell).parent, path.parent):
+        for folder in (self.map_file(record.cell).parent, path.parent):
             if folder.exists():
                 flush_folder(folder)
         self.forget_samples(record.cell)
 
     def uv(self, cell: Cell) -> NDArray[np.complex128] | None:
         """Return the recorded map, complex128 (n,); None if there is none."""
-        path = self._found(self._map_path(cell), cell)
+        path = self._found(self.map_file(cell), cell)
         return None if path is None else read_map(path, self.folder)
 
     def save_mesh(self, mesh: TriangleMesh) -> None:
@@ -208,7 +209,7 @@ class Store:
 
     def forget(self, cell: Cell) -> None:
         """Delete a cell's record and map, if they are here."""
-        for path in (self._record_path(cell), self._map_path(cell)):
+        for path in (self.record_file(cell), self.map_file(cell)):
             path.unlink(missing_ok=True)
 
     def forget_samples(self, cell: Cell) -> None:
@@ -289,10 +290,7 @@ class Store:
         return FileLock(lock_path(self.folder))
 
     def _found(self, path: Path, cell: Cell) -> Path | None:
-        """Return a cell's file by its name or else by its key; None if there is none.
-
-        A mesh may have been renamed, and older versions did not clean names.
-        """
+        """Return a cell's file by its name, or by its key if the mesh was renamed; else None."""
         if is_there(path):
             return path
         pattern = f"*--{cell.key[:12]}{path.suffix}"
@@ -300,21 +298,15 @@ class Store:
 
     def record_file(self, cell: Cell) -> Path:
         """Return the path of a cell's record, if it was saved."""
-        return self._record_path(cell)
+        return self.folder / "records" / f"{cell.label}.json"
 
     def map_file(self, cell: Cell) -> Path:
         """Return the path of a cell's map, if it was saved."""
-        return self._map_path(cell)
+        return self.folder / "maps" / f"{cell.label}.npz"
 
     def mesh_file(self, cell: Cell) -> Path:
         """Return the path of a cell's surface, if it was saved."""
         return self._mesh_path(cell.mesh_hash)
-
-    def _record_path(self, cell: Cell) -> Path:
-        return self.folder / "records" / f"{cell.label}.json"
-
-    def _map_path(self, cell: Cell) -> Path:
-        return self.folder / "maps" / f"{cell.label}.npz"
 
     def _mesh_path(self, mesh_hash: str) -> Path:
         return self.folder / "meshes" / f"{file_name(mesh_hash[:32])}.npz"

@@ -53,11 +53,7 @@ class Kind(StrEnum):
     mesh = "mesh"
     metrics = "metrics"
     #: Nothing disagrees, but something cannot be compared.
-    not_signed = "not signed"
     not_kept = "not kept"
-
-
-_ONLY_REMARKS = (Kind.not_signed, Kind.not_kept)
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ class Finding:
     @property
     def disagrees(self) -> bool:
         """Whether something is wrong, rather than just not comparable."""
-        return self.kind not in _ONLY_REMARKS
+        return self.kind is not Kind.not_kept
 
     def __str__(self) -> str:
         return f"{self.file.name}: {self.detail}"
@@ -134,10 +130,7 @@ def _refusal(store: Store, found: Sequence[Finding]) -> str:
 
 def verify_record(file: Path, record: Record) -> Iterator[Finding]:
     """Compare a record with its digest, its file's name and its own status."""
-    as_written = is_as_written(json.loads(read_bytes(file, file.parents[1])))
-    if as_written is None:
-        yield Finding(file, Kind.not_signed, "has no digest: written by an earlier version")
-    elif not as_written:
+    if not is_as_written(json.loads(read_bytes(file, file.parents[1]))):
         yield Finding(file, Kind.digest, "was changed after it was written: its digest differs")
     if not file.stem.endswith(f"--{record.cell.key[:12]}"):
         yield Finding(

@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.results.comparison import circumstances
+from cembench.results.intervals import is_look, next_look
 from cembench.results.records import Ended, Outcome, Record, Round
-from cembench.results.sequential_checks import is_look, next_look
 from cembench.results.store import Store
 from cembench.running.background_load import counters, neighbours
 from cembench.running.environment import describe_environment
@@ -345,7 +345,7 @@ class _Run:
 
     def _save_measured(self, state: CellState, ended: Ended | None) -> None:
         rounds = tuple(state.rounds[number] for number in sorted(state.rounds))
-        notes = (*state.passed.notes, *_notes(state.passed, rounds))
+        notes = (*state.passed.notes, *_notes(rounds))
         why = self.apart.get(circumstances(state.task.cell))
         if why is not None:
             text = f"not compared within one process, which could not be used in {why}"
@@ -360,16 +360,10 @@ class _Run:
         self.recorder.save(state.task, state.record, state.samples.uv())
 
 
-def _notes(checked: Outcome, rounds: Sequence[Round]) -> tuple[Notice, ...]:
+def _notes(rounds: Sequence[Round]) -> tuple[Notice, ...]:
     """Return remarks on what the rounds of a cell show together."""
     notices = []
-    differing = [
-        k + 1
-        for k, r in enumerate(rounds)
-        if r.repeated is False
-        or (r.uv_hash is not None and r.uv_hash != checked.uv_hash)
-        or not all(r.same_bits)
-    ]
+    differing = [k for k, r in enumerate(rounds, start=1) if r.repeated is False]
     if differing:
         named = ", ".join(map(str, differing))
         text = f"not deterministic: the same surface got different maps in rounds {named}"

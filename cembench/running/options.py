@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from cembench.results.intervals import USUAL_MOST_ROUNDS
 from cembench.results.records import REFERENCE, Record
-from cembench.results.sequential_checks import USUAL_MOST_ROUNDS
 from cembench.running.pairing import Pairing
 
 #: Default limit of a call in wall-clock seconds.

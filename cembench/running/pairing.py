@@ -18,8 +18,7 @@ from typing import Literal
 
 import numpy as np
 
-from cembench.results.intervals import ERROR
-from cembench.results.sequential_checks import LOOKS, share
+from cembench.results.intervals import ERROR, LOOKS, share
 
 Pairing = Literal["auto", "separate", "process"]
 

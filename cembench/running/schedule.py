@@ -19,10 +19,9 @@ from cembench.results.comparison import (
     ratio_interval,
     ratios_of_rounds,
 )
-from cembench.results.intervals import Interval
+from cembench.results.intervals import Interval, next_look, share_of
 from cembench.results.records import Cell, Ended, Outcome, Record, Round, lower_median
 from cembench.results.samples import Samples
-from cembench.results.sequential_checks import next_look, share_of
 from cembench.running.measure import ENOUGH_SECONDS
 from cembench.running.options import Options
 from cembench.running.plan import Task

@@ -23,8 +23,8 @@ from cembench.report.document import (
 )
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
+from cembench.results.columns import row
 from cembench.results.comparison import NOT_DETECTED
-from cembench.results.record_rows import row
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.validation.finding import ValidationFinding

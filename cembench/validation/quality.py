@@ -19,6 +19,7 @@ from statistics import median
 from pydantic import BaseModel, ConfigDict
 
 from cembench.core.notices import NoticeKind, of_kind
+from cembench.results.columns import solve_words
 from cembench.results.comparison import (
     Comparison,
     compare,
@@ -28,7 +29,6 @@ from cembench.results.comparison import (
     paired_ratios,
 )
 from cembench.results.comparison import Verdict as SpeedVerdict
-from cembench.results.external_words import solve_words
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import FaultKind, Record

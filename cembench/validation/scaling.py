@@ -5,7 +5,7 @@ a reference solver in the same round. What slows the machine for a while slows b
 large meshes dearer on it (a neighbour in the shared cache) raises both. The processes of a round
 are in random order, so both figures scatter evenly about their true values, and the signed-rank
 interval holds for any noise. Rounds are added until the answer is clear
-(:mod:`cembench.results.sequential_checks`).
+(:mod:`cembench.results.intervals`).
 """
 
 from __future__ import annotations
@@ -20,10 +20,9 @@ from pydantic import BaseModel, ConfigDict
 
 from cembench.core.errors import ParameterError
 from cembench.core.wording import Setting
-from cembench.results.intervals import ERROR, Interval
+from cembench.results.intervals import ERROR, LOOKS, Interval, next_look, share
+from cembench.results.rank_tests import centre_interval
 from cembench.results.records import Record, Round, lower_median
-from cembench.results.sequential_checks import LOOKS, next_look, share
-from cembench.results.signed_rank import centre_interval
 from cembench.running.schedule import cost
 from cembench.validation.finding import ValidationFinding
 

@@ -10,7 +10,6 @@ import typer
 import cembench
 from cembench.commands.cli import app
 from cembench.commands.from_api import _value
-from cembench.core.arguments import arguments_of
 
 VERBS = {
     (one.name or one.callback.__name__).rstrip("_"): one.callback

@@ -12,7 +12,7 @@ from cembench.surfaces.holed_disk import holed_disk
 
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence
-from cembench.report.document import sections_of, tables_of
+from cembench.report.document import Table, items_of, sections_of
 from cembench.report.write_report import write_report
 from cembench.results.papers import NO_PAPER, find_paper, papers, usual_paper
 from tests.papers.invented_run import write
@@ -102,7 +102,7 @@ def test_the_report_shows_printed_beside_measured_and_opens_the_source(
     openabf_run, tmp_path, quick_drawing
 ):
     report = write_report(openabf_run, tmp_path, "c", paper=small_openabf())
-    tables = {table.name: table for table in tables_of(report)}
+    tables = {table.name: table for table in items_of(report, Table)}
     first = tables["table-46"]
     rows = {row[0].text: [value.text for value in row] for row in first.rows}
     assert rows["wavy~49928f"][2:] == ["0.45", "2.00", "0.27", "1.00"]
@@ -132,7 +132,7 @@ def test_a_paper_without_printed_tables_has_claims_alone(disks, tmp_path, quick_
     assert (paper.models, paper.printed) == ((), {})
     report = write_report(disks, tmp_path, "c", paper=paper)
     assert report.paper == paper
-    titles = [section.title for _, section in sections_of(report)]
+    titles = [section.title for section in sections_of(report)]
     assert "Claims of the paper" in titles
     assert not any(title.startswith("Table") for title in titles)
     found = verdicts(disks, "ldm2018")

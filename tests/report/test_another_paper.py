@@ -6,7 +6,7 @@ import pytest
 
 from cembench.core.errors import RecordError
 from cembench.report.content.evidence import Evidence
-from cembench.report.document import Claim, Gap, figures_of, plain, sections_of, tables_of
+from cembench.report.document import Claim, Figure, Gap, Table, items_of, plain, sections_of
 from cembench.report.write_report import write_report
 from cembench.results.papers import find_paper
 
@@ -27,7 +27,7 @@ def test_a_paper_costs_few_lines():
 def test_its_title_tables_and_misprints_are_there(report):
     assert report.title == "Maps onto Circles: its claims, tables and figures, measured"
     assert report.paper == PAPER
-    tables = {table.name: table for table in tables_of(report)}
+    tables = {table.name: table for table in items_of(report, Table)}
     assert {"table-1", "table-3"} <= tables.keys()
     assert not {"table-2", "table-4", "averages"} & tables.keys()
     table = tables["table-1"]
@@ -37,11 +37,11 @@ def test_its_title_tables_and_misprints_are_there(report):
     assert table.absent == "not in this run: Teapot"
     printed = {row[0].text: row[2].text for row in table.rows if row[2].origin == "printed"}
     assert printed == {"Chinese Vase": "0.50", "Liu's Neutral Face": "0.60"}
-    assert any(section.title == "Tables 1 to 3" for _, section in sections_of(report))
+    assert any(section.title == "Tables 1 to 3" for section in sections_of(report))
 
 
 def test_its_claims_have_verdicts(report):
-    items = [item for _, section in sections_of(report) for item in section.items]
+    items = [item for section in sections_of(report) for item in section.items]
     claims = {item.name: item for item in items if isinstance(item, Claim)}
     assert list(claims) == ["lower-energy", "small-angles"]
     assert claims["lower-energy"].verdict == "holds"
@@ -54,8 +54,8 @@ def test_its_claims_have_verdicts(report):
 
 
 def test_its_pictures_are_there_and_no_other_paper_s(report):
-    assert "Figure 1" in {figure.paper for figure in figures_of(report)}
-    items = [item for _, section in sections_of(report) for item in section.items]
+    assert "Figure 1" in {figure.paper for figure in items_of(report, Figure)}
+    items = [item for section in sections_of(report) for item in section.items]
     gaps = [item.title for item in items if isinstance(item, Gap)]
     assert not any(title.startswith("Figure") for title in gaps)
 

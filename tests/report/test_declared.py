@@ -9,9 +9,8 @@ from cembench.core.errors import ParameterError
 from cembench.report.declared import declared_table, further_tables, own_tables, read_tables
 from cembench.report.document import Table, Text
 from cembench.report.write_report import write_report
-from cembench.results.columns import COLUMNS
+from cembench.results.columns import COLUMNS, row
 from cembench.results.frame import evaluate
-from cembench.results.record_rows import row
 
 MINE = """
 [by-target]
@@ -110,7 +109,7 @@ def test_braces_that_stand_for_nothing_are_an_error(evidence, tmp_path, text):
     file.write_text(f'[a]\ntitle = "{text}"\ncolumns = ["mesh"]')
     with pytest.raises(ParameterError) as caught:
         further_tables(evidence, [file])
-    assert "known in braces are n, policy" in str(caught.value)
+    assert "known in braces are in_policy, n, policy, reference" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -151,7 +150,27 @@ def test_entries_are_of_records_or_derived_from_them(evidence, name):
     table = declared_table(evidence, name, surface="A surface", faces="9", target="disk")
     assert isinstance(table, Table)
     for line in table.rows:
-        for value in line:
-            assert value.number is None or value.origin
+        for column, value in zip(table.columns, line, strict=True):
+            assert value.number is None or value.origin or column.title == "faces"
             if value.record:
                 assert value.record in evidence.by_key
+
+
+def test_a_table_of_surfaces_has_a_column_for_each_algorithm_and_aggregates_below(
+    evidence, tmp_path
+):
+    file = tmp_path / "mine.toml"
+    file.write_text(
+        '[a]\ntitle = "A, {surfaces}"\nrows = "surface"\nwhere = "main"\n'
+        'columns = [{ column = "seconds", group = "s", title = "{algorithm}" }]\n'
+        'footers = [{ label = "largest", value = "largest(x)", titles = ["CEM"] }]'
+    )
+    (table,) = further_tables(evidence, [file])[0].items
+    labels = [series.label for series in evidence.series if series.main]
+    assert table.title == f"A, {len(evidence.surfaces)}"
+    assert [(c.group, c.title) for c in table.columns[2:]] == [("s", label) for label in labels]
+    column = 2 + labels.index("CEM")
+    *rows, largest, counts = table.rows
+    known = [row[column].number for row in rows if row[column].number is not None]
+    assert largest[column].number == max(known)
+    assert counts[column].number == len(known)

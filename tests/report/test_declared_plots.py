@@ -18,7 +18,7 @@ from cembench.report.declared_plots import (
     own_plots,
 )
 from cembench.report.document import Text
-from cembench.report.plot_statistics import cost_ratios, fit, front
+from cembench.report.plot_rows import cost_ratios, fit, front
 from cembench.report.plots import Point, data_of
 from cembench.report.write_report import write_report
 

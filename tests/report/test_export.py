@@ -6,7 +6,7 @@ from pyarrow import parquet
 
 from cembench.core.errors import RecordError
 from cembench.report.export import Format, export_rows
-from cembench.results.record_rows import row, rows
+from cembench.results.columns import row, rows
 from tests.results.test_comparison import record_of
 
 RECORDS = [

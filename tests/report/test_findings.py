@@ -7,10 +7,8 @@ import pytest
 
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.findings import findings
-from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
+from cembench.report.content.findings import as_good, claim_of_the_paper, findings, verdicts_counted
 from cembench.report.content.report import is_of_the_paper
-from cembench.report.content.standings import as_good
 from cembench.report.declared_plots import declared_plot
 from cembench.report.document import VERDICTS, Claim, plain
 from cembench.results.papers import find_paper
@@ -207,7 +205,7 @@ def test_the_table_of_the_own_surfaces_has_a_row_each_and_gaps_with_a_cause(evid
     assert [row[0].text for row in table.rows] == ["mine-0", "mine-1"]
     assert [value.number for value in table.rows[0][2:4]] == [1.5, 1.25]
     assert table.rows[1][2].text == "failed"
-    assert any("does not map to the disk" in note for note in table.notes)
+    assert any("not a map to the disk" in note for note in table.notes)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@ import subprocess
 
 import pytest
 
-from cembench.report.document import Column, Table, Value, tables_of
+from cembench.report.document import Column, Table, Value, items_of
 from cembench.report.render.latex import escape, table_lines, write_latex
 from tests.report.sample_report import sample_report
 
@@ -82,7 +82,7 @@ def test_the_report_compiles_as_it_is(written, tmp_path):
 @needs_latex
 def test_a_table_alone_can_be_put_into_another_document(written, tmp_path):
     shutil.copytree(written[1] / "tables", tmp_path / "tables")
-    inputs = "\n".join(rf"\input{{tables/{t.name}}}\clearpage" for t in tables_of(written[0]))
+    inputs = "\n".join(rf"\input{{tables/{t.name}}}\clearpage" for t in items_of(written[0], Table))
     (tmp_path / "mine.tex").write_text(
         r"\documentclass{article}\usepackage[T1]{fontenc}\usepackage[utf8]{inputenc}"
         r"\usepackage{booktabs,graphicx}"

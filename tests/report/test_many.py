@@ -12,8 +12,7 @@ from cembench.report.content import causes
 from cembench.report.content.causes import Cause
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.findings import many_findings
-from cembench.report.content.many_surfaces import HARDEST, hardest
-from cembench.report.content.pairwise_wins import pairwise_wins
+from cembench.report.content.many_surfaces import HARDEST, hardest, pairwise_wins
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
 from cembench.report.difficulty import boundary_crowding, shape
@@ -268,7 +267,7 @@ def test_the_terminal_has_a_line_an_algorithm(evidence):
     from rich.console import Console
 
     console = Console(width=80, record=True, file=io.StringIO())
-    console.print(many_table(evidence.records))
+    console.print(many_table(evidence))
     text = console.export_text()
     assert all(len(line.rstrip()) <= 80 for line in text.splitlines())
     line = next(line for line in text.splitlines() if line.startswith("cem"))

@@ -14,14 +14,14 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import facts, stand_ins_words
 from cembench.report.document import (
     Claim,
+    Figure,
     Gap,
     Table,
-    figures_of,
+    items_of,
     plain,
     sections_of,
-    tables_of,
 )
-from cembench.report.render.terminal_report import paper_tables
+from cembench.report.render.terminal import paper_tables
 from cembench.report.write_report import write_report
 from cembench.results.merging import merge
 from cembench.results.store import Store
@@ -30,29 +30,25 @@ from tests.report.sample_report import CITATION
 from tests.report.small_run import meshes, write_run
 
 
-def items_of(report, kind):
-    return [i for _, section in sections_of(report) for i in section.items if isinstance(i, kind)]
-
-
 def test_everything_that_the_report_names_is_there(written):
     report, folder = written
-    for figure in figures_of(report):
+    for figure in items_of(report, Figure):
         for path in [*figure.files, *([figure.data] if figure.data else [])]:
             assert (folder / path).stat().st_size > 0, path
-    for table in tables_of(report):
+    for table in items_of(report, Table):
         assert all(len(row) == len(table.columns) for row in table.rows)
         assert (folder / "tables" / f"{table.name}.csv").is_file()
         assert (folder / "tables" / f"{table.name}.tex").is_file()
         for row in table.rows:
             assert all(not value.record or value.record in report.records for value in row)
-    names = [t.name for t in tables_of(report)]
+    names = [t.name for t in items_of(report, Table)]
     assert len(set(names)) == len(names)
     assert {path.name for path in folder.iterdir()} >= {"index.html", "report.md", "report.tex"}
 
 
 def test_the_papers_figures_are_there_or_a_gap_names_the_command(written):
     report, _ = written
-    there = {figure.paper for figure in figures_of(report)}
+    there = {figure.paper for figure in items_of(report, Figure)}
     gaps = {gap.title.partition(":")[0]: gap for gap in items_of(report, Gap)}
     for k in range(1, 15):
         assert f"Figure {k}" in there or f"Figure {k}" in gaps
@@ -63,7 +59,7 @@ def test_the_papers_figures_are_there_or_a_gap_names_the_command(written):
 
 def test_a_surface_has_a_page_with_every_map_that_ended_ok(written):
     report, folder = written
-    pages = {s.title: s for _, s in sections_of(report) if s.page}
+    pages = {s.title: s for s in sections_of(report) if s.page}
     assert set(pages) == {"Chinese Vase", "Liu's Neutral Face", "flat-disk"}
     gallery = pages["Chinese Vase"].items[1]
     assert [f.title for f in gallery.figures] == ["FDM", "LDM", "CEM", "Harmonic", "LSCM"]
@@ -72,7 +68,7 @@ def test_a_surface_has_a_page_with_every_map_that_ended_ok(written):
 
 def test_exhibits_are_sections_with_their_pictures_and_tables(written):
     report, folder = written
-    section = next(s for _, s in sections_of(report) if s.name == "exhibit-koebe")
+    section = next(s for s in sections_of(report) if s.name == "exhibit-koebe")
     (figure,) = (i for i in section.items if getattr(i, "files", None))
     assert (folder / figure.files[0]).is_file()
     (table,) = (i for i in section.items if hasattr(i, "rows"))
@@ -92,7 +88,7 @@ def test_stand_ins_are_said_to_stand_for_counts_and_not_for_difficulty(small_run
 
 
 def test_what_did_not_end_ok_and_what_is_missing_are_listed(written):
-    table = next(t for t in tables_of(written[0]) if t.name == "not-ok")
+    table = next(t for t in items_of(written[0], Table) if t.name == "not-ok")
     statuses = [row[3].text for row in table.rows]
     assert statuses.count("failed") == 2
     assert statuses.count("timeout") == 2
@@ -100,7 +96,7 @@ def test_what_did_not_end_ok_and_what_is_missing_are_listed(written):
 
 
 def test_there_are_at_least_ten_claims_and_none_is_without_figures(written):
-    claims = items_of(written[0], Claim)
+    claims = list(items_of(written[0], Claim))
     assert len(claims) >= 10
     assert len({claim.name for claim in claims}) == len(claims)
     assert all(claim.figures and claim.place and claim.test for claim in claims)
@@ -122,7 +118,7 @@ def test_links_of_the_markdown_lead_somewhere(written):
 
 def test_the_first_screen_of_every_form_has_the_paper_and_all_verdicts(written):
     report, folder = written
-    claims = items_of(report, Claim)
+    claims = list(items_of(report, Claim))
     counted = plain(report.findings.sentences[1])
     numbers = [int(number) for number in re.findall(r"\b\d+\b(?= (?:do|hold|ha|is|are))", counted)]
     assert counted.startswith(f"Of {len(claims)} claims of the paper, ")
@@ -181,7 +177,7 @@ def test_an_older_report_is_replaced_and_other_files_are_left(tmp_path):
     assert (folder / "changed.png").read_text() == "new"
     assert not (folder / "old.png").exists()
     assert (tmp_path / "run" / "plan.json").exists()
-    gaps = items_of(report, Gap)
+    gaps = list(items_of(report, Gap))
     assert any("does not hold the surface" in gap.why for gap in gaps)
     assert any("--solves reuse,backslash" in gap.command for gap in gaps)
 

@@ -1,11 +1,15 @@
 import pytest
 from cembench.surfaces.spherical_cap import spherical_cap
 
-from cembench.report.content import averages
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.policies import policies_table
-from cembench.report.content.printed_tables import printed_tables
-from cembench.report.content.rates import averages_table, measured_rates, rates_tables
+from cembench.report.content.printed_tables import (
+    READINGS,
+    averages_table,
+    measured_rates,
+    printed_rates,
+    printed_tables,
+)
 from cembench.report.content.surface_page import figures_table
 from cembench.report.declared import declared_table
 from cembench.report.document import marked
@@ -119,21 +123,20 @@ def test_other_algorithms_and_surfaces_have_tables_of_their_own(evidence):
 
 
 def test_the_printed_averages_are_the_stated_ones_in_both_readings():
-    sets = [averages.printed_rates(PAPER, a) for a in PAPER.compared]
+    sets = [printed_rates(PAPER, a) for a in PAPER.compared]
     assert [len(rates) for rates in sets] == [20, 18, 20]
-    assert [round(averages.mean_rate(r), 1) for r in sets] == [8.5, 17.2, 4.1]
-    assert [round(averages.geometric_rate(r), 1) for r in sets] == [6.8, 12.4, 3.5]
+    mean, geometric, saving, savings = READINGS
+    assert [mean.entry(rates, "").text for rates in sets] == ["8.5", "17.2", "4.1"]
+    assert [geometric.entry(rates, "").text for rates in sets] == ["6.8", "12.4", "3.5"]
     # The paper cuts these, 94.5 % and 80.5 % among them, instead of rounding.
-    assert [int(100 * averages.saving_of_mean(r)) for r in sets] == [89, 94, 80]
-    assert [averages.percent(averages.mean_saving(r)) for r in sets] == ["83 %", "89 %", "73 %"]
+    assert [int(100 * saving.of(rates)) for rates in sets] == [89, 94, 80]
+    assert [savings.entry(rates, "").text for rates in sets] == ["83 %", "89 %", "73 %"]
 
 
 def test_averages_of_known_rates():
     rates = [1.0, 3.0]  # CEM takes a half, and a quarter
-    assert averages.mean_rate(rates) == 2
-    assert averages.geometric_rate(rates) == pytest.approx(8**0.5 - 1)
-    assert averages.saving_of_mean(rates) == pytest.approx(2 / 3)
-    assert averages.mean_saving(rates) == pytest.approx(5 / 8)
+    expected = [2, 8**0.5 - 1, 2 / 3, 5 / 8]
+    assert [reading.of(rates) for reading in READINGS] == pytest.approx(expected)
 
 
 def test_aggregates_run_over_what_was_measured_and_say_their_n(evidence):
@@ -142,7 +145,7 @@ def test_aggregates_run_over_what_was_measured_and_say_their_n(evidence):
     table = averages_table(evidence, 2, "reuse")
     counts = table.rows[-1]
     assert [v.number for v in counts[1:]] == [None, 20, 1, 1, None, 18, 2, 2, None, 20, 2, 2]
-    footer = by_name(rates_tables(evidence, 2))["table-2"].rows[-1]
+    footer = by_name(printed_tables(evidence, 2))["table-2"].rows[-1]
     assert footer[0].text == "n, surfaces counted"
     assert [v.number for v in footer[2:]] == [2, 1, 2, 2, 2, 2]
 
@@ -171,7 +174,7 @@ def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
 
 
 def test_the_misprint_is_marked(evidence):
-    from cembench.report.content.printed_beside_measured import paper_value
+    from cembench.report.by_surface import paper_value
 
     value = paper_value(PAPER, 2, "Knit Cap Man", "fdm", 2)
     assert value.text == "29.07†"
@@ -211,14 +214,14 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
     rates = measured_rates(evidence, "ldm", "reuse")
     assert rates["Liu's Neutral Face"] == pytest.approx(7.0)
     assert len(rates) == 2
-    table = by_name(rates_tables(evidence, 2))["table-2"]
+    table = by_name(printed_tables(evidence, 2))["table-2"]
     assert len(table.rows) - table.footer_rows == 3
     _, counted = entry(table, "n, surfaces counted", "LDM", "here")
     assert counted.number == 2
 
 
 def test_how_sure_the_speedups_are_alone_together_and_over_families(evidence):
-    tables = by_name(rates_tables(evidence, 2))
+    tables = by_name(printed_tables(evidence, 2))
     table = tables["sure-speedups"]
     by_title = {
         (column.group, column.title): [row[k] for row in table.rows]

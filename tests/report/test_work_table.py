@@ -3,7 +3,7 @@
 import pytest
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.linear_algebra_work import work_tables
+from cembench.report.content.policies import work_tables
 from cembench.results.records import LinearAlgebraWork
 
 #: Factorisations, right-hand sides and numbers in the factor.

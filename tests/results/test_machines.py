@@ -8,7 +8,7 @@ from rich.console import Console
 
 from cembench.commands.cli import app
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.machines import machines_section
+from cembench.report.content.report import machines_section
 from cembench.report.content.surface_page import figures_table
 from cembench.report.document import Table
 from cembench.report.run_tables import machine_lines, results_table

@@ -4,9 +4,8 @@ from scipy.stats import binomtest
 
 from benchmarks import noise, precision
 from cembench.results.comparison import compare_ratios
-from cembench.results.intervals import ERROR
+from cembench.results.intervals import ERROR, share
 from cembench.results.multiple_testing import corrected, holm, sign_test
-from cembench.results.sequential_checks import share
 
 
 def test_holm_multiplies_by_what_is_left_and_keeps_the_order():

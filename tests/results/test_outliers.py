@@ -4,7 +4,7 @@ import pytest
 
 from cembench.api.benchmark import Run
 from cembench.commands.benchmark import _print_run
-from cembench.results.outliers import NAMED, outlier_lines, outliers
+from cembench.results.stability import NAMED, outlier_lines, outliers
 from tests.results.test_comparison import record_of
 
 

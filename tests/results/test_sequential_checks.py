@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 
 from benchmarks import noise, precision
-from cembench.results.intervals import ERROR
-from cembench.results.sequential_checks import LOOKS, is_look, next_look, share, share_of
-from cembench.results.signed_rank import cut
+from cembench.results.intervals import ERROR, LOOKS, is_look, next_look, share, share_of
+from cembench.results.rank_tests import cut
 from tests.results.test_comparison import record_of
 
 

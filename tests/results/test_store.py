@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cembench.core.errors import RecordError
+from cembench.results import run_folder
 from cembench.results.merging import merge
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 from cembench.results.store import Store
@@ -89,6 +90,7 @@ def test_nothing_is_half_written(record, tmp_path, monkeypatch):
 
 def test_samples_are_kept_by_environment_until_the_record_is_there(record, tmp_path):
     store = Store(tmp_path)
+    run_folder.claim(tmp_path)
     samples = store.samples(record.cell, "e")
     assert (samples.check(), samples.uv(), samples.rounds()) == (None, None, {})
     assert store.rounds_done(record.cell) is None

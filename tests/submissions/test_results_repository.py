@@ -137,9 +137,9 @@ def published(bundles, tmp_path_factory):
 
 
 def table_of(report, name):
-    from cembench.report.document import tables_of
+    from cembench.report.document import Table, items_of
 
-    return next(table for table in tables_of(report) if table.name == name)
+    return next(table for table in items_of(report, Table) if table.name == name)
 
 
 def test_the_leaderboard_answers_its_questions_and_each_figure_names_its_record(published):

@@ -6,9 +6,8 @@ import pytest
 
 from cembench.core.errors import ParameterError
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.requirement import Requirement
 from cembench.validation.summaries import append_markdown, write_junit
-from cembench.validation.verdict import Validation
+from cembench.validation.verdict import Requirement, Validation
 
 FAULT = ValidationFinding(
     stage="contract",

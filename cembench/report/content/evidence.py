@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from math import inf
 from pathlib import Path
@@ -19,7 +19,7 @@ from cembench.core.names import distinct_slugs
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
-from cembench.results import record_rows
+from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED, family_of
 from cembench.results.comparison import compare
 from cembench.results.exhibits import Exhibit, read_exhibits
@@ -56,8 +56,6 @@ class AlgorithmSeries:
     label: str
     #: Whether most cells of the run have this choice of parameters; tables show that one.
     main: bool = True
-    #: The parameters of the variant, by name.
-    parameters: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     @property
     def name(self) -> str:
@@ -149,10 +147,16 @@ class Evidence:
         """The algorithm that the others are compared with: the paper's, or the usual one."""
         return self.paper.reference or REFERENCE
 
+    @property
+    def reference_label(self) -> str:
+        """What :attr:`reference` is called in this run."""
+        series = self.series_of(self.reference)
+        return series.label if series else self.reference.upper()
+
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
-        return {row["key"]: row for row in record_rows.rows(self.records, self.reference)}
+        return {row["key"]: row for row in columns.rows(self.records, self.reference)}
 
     @cached_property
     def frame(self) -> pd.DataFrame:
@@ -317,12 +321,10 @@ class Evidence:
         """Every algorithm of the run: the paper's in the paper's order, then others by name."""
         variants: dict[str, Counter[Variant]] = {}
         about: dict[str, Record] = {}
-        parameters: dict[tuple[str, Variant], Mapping[str, Any]] = {}
         for record in self.records:
             name = record.cell.algorithm
             choice = self._variants[record.cell.key]
             variants.setdefault(name, Counter())[choice] += 1
-            parameters.setdefault((name, choice), record.cell.parameters)
             about[name] = record
         titles = Counter(record.title for record in about.values())
         found = []
@@ -333,10 +335,7 @@ class Evidence:
                 if titles[title] > 1:
                     title = f"{title} ({name})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
-                given = parameters[name, choice]
-                found.append(
-                    AlgorithmSeries(name, title, target, choice, label, k == 0, parameters=given)
-                )
+                found.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(found)
 
     def _place(self, algorithm: str) -> int:

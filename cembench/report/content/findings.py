@@ -2,28 +2,193 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from statistics import mean
+from dataclasses import dataclass
+from math import exp, log
+from statistics import mean, median
 
-from cembench.report.content.by_surface import own_table
-from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, Evidence
-from cembench.report.content.inspection import Inspection
-from cembench.report.content.own_claim import claim_of_the_paper, verdicts_counted
-from cembench.report.content.standings import (
-    NEAR,
-    AngleRatio,
-    Field,
-    Standing,
-    compare_angles,
-    compare_seconds,
-    field_of,
-    listed,
+import numpy as np
+
+from cembench.report.content.claims import under
+from cembench.report.content.evidence import (
+    ANGLE,
+    AS_GOOD,
+    DEGREES,
+    DISK,
+    AlgorithmSeries,
+    Evidence,
 )
-from cembench.report.document import Claim, Figure, Finding, Findings, Sentence
-from cembench.results.comparison import Comparison
-from cembench.results.families import FEWEST_FAMILIES, family_means, share_interval
-from cembench.results.outliers import outlier_lines
-from cembench.results.stability import scatter_words, stability_words
+from cembench.report.content.inspection import Inspection
+from cembench.report.content.printed_tables import MEAN_RATE, measured_rates
+from cembench.report.content.speedup_significance import paired_rounds
+from cembench.report.declared import declared_table
+from cembench.report.document import VERDICTS, Claim, Figure, Finding, Findings, Sentence
+from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
+from cembench.results.families import (
+    FEWEST_FAMILIES,
+    average_interval,
+    family_means,
+    rate_interval,
+    share_interval,
+)
+from cembench.results.intervals import DEFAULT_ROUNDS, Interval
+from cembench.results.records import Record
+from cembench.results.stability import outlier_lines, scatter_words, stability_words
+
+#: An algorithm takes part with maps of at least this share of the surfaces that most mapped.
+SHARE = 0.9
+#: Smaller mean angle errors, in degrees, count as this: their ratios are of rounding.
+FLOOR = 0.01
+#: An angle error within this share of the smallest one of a surface counts as equal to it.
+NEAR = 0.01
+
+
+def as_good(angles: Sequence[float], best: Sequence[float]) -> bool:
+    """Whether maps are about as good as the best ones on every surface.
+
+    Both are mean angle errors in degrees, one per surface.
+    """
+    return all(a <= max(AS_GOOD * b, b + DEGREES) for a, b in zip(angles, best, strict=True))
+
+
+@dataclass(frozen=True)
+class Standing:
+    """An algorithm's records on the common surfaces.
+
+    `families` are those of the records' surfaces, `angles` their mean angle errors in degrees, none
+    below :data:`FLOOR`, and `angle` and `seconds` geometric means over families.
+    """
+
+    series: AlgorithmSeries
+    records: tuple[Record, ...]
+    families: tuple[str, ...]
+    angles: list[float]
+    angle: float
+    seconds: float
+
+    @property
+    def label(self) -> str:
+        """The algorithm's name in this run."""
+        return self.series.label
+
+
+@dataclass(frozen=True)
+class AngleRatio:
+    """The angle errors of an algorithm over those of another on the same surfaces.
+
+    All three are over families; the interval is None for fewer than six.
+    """
+
+    mean: float
+    median: float
+    interval: Interval | None
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether the interval shows that the other's are smaller."""
+        return self.interval is not None and self.interval.low > 1
+
+
+@dataclass(frozen=True)
+class Field:
+    """The algorithms that are compared, those with the smallest angle errors first."""
+
+    standings: tuple[Standing, ...]
+    #: Number of surfaces that an algorithm for disks mapped.
+    surfaces: int
+    #: Labels of the algorithms that mapped too few of them.
+    left_out: tuple[str, ...]
+
+    @property
+    def n(self) -> int:
+        """Number of surfaces that all of them mapped."""
+        return len(self.standings[0].records)
+
+    @property
+    def families(self) -> int:
+        """Number of objects that these surfaces show."""
+        return len(set(self.standings[0].families))
+
+    @property
+    def smallest(self) -> list[float]:
+        """The smallest mean angle error on each surface."""
+        return [min(column) for column in zip(*(s.angles for s in self.standings), strict=True)]
+
+    @property
+    def good(self) -> list[Standing]:
+        """The algorithms that are as good as the best one on every surface, the fastest first."""
+        kept = [s for s in self.standings if as_good(s.angles, self.smallest)]
+        return sorted(kept, key=lambda s: s.seconds)
+
+    def near(self, standing: Standing, share: float) -> list[bool]:
+        """Return on which surfaces the angle error is within a share of the smallest."""
+        pairs = zip(standing.angles, self.smallest, strict=True)
+        return [own <= (1 + share) * least for own, least in pairs]
+
+
+def field_of(evidence: Evidence, policy: str) -> Field | None:
+    """Return the main algorithms that map to the disk, on the surfaces that all of them mapped.
+
+    Those that mapped fewer than :data:`SHARE` of what others did are left out. None if there is no
+    surface.
+    """
+    frame = evidence.frame
+    disks = frame[(frame["target"] == DISK) & frame["main"] & (frame["solves"] == policy)]
+    maps = disks[disks["ok"] & (disks["seconds"] > 0) & disks[ANGLE].notna()]
+    keys = maps.pivot(index="place", columns="label", values="key")
+    number = keys.notna().sum()
+    series = [s for s in evidence.disk_series if s.main]
+    chosen = [s for s in series if number.get(s.label, 0) >= SHARE * max(number, default=1)]
+    common = keys[[s.label for s in chosen]].dropna()
+    if common.empty:
+        return None
+    standings, rows = [], maps.set_index("key")
+    for s in chosen:
+        own = rows.loc[common[s.label]]
+        angles = own[ANGLE].astype(float).clip(lower=FLOOR)
+        families = tuple(own["family"])
+        means = (_over_families(x.tolist(), families) for x in (angles, own["seconds"]))
+        records = tuple(evidence.by_key[key] for key in own.index)
+        standings.append(Standing(s, records, families, angles.tolist(), *means))
+    left_out = tuple(s.label for s in series if s not in chosen)
+    return Field(tuple(sorted(standings, key=lambda s: s.angle)), len(keys), left_out)
+
+
+def _over_families(values: Sequence[float], families: Sequence[str]) -> float:
+    """Return the geometric mean over families of the geometric means within them."""
+    return exp(mean(family_means([log(value) for value in values], families)))
+
+
+def compare_angles(other: Standing, best: Standing) -> AngleRatio:
+    """Return the geometric mean over families of other / best, with its interval and the median."""
+    ratios = [a / b for a, b in zip(other.angles, best.angles, strict=True)]
+    logs = family_means([log(ratio) for ratio in ratios], best.families)
+    interval = average_interval(ratios, best.families)
+    return AngleRatio(exp(mean(logs)), exp(median(logs)), interval)
+
+
+def compare_seconds(slower: Standing, faster: Standing) -> Comparison | None:
+    """Compare two algorithms by the ratios of their seconds within rounds.
+
+    With enough families the ratios of these decide, which is a statement on other families;
+    otherwise the means over the surfaces in each round do, a statement on these surfaces.
+    """
+    ratios = [paired_ratios(a, b) for a, b in zip(slower.records, faster.records, strict=True)]
+    rounds = min(map(len, ratios))
+    if not rounds:
+        return None
+    if len(set(faster.families)) >= FEWEST_FAMILIES:
+        logs = [median(map(log, found)) for found in ratios]
+        return compare_ratios([exp(own) for own in family_means(logs, faster.families)])
+    together = np.log([found[:rounds] for found in ratios]).mean(axis=0)
+    return compare_ratios(np.exp(together).tolist())
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return names as "a, b and c"."""
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def findings(
@@ -50,7 +215,7 @@ def findings(
     return Findings(
         tuple(sentences),
         tuple(outlier_lines(evidence.records)),
-        None if claims else own_table(evidence),
+        None if claims else declared_table(evidence, "own-surfaces"),
         (*(field_figures(field) if field else ()), _ended(evidence)),
         _picture(evidence, inspections, best),
     )
@@ -243,3 +408,61 @@ def many_findings(evidence: Evidence) -> Findings:
         tuple(outlier_lines(evidence.records)),
         figures=tuple(figures),
     )
+
+
+#: Verdicts whose claims are named in the count.
+_NAMED = ("does not hold here", "holds in part")
+
+
+def claim_of_the_paper(evidence: Evidence) -> str:
+    """Return the paper's average rates of speedup beside those of this run, as a sentence.
+
+    A measured rate has its 95 % interval over models in brackets where there are enough of them
+    and of rounds (:func:`cembench.results.families.rate_interval`).
+    """
+    paper = evidence.paper
+    names = ", ".join(algorithm.upper() for algorithm in paper.compared)
+    printed = ", ".join(f"{paper.stated['rate'][algorithm]:.1f}" for algorithm in paper.compared)
+    told = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
+    here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
+    origins = Counter(surface.origin for surface in evidence.one_per_model)
+    models, others = origins["model"], origins["stand-in"]
+    over = [f"{models} of its models"] if models else []
+    over += [f"{others} stand-in{'s' if others > 1 else ''}"] if others else []
+    intervals = (
+        "with 95 % intervals over models"
+        if any(sure for _, (_, sure) in told)
+        else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_FAMILIES} models)"
+    )
+    return (
+        f"{paper.reference.upper()} against {names}: printed {printed}; here {here}. This is "
+        f"{paper.rate}, averaged over the models; here over {' and '.join(over)}, {intervals}."
+    )
+
+
+def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
+    """Return the measured averages as text, and whether one of them has an interval."""
+    told, sure = [], False
+    for algorithm in evidence.paper.compared:
+        rates = list(measured_rates(evidence, algorithm, policy).values())
+        series, interval = evidence.series_of(algorithm), None
+        if rates and series is not None:
+            rounds = paired_rounds(evidence, series, policy, evidence.one_per_model)
+            interval = rate_interval([ratios for _, ratios, _ in rounds], log=False)
+        between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
+        told.append(f"{MEAN_RATE.of(rates):.1f}{between}" if rates else "not measured")
+        sure = sure or interval is not None
+    return ", ".join(told), sure
+
+
+def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
+    """Return the numbers of all verdicts, failing ones first and with links to their claims."""
+    parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
+    for verdict, (one, several) in VERDICTS.items():
+        found = [claim for claim in claims if claim.verdict == verdict]
+        if found:
+            parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
+            parts.append(one if len(found) == 1 else several)
+        for k, claim in enumerate(found if verdict in _NAMED else ()):
+            parts += [", " if k else ": ", claim]
+    return (*parts, ".")

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from cembench.report.content.evidence import Evidence, model_surface
 from cembench.report.content.exhibits import exhibit_gaps
-from cembench.report.content.exponents import exponents_table
 from cembench.report.content.inspection import Inspection
 from cembench.report.declared_plots import declared_plot, own_plots
 from cembench.report.document import Figure, Gap, Item, Section
+from cembench.report.plot_rows import exponents_table
 from cembench.report.plots import Plot, drawn
 from cembench.results.papers import Picture
 
@@ -71,8 +71,9 @@ def _gap(evidence: Evidence, seen: Inspections, model: str, figure: str) -> Gap:
     )
     return Gap(
         title,
-        f"no map of {model} by CEM: {why}.",
-        f"cembench run --surfaces {model_surface(model)} -a cem -o {evidence.store.folder}",
+        f"no map of {model} by {evidence.reference_label}: {why}.",
+        f"cembench run --surfaces {model_surface(model)} -a {evidence.reference} "
+        f"-o {evidence.store.folder}",
     )
 
 
@@ -92,7 +93,7 @@ def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> 
     return [
         Figure(
             f"{figure.lower().replace(' ', '-')}-{k + 1}",
-            f"{model} ({surface.origin}) and its map by CEM: {picture.title}",
+            f"{model} ({surface.origin}) and its map by {series.label}: {picture.title}",
             picture.files,
             picture.caption,
             alternative=picture.alternative,

@@ -1,23 +1,17 @@
-"""Times under both linear-algebra policies: reuse and backslash."""
+"""The linear algebra of a run: its work, counted, and times under both policies."""
 
 from __future__ import annotations
 
-from cembench.report.content.averages import geometric_rate, mean_rate
-from cembench.report.content.evidence import (
-    Evidence,
-)
-from cembench.report.content.printed_beside_measured import (
-    Footer,
-    Quantity,
-    geometric_mean,
-    table_beside,
-)
-from cembench.report.content.rates import measured_rates
-from cembench.report.document import Column, Gap, Table, count, entry, words
-from cembench.results.columns import COLUMNS, FrameColumn
+from cembench.report.by_surface import MEAN_RATIO, POLICIES, Quantity, table_beside
+from cembench.report.content.evidence import Evidence
+from cembench.report.content.printed_tables import GEOMETRIC_RATE, MEAN_RATE, measured_rates
+from cembench.report.declared import declared_table
+from cembench.report.document import Column, Gap, Table, count, words
+from cembench.results.columns import COLUMNS, FrameColumn, counted
+from cembench.results.frame import filled
 from cembench.results.records import Record
 
-BOTH = ("reuse", "backslash")
+REUSE, BACKSLASH = BOTH = tuple(POLICIES)
 
 
 def has_both_policies(evidence: Evidence) -> bool:
@@ -41,7 +35,7 @@ def policies_table(evidence: Evidence) -> Table:
     known = frame[frame["ok"]].pivot(
         index=["mesh_hash", "label"], columns="solves", values="seconds"
     )
-    ratios = (known[BOTH[1]] / known[BOTH[0]]).dropna().to_dict()
+    ratios = (known[BACKSLASH] / known[REUSE]).dropna().to_dict()
     quantities = []
     for series in evidence.series:
 
@@ -51,8 +45,7 @@ def policies_table(evidence: Evidence) -> Table:
         of_ratio = FrameColumn("ratio", ratio, form=".2f", lacking="not under both policies")
         seconds = COLUMNS["seconds"]
         quantities += [Quantity(series.label, series, seconds, title=p, policy=p) for p in BOTH]
-        quantities.append(Quantity(series.label, series, of_ratio, title="ratio", policy=BOTH[0]))
-    mean = Footer("geometric mean", geometric_mean, lambda mean: f"{mean:.2f}", ("ratio",))
+        quantities.append(Quantity(series.label, series, of_ratio, title="ratio", policy=REUSE))
     return table_beside(
         evidence,
         "reuse-against-backslash",
@@ -61,33 +54,49 @@ def policies_table(evidence: Evidence) -> Table:
         quantities,
         caption="The ratio shows what an implementation saves by reusing a factorisation, "
         "whatever the algorithm. The paper's MATLAB code factored at every solve.",
-        footers=(mean,),
+        footers=(MEAN_RATIO,),
     )
 
 
 def speedups_table(evidence: Evidence) -> Table:
-    """Return a table of CEM's average rates of speedup under both policies."""
-    series = [s for s in evidence.disk_series if s.algorithm != evidence.reference and s.main]
-    columns = [Column("CEM over", numeric=False)]
-    for policy in BOTH:
-        columns += [
-            Column("mean rate", policy),
-            Column("geometric mean - 1", policy),
-            Column("n", policy),
-        ]
-    rows = []
-    for s in series:
+    """Return a table of the reference's average rates of speedup under both policies."""
+    titles = ("mean rate", "geometric mean - 1", "n")
+    columns = [Column(title, policy) for policy in BOTH for title in titles]
+    rows, label = [], evidence.reference_label
+    for s in evidence.disk_series:
+        if s.algorithm == evidence.reference or not s.main:
+            continue
         cells = [words(s.label)]
         for policy in BOTH:
             rates = list(measured_rates(evidence, s.algorithm, policy).values())
-            for mean in (mean_rate, geometric_rate):
-                cells.append(entry(mean(rates) if rates else None, ".2f", "no rate"))
+            for mean in (MEAN_RATE, GEOMETRIC_RATE):
+                cells.append(mean.model_copy(update={"form": ".2f"}).entry(rates, "no rate"))
             cells.append(count(len(rates)))
         rows.append(tuple(cells))
     return Table(
         "speedup-by-policy",
-        "Speedup of CEM under both policies: the algorithm, and the reuse of factorisations",
-        tuple(columns),
+        f"Speedup of {label} under both policies: the algorithm, and the reuse of factorisations",
+        (Column(f"{label} over", numeric=False), *columns),
         tuple(rows),
         "Rates of speedup on the surfaces that are or stand in for models of the paper.",
     )
+
+
+def work_tables(evidence: Evidence) -> list[Table]:
+    """Return a table of factorisations and solves for each policy whose records hold counts."""
+    tables = []
+    for policy in evidence.policies:
+        own = [record for record in evidence.records if record.cell.solves == policy]
+        if any(map(counted, own)):
+            known = {"policy": policy, **evidence.paper.functions()}
+            told = (filled(note, evidence.frame, known) for note in evidence.paper.work_notes)
+            made = declared_table(
+                evidence,
+                "linear-algebra-work",
+                keys=[record.cell.key for record in own],
+                surfaces=evidence.surfaces,
+                notes=list(filter(None, told)),
+                called=f"linear-algebra-work-{policy}",
+            )
+            tables += [made] if made else []
+    return tables

@@ -1,44 +1,65 @@
-"""A paper's tables: printed figures beside measured ones, and tables of what is not in the paper.
+"""A paper's tables: printed figures beside measured ones, rates of speedup and their averages.
 
-The paper's four algorithms on its models are shown with the printed figures. Other algorithms that
-map to the disk, and other surfaces, have separate tables.
+The paper's algorithms on its models are shown with the printed figures. Other algorithms that map
+to the disk, and other surfaces, have separate tables. A rate of speedup is t / t_reference - 1. A
+paper may average rates arithmetically, where one large ratio counts as much as many small ones, and
+convert that mean to a saving; the geometric mean of the ratios and the mean of the savings weight
+every model equally.
 """
 
 from __future__ import annotations
 
-from cembench.report.content.averages import READINGS
-from cembench.report.content.evidence import (
-    AlgorithmSeries,
-    Evidence,
-)
-from cembench.report.content.printed_beside_measured import (
+from collections.abc import Sequence
+from functools import partial
+
+from cembench.report.by_surface import (
+    MEAN_RATIO,
     POLICIES,
+    Footer,
     Quantity,
-    absent_models,
     in_policy,
     policy_suffix,
     table_beside,
 )
-from cembench.report.document import Table
-from cembench.results.columns import COLUMNS, FrameColumn
+from cembench.report.content.evidence import AlgorithmSeries, Evidence
+from cembench.report.content.speedup_significance import sure_speedups
+from cembench.report.document import Column, Table, count, entry, missing, words
+from cembench.results.columns import COLUMNS, FrameColumn, worded
+from cembench.results.papers import Paper
+
+#: The readings of an average of rates, the paper's own first and third.
+READINGS = (
+    Footer(label="mean rate (as the paper)", value="mean(x)", form=".1f"),
+    Footer(label="geometric mean of ratios - 1", value="geometric(1 + x) - 1", form=".1f"),
+    Footer(label="saving, 1 - 1/(1 + mean)", value="1 - 1 / (1 + mean(x))", form="percent"),
+    Footer(label="mean of the savings", value="mean(1 - 1 / (1 + x))", form="percent"),
+)
+MEAN_RATE, GEOMETRIC_RATE = READINGS[:2]
 
 
 def printed_tables(evidence: Evidence, number: int) -> list[Table]:
-    """Return the paper's table `number`, then other algorithms and other surfaces, if any."""
-    policies = evidence.policies if evidence.paper.printed[number].by_policy else (None,)
-    return [made for policy in policies for made in printed_table(evidence, number, policy)]
+    """Return the paper's table `number`, then other algorithms and other surfaces, if any.
+
+    One that compares algorithms has averages and their certainty, for each policy.
+    """
+    table, made = evidence.paper.printed[number], []
+    for policy in evidence.policies if table.by_policy or table.compares else (None,):
+        made += _printed_table(evidence, number, policy)
+        if table.compares and policy:
+            made += [averages_table(evidence, number, policy)] if evidence.models else []
+            made += sure_speedups(evidence, policy)
+    return made
 
 
-def printed_table(evidence: Evidence, number: int, policy: str | None) -> list[Table]:
+def _printed_table(evidence: Evidence, number: int, policy: str | None) -> list[Table]:
     """Return the same under one policy, or None for a table that has none."""
-    paper = evidence.paper
+    paper, disks = evidence.paper, evidence.disk_series
     table = paper.printed[number]
-    tail = policy_suffix(policy, evidence) if policy else ""
     add = in_policy(evidence, policy) if policy else ""
-    name, title = f"table-{number}{tail}", f"{table.title[0].upper()}{table.title[1:]}"
+    name = f"table-{number}{policy_suffix(policy, evidence) if policy else ''}"
+    title = f"{table.title[0].upper()}{table.title[1:]}"
     shown = paper.compared if table.compares else paper.algorithms
     footers = READINGS if table.compares else ()
-    disks = evidence.disk_series
     tables = []
     if evidence.models and table.figures:
         own = [q for a in shown for q in _quantities(evidence, number, evidence.series_of(a), a)]
@@ -52,26 +73,20 @@ def printed_table(evidence: Evidence, number: int, policy: str | None) -> list[T
                 absent=f"not in this run: {absent}" if absent else "",
             )
         )  # fmt: skip
-        others = [s for s in disks if not (s.algorithm in paper.algorithms and s.main)]
-        if more := [q for s in others for q in _quantities(evidence, number, s)]:
+    others = [s for s in disks if not (s.algorithm in paper.algorithms and s.main)]
+    left_out = set(paper.algorithms) - set(shown)
+    rest = [s for s in disks if s.algorithm not in left_out]
+    for what, surfaces, series in (
+        ("algorithms", evidence.models, others),
+        ("surfaces", evidence.others, rest),
+    ):
+        quantities = [q for s in series for q in _quantities(evidence, number, s)]
+        if table.figures and surfaces and (quantities or what == "surfaces"):
+            of = f"{title}: {what} that are not in the paper{add}"
+            at = f"{name}-other-{what}"
             tables.append(
-                table_beside(
-                    evidence, f"{name}-other-algorithms",
-                    f"{title}: algorithms that are not in the paper{add}",
-                    evidence.models, more, policy=policy, footers=footers,
-                )
-            )  # fmt: skip
-    if evidence.others and table.figures:
-        left_out = set(paper.algorithms) - set(shown)
-        series = [s for s in disks if s.algorithm not in left_out]
-        tables.append(
-            table_beside(
-                evidence, f"{name}-other-surfaces",
-                f"{title}: surfaces that are not in the paper{add}",
-                evidence.others, [q for s in series for q in _quantities(evidence, number, s)],
-                policy=policy, footers=footers,
+                table_beside(evidence, at, of, surfaces, quantities, policy=policy, footers=footers)
             )
-        )  # fmt: skip
     return tables
 
 
@@ -83,19 +98,112 @@ def _quantities(
     if series is not None and table.compares and series.algorithm == evidence.paper.reference:
         return []
     title = series.label if series else printed.upper()
+    figures = {**COLUMNS, "rate": FrameColumn("rate", evidence.rate, form=".2f")}
     return [
         Quantity(
             f"{title} {one.heading}".rstrip(),
             series,
-            _figure(evidence, one.column),
-            (number, one.printed.format(printed)) if printed else None,
-            one.digits,
+            figures[one.column],
+            (number, one.printed.format(printed), one.digits) if printed else None,
         )
         for one in table.figures
         if one.only in ("", printed)
     ]
 
 
-def _figure(evidence: Evidence, name: str) -> FrameColumn:
-    """Return a column of the frame, or the rate of speedup of CEM over the algorithm."""
-    return FrameColumn("rate", evidence.rate, form=".2f") if name == "rate" else COLUMNS[name]
+def absent_models(evidence: Evidence) -> list[str]:
+    """Return the models of the paper without a surface in the run."""
+    there = {s.paper_row for s in evidence.models}
+    return [model for model in evidence.paper.models if model not in there]
+
+
+def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
+    """Return both readings of the averages: stated, printed for all or these models, measured."""
+    paper = evidence.paper
+    titles = ("stated", "printed, all", "printed, these", "here")
+    columns = [Column(title, a.upper()) for a in paper.compared for title in titles]
+    stated = {0: paper.stated.get("rate", {}), 2: paper.stated.get("saving", {})}
+    rows, counts, work = [], [words("n, models counted")], []
+    sets = {}
+    for a in paper.compared:
+        here = measured_rates(evidence, a, policy)
+        sets[a] = (printed_rates(paper, a), printed_rates(paper, a, list(here)), [*here.values()])
+        counts += [words(""), *(count(len(rates)) for rates in sets[a])]
+        work.append(work_ratios(evidence, a, policy))
+    for k, reading in enumerate(READINGS):
+        cells = [words(reading.label)]
+        for a in paper.compared:
+            claim, unstated = stated.get(k, {}).get(a), "the paper does not state it"
+            form = partial(worded, form=reading.form)
+            cells.append(entry(claim, form, unstated, origin="printed"))
+            cells += [reading.entry(rates, "no rate to average") for rates in sets[a]]
+        rows.append(tuple(cells))
+    if any(work):  # the row that no machine's speed is in
+        cells = [words(f"factorisations over {evidence.reference_label}'s, geometric mean")]
+        tenths = MEAN_RATIO.model_copy(update={"form": ".1f"})
+        for ratios in work:
+            cells += [missing("the paper does not count them")] * 3
+            cells.append(tenths.entry(ratios, "not counted"))
+        rows.append(tuple(cells))
+    origins = ", ".join(sorted({s.origin for s in evidence.models}))
+    replaced = (
+        f"the misprint ({model}, {algorithm.upper()}) is replaced by the {rate:.2f} that Table "
+        f"{paper.table_of('seconds')} gives"
+        for table, model, algorithm in paper.misprints
+        if table == number and (rate := corrected_rate(paper, model, algorithm)) is not None
+    )
+    return Table(
+        name=f"averages{policy_suffix(policy, evidence)}",
+        title=f"Averages of Table {number}, in both readings{in_policy(evidence, policy)}",
+        columns=(Column("reading", numeric=False), *columns),
+        rows=(*rows, tuple(counts)),
+        caption=(
+            "In the mean of rates, single large ratios dominate; the geometric mean and the mean "
+            "of the savings weight every model equally. 'Printed, these' are the printed rates of "
+            "the models that were measured here too. Each model counts once: if it was measured "
+            "itself, its stand-in is left out."
+        ),
+        notes=(
+            *replaced,
+            f"measured on: {origins}; {len(absent_models(evidence))} of the paper's "
+            "models are not in this run",
+        ),
+        footer_rows=1,
+    )
+
+
+def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = None) -> list[float]:
+    """Return the printed rates for these models (default: all), misprints from the seconds."""
+    chosen = paper.models if models is None else models
+    rates = (corrected_rate(paper, model, algorithm) for model in chosen)
+    return [rate for rate in rates if rate is not None]
+
+
+def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:
+    """Return a printed rate, or for a misprint the one that follows from the printed seconds."""
+    rates, seconds = paper.table_of("rate"), paper.table_of("seconds")
+    if rates is not None and (rates, model, algorithm) not in paper.misprints:
+        return paper.tables[rates][model][algorithm]
+    times = paper.tables[seconds][model] if seconds is not None else {}
+    ours, theirs = times.get(paper.reference), times.get(algorithm)
+    return None if ours is None or theirs is None else theirs / ours - 1
+
+
+def measured_rates(evidence: Evidence, algorithm: str, policy: str) -> dict[str, float]:
+    """Return the rates of speedup over an algorithm by model, those of one surface for each."""
+    frame = evidence.frame
+    rows = frame[frame["counted"] & frame["main"] & (frame["algorithm"] == algorithm)]
+    rows = rows[rows["solves"] == policy]
+    rates = (evidence.rate(evidence.by_key[key]) for key in rows["key"])
+    return {m: rate for m, rate in zip(rows["model"], rates, strict=True) if rate is not None}
+
+
+def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:
+    """Return an algorithm's numeric factorisations over CEM's, of the models that count."""
+    frame = evidence.frame
+    rows = frame[frame["counted"] & frame["main"] & (frame["solves"] == policy)]
+    work = rows.pivot(index="place", columns="algorithm", values="counted_factorisations")
+    if not {algorithm, evidence.reference} <= set(work):
+        return []
+    ratios: list[float] = (work[algorithm] / work[evidence.reference]).dropna().tolist()
+    return ratios

@@ -13,14 +13,10 @@ from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface, figure_of
 from cembench.report.content.exhibits import exhibit_sections
-from cembench.report.content.exponents import exponents_table
 from cembench.report.content.findings import findings, many_findings, surfaces_words
 from cembench.report.content.inspection import Inspection, inspect_surface
-from cembench.report.content.linear_algebra_work import work_tables
-from cembench.report.content.machines import machines_section
 from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
-from cembench.report.content.rates import rates_tables
 from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table, own_tables
@@ -28,18 +24,61 @@ from cembench.report.declared_plots import declared_plot
 from cembench.report.document import (
     ORIGINS,
     Claim,
+    Column,
     Figure,
     Findings,
     Item,
+    Plain,
     Report,
     Section,
     Table,
     Text,
     words,
 )
+from cembench.report.plot_rows import exponents_table
 from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
+from cembench.results.machines import machine_of, software_differences
 from cembench.results.records import MeshOrigin
+
+
+def machines_section(evidence: Evidence) -> Section | None:
+    """A line a machine, and in what their software differs; None where there is one machine."""
+    environments = evidence.store.environments()
+    marked = evidence.machines
+    differing = software_differences(evidence.records, environments)
+    if not marked.letters and not differing:
+        return None
+    items: list[Item] = [Text(words) for words in marked.explained()]
+    if marked.letters:
+        items.append(
+            Text(
+                "The letter beside a time names its machine. A surface is measured on one machine "
+                "by all algorithms, so rates of speedup, their averages, ranks and profiles are "
+                "formed within machines. Plots of seconds, and exponents, run over all of them: "
+                "part of what they show is how machines differ."
+            )
+        )
+        items.append(_table(evidence))
+    items += [Text(f"Other software than most cells have: {words}.") for words in differing]
+    return Section("machines", "Machines", tuple(items))
+
+
+def _table(evidence: Evidence) -> Table:
+    environments = evidence.store.environments()
+    rows: list[list[Plain]] = []
+    for name, letter in evidence.machines.letters.items():
+        own = [record for record in evidence.records if evidence.machines.of(record) == letter]
+        about = next(
+            (e for r in own if machine_of(e := environments.get(r.environment, {})) == name), {}
+        )
+        surfaces = len({record.cell.mesh_hash for record in own})
+        cpu = str(about.get("cpu") or "-")
+        rows.append([letter, name or "not named", cpu, surfaces, len(own)])
+    columns = [Column(title, numeric=False) for title in ("mark", "machine", "processor")]
+    columns += [Column("surfaces"), Column("cells")]
+    return Table.of("machines", "Machines of this run", columns, rows, origin="")
+
 
 #: Receives progress: a text, the number of finished steps, and their total.
 Progress = Callable[[str, int, int], None]
@@ -282,12 +321,9 @@ def _tables(run: _Run) -> Section | None:
     evidence, printed = run.evidence, run.evidence.paper.printed
     items: list[Item] = []
     for number in sorted(printed):
-        if printed[number].compares:
-            items += rates_tables(evidence, number)
-        else:
-            items += printed_tables(evidence, number)
+        items += printed_tables(evidence, number)
         if any(figure.column == "seconds" for figure in printed[number].figures):
-            items += work_tables(evidence)
+            items += policies.work_tables(evidence)
     numbers = sorted(number for number, table in printed.items() if table.figures)
     title = f"Tables {numbers[0]} to {numbers[-1]}" if numbers else ""
     return Section("tables", title, tuple(items)) if items else None
@@ -338,7 +374,7 @@ def _own_results(run: _Run) -> Section:
         figures_table(evidence, surface, f"{evidence.name_of(surface)}-overview")
         for surface in evidence.surfaces
     ]
-    items += work_tables(evidence)
+    items += policies.work_tables(evidence)
     items += (*run.plots(*_TIMES), *_certain(run), *_policies(run), *_beside(run))
     of_models = [paper_plot(evidence, name, run.seen) for name in reversed(OF_MODELS)]
     items += (*drawn(of_models, run.folder), *run.plots("cost-by-faces"))

@@ -8,8 +8,8 @@ from itertools import islice
 from math import exp, log
 from statistics import mean
 
+from cembench.report.by_surface import in_policy, policy_suffix
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
-from cembench.report.content.printed_beside_measured import in_policy, policy_suffix
 from cembench.report.document import Column, Table, Value, count, missing, words
 from cembench.results.comparison import NOT_DETECTED, Comparison, compare, paired_ratios
 from cembench.results.families import FEWEST_FAMILIES, average_interval, family_means, votes

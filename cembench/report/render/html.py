@@ -18,7 +18,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from itertools import groupby
 from pathlib import Path, PurePosixPath
@@ -43,9 +43,7 @@ from cembench.report.document import (
     Value,
     Verdict,
     csv_of,
-    figures_of,
-    galleries_of,
-    tables_of,
+    items_of,
 )
 from cembench.report.pictures import (
     embed_pixels,
@@ -54,7 +52,65 @@ from cembench.report.pictures import (
     size_of,
     unreadable,
 )
-from cembench.report.render.facets import facets_of
+
+#: The facets, each with the columns of a record whose values name a choice.
+FACETS: Mapping[str, tuple[str, ...]] = {
+    "surface": ("mesh", "paper_row"),
+    "algorithm": ("algorithm", "title"),
+    "status": ("status",),
+}
+Rows = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Facets:
+    """The choices of a report's filter.
+
+    Parameters
+    ----------
+    choices : mapping
+        The choices of each of :data:`FACETS`, as printed.
+    names : mapping
+        Names in tables and plots that mean one choice: its facet and its place among the choices.
+    cells : mapping
+        The places of each record's choices, by its key.
+
+    """
+
+    choices: Mapping[str, list[str]]
+    names: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    cells: Mapping[str, list[int]] = field(default_factory=dict)
+
+
+def facets_of(records: Rows) -> Facets:
+    """Return the choices that records offer. Names that mean several choices are left out."""
+    printed = _printed(records)
+    choices = [sorted({own[k] for own in printed.values()}, key=str.casefold) for k in range(3)]
+    cells = {
+        key: [choices[k].index(name) for k, name in enumerate(own)] for key, own in printed.items()
+    }
+    meant: dict[str, set[tuple[int, int]]] = {}
+    for key, row in records.items():
+        for k, columns in enumerate(FACETS.values()):
+            for name in filter(None, (printed[key][k], *map(row.get, columns))):
+                meant.setdefault(str(name), set()).add((k, cells[key][k]))
+    names = {name: found.pop() for name, found in meant.items() if len(found) == 1}
+    return Facets(dict(zip(FACETS, choices, strict=True)), names, cells)
+
+
+def _printed(records: Rows) -> dict[str, tuple[str, str, str]]:
+    """Return the surface, algorithm and status of each record; algorithms of one title differ."""
+    titles = {r.get("algorithm"): r.get("title") or r.get("algorithm") for r in records.values()}
+    often = Counter(titles.values())
+
+    def of(row: Mapping[str, Any]) -> tuple[str, str, str]:
+        name = row.get("algorithm")
+        title = titles[name] if often[titles[name]] == 1 else f"{titles[name]} ({name})"
+        surface = row.get("paper_row") or row.get("mesh")
+        return str(surface or ""), str(title or ""), str(row.get("status") or "")
+
+    return {key: of(row) for key, row in records.items()}
+
 
 FILE = "index.html"
 #: The sign before each verdict, so that it does not rely on colour alone.
@@ -97,15 +153,17 @@ def render(report: Report, folder: Path) -> str:
     anchors = _Anchors()
     sections = [_section(section, anchors, None) for section in report.sections]
     everything = [s for top in sections for s in _all_sections(top)]
-    figures = list(figures_of(report))
+    figures = list(items_of(report, Figure))
     pictures = _Pictures(figures, folder)
-    data = _small_files(folder, [f.data for f in figures if f.data], map(csv_of, tables_of(report)))
+    data = _small_files(
+        folder, [f.data for f in figures if f.data], map(csv_of, items_of(report, Table))
+    )
     keys = _short_keys(report.records)
     facets = facets_of(report.records)
     plots = {anchors.of(f): _plot(f.plot) for f in figures if f.plot is not None}
     script = template_text("unpack.js") + template_text("report.js")
     style = template_text("report.css")
-    if any(gallery.scene for gallery in galleries_of(report)):
+    if any(gallery.scene for gallery in items_of(report, Gallery)):
         script, style = script + template_text("view.js"), style + template_text("view.css")
     library, packed_library = _plotly() if plots else (b"", "")
     store = {
@@ -324,7 +382,7 @@ class _Pictures:
     def first_of(self, section: Section) -> Mapping[str, Any] | None:
         """Return a copy of the first picture of a page, for the list of pages."""
         one = Report(title="", command="", facts=(), sections=(section,))
-        pictures = (f for f in figures_of(one) if f.plot is None and self._files[id(f)])
+        pictures = (f for f in items_of(one, Figure) if f.plot is None and self._files[id(f)])
         first = next(pictures, None)
         return None if first is None else self.of(first, copy=True)
 

@@ -28,8 +28,8 @@ from cembench.report.document import (
     Text,
     Value,
     is_prose,
+    items_of,
     marked,
-    tables_of,
     tex_of,
 )
 
@@ -72,7 +72,7 @@ PREAMBLE = r"""\documentclass[a4paper,10pt]{article}
 
 def write_latex(report: Report, folder: Path) -> Path:
     """Write ``report.tex`` and ``tables/*.tex``; return the path of the first."""
-    for table in tables_of(report):
+    for table in items_of(report, Table):
         _write(folder / tex_of(table), table_lines(table))
     lines = [f"% Made by: {escape(report.command)}", PREAMBLE]
     lines += [rf"\title{{{escape(report.title)}}}", r"\author{}", r"\date{}"]

@@ -1,4 +1,4 @@
-"""Lay out what a report is made of on a terminal.
+"""Lay out what a report is made of on a terminal, and the head of a report with its first tables.
 
 Where a table is too wide, its headings are broken into lines; then columns that are details are
 left out, long texts are broken into lines, and at last names are shortened.
@@ -22,14 +22,17 @@ from cembench.report.document import (
     Column,
     Gap,
     OnTerminal,
+    Report,
     Section,
     Table,
     Text,
     Tone,
     Value,
     is_prose,
+    items_of,
     marked,
     of_status,
+    plain,
     words,
 )
 
@@ -214,3 +217,42 @@ def folded(table: Table) -> Table:
     ]
     columns = (table.columns[0], Column("", numeric=False), *map(Column, groups))
     return replace(table, columns=columns, rows=tuple(rows))
+
+
+def paper_tables(report: Report) -> RenderableType:
+    """Return the head and the paper's tables, printed figures above measured ones.
+
+    A run over the user's own surfaces has its own table instead.
+    """
+    tables = {table.name: table for table in items_of(report, Table)}
+    printed = [f"table-{number}" for number in (report.paper.printed if report.paper else ())]
+    names = (name if name in tables else f"{name}-other-surfaces" for name in printed)
+    chosen = [tables[name] for name in names if name in tables]
+    parts = list(_head(report))
+    for table in chosen:
+        notes = tuple(note for note in table.notes if note != table.absent)
+        parts += [folded(replace(table, caption="", notes=notes)), ""]
+    absent = {table.absent for table in chosen if table.absent}
+    parts += [Line(note, STYLES["faint"]) for note in sorted(absent)]
+    if chosen:
+        marks = [f"{mark} {words}" for words, mark in ORIGINS.values() if mark and mark != "ᵖ"]
+        parts.append(Line(f"{'; '.join(marks)}; † misprint; ! unstable", STYLES["faint"]))
+    return Group(*parts)
+
+
+def _head(report: Report) -> Iterator[RenderableType]:
+    """Yield the title, the paper that the report is about, and the findings."""
+    yield Line(report.title, "bold")
+    if report.paper is not None:
+        yield Line(f"{report.paper.authors}. {report.paper.place}. doi:{report.paper.doi}")
+    found = report.findings
+    if found is not None:
+        yield from (Line(f"\n{plain(sentence)}") for sentence in found.sentences)
+        yield Line()
+        yield from (Line(f"! {line}", STYLES["doubtful"]) for line in found.suspects)
+        if found.table is not None:
+            yield from (folded(replace(found.table, caption="", notes=())), Line())
+        for figure in found.figures:
+            line = Line.assemble((figure.number, "bold"), f"  {figure.words}")
+            yield Padding(line, (0, 0, 0, 2), expand=False)
+    yield Line()

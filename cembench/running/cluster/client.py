@@ -22,9 +22,9 @@ from pydantic import ValidationError
 
 from cembench.core.errors import ClusterError
 from cembench.results import run_folder
+from cembench.results.intervals import next_look
 from cembench.results.machines import differences
 from cembench.results.records import Fault, FaultKind, Record, not_ok
-from cembench.results.sequential_checks import next_look
 from cembench.results.store import Store
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from cembench.running.cluster.units import Parcel, grouped, makespan, parcel
