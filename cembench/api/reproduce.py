@@ -38,8 +38,8 @@ class Reproduction:
     --------
     >>> import cembench
     >>> found = cembench.reproduce(offline=True, budget=0)  # doctest: +SKIP
-    >>> sorted(found.surfaces.values())  # doctest: +SKIP
-    ['stand-in', 'stand-in', 'stand-in', 'stand-in', 'stand-in', 'stand-in', 'stand-in', 'stand-in']
+    >>> sorted(set(found.surfaces.values()))  # doctest: +SKIP
+    ['stand-in']
 
     """
 

@@ -139,7 +139,7 @@ def test_a_lock_is_held_by_one_and_what_a_killed_run_left_is_cleared(tmp_path):
     (scratch / "V.npy").touch()
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
-    left = [f".draft-{'0' * 12}-{ended.pid}-{'0' * 32}.npz", f".draft-{'0' * 32}"]
+    left = [f".draft-{'0' * 12}-{ended.pid}-{'0' * 32}.npz"]
     kept = [f".draft-{'0' * 12}-{os.getpid()}-{'0' * 32}", ".draft-thesis"]
     (tmp_path / "run/maps").mkdir()
     for name in left + kept:
