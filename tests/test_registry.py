@@ -114,8 +114,11 @@ def test_an_unknown_name_lists_the_known_ones():
         load_registry().algorithm("x")
     with pytest.raises(RegistryError, match=r"Did you mean flat-disk\?"):
         load_registry().surface("flat-dsik")
-    with pytest.raises(RegistryError, match=r"--dataset left-hand`\. Its stand-in is left-hand-s"):
+    with pytest.raises(RegistryError, match="Its stand-in is left-hand-stand-in") as public:
         load_registry().surface("left-hand")
+    assert "`cembench.load_surface('left-hand')`" in str(public.value)
+    public.value.reword({})
+    assert "`--dataset left-hand`" in str(public.value)
     with pytest.raises(RegistryError, match=r"unknown surface 'x'; known: .*flat-disk"):
         load_registry().surface("x")
 

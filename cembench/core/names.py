@@ -39,7 +39,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
     (' Did you mean cem?', ' Did you mean harmonic-tutte?')
     """
     names, low = list(dict.fromkeys(known)), name.lower()
-    close = get_close_matches(low, [one.lower() for one in names])
+    close = [low] if low in map(str.lower, names) else get_close_matches(low, map(str.lower, names))
     near = [one for text in close for one in names if one.lower() == text]
     near = near or [one for one in names if one.lower().startswith(low)]
     near = near or [one for one in names if low in one.lower()]

@@ -69,6 +69,26 @@ def test_a_result_shows_and_saves_itself(disk, tmp_path):
     result.save(saved, overwrite=True)
 
 
+def test_a_notebook_shows_a_plot_once(disk, monkeypatch):
+    from matplotlib import pyplot
+
+    result, before = cembench.parameterize(disk), pyplot.get_fignums()
+    figure = result.plot()
+    assert pyplot.get_fignums() == [*before, figure.number]
+    pyplot.close(figure)
+    monkeypatch.setattr("cembench.api.parameterize.is_notebook", lambda: True)
+    result.plot()
+    assert pyplot.get_fignums() == before
+
+
+def test_the_page_and_the_notices_say_where_one_chart_cannot_serve(disk, monkeypatch, tmp_path):
+    result = cembench.parameterize(disk)
+    assert not any("islands" in notice for notice in result.notices)
+    monkeypatch.setattr("cembench.api.view.needs_islands", lambda metrics: True)
+    assert any("islands" in notice for notice in result.notices)
+    assert "islands" in result.show(tmp_path / "a.html").read_text()
+
+
 def test_parameters_are_checked_as_on_the_command_line(disk):
     assert cembench.parameterize(disk, "cem", max_iterations=2).iterations <= 2
     with pytest.raises(cembench.ParameterError, match="max_iterations"):

@@ -193,6 +193,31 @@ def test_the_function_refuses_what_the_option_would(given):
         cembench.benchmark(["flat-disk"], **given)
 
 
+def test_a_wrong_argument_names_the_function():
+    with pytest.raises(TypeError, match=r"benchmark\(\) got an unexpected keyword argument"):
+        cembench.benchmark(["flat-disk"], round=1)
+
+
+def test_a_name_that_is_nearly_right_is_suggested(cli, cap):
+    for words, meant in (
+        (("-a", "CEM"), "Did you mean cem?"),
+        (("-a", "tutte"), "Did you mean harmonic-tutte?"),
+        (("-a", "cem", "-p", "max_iteration=3"), "Did you mean max_iterations?"),
+    ):
+        code, _, err = cli("map", cap, *words)
+        assert code == 2
+        assert meant in err
+    for name, meant in (("capp.obj", "cap.obj"), ("hemi-elipsoid", "hemi-ellipsoid")):
+        assert f"Did you mean {meant}" in cli("map", name)[2]
+
+
+def test_a_generated_surface_is_mapped_by_its_name(cli):
+    code, out, err = cli("map", "cone", "-o", "cone.obj", "--json")
+    assert code == 0, err
+    assert json.loads(out)["mesh"] == "cone"
+    assert cembench.read_mesh(cli.folder / "cone.obj").m == cembench.surface("cone").m
+
+
 def test_one_bad_file_of_a_folder_is_left_out_with_a_note(cli, cap):
     cli.folder.joinpath("bad.obj").write_text("v 0 0 0\nf 1 2 3\n")
     words = ("run", "--mesh-dir", ".", "-a", "lscm", "--dry-run", "--json")
