@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 2_100,
     "mesh": 6_000,
     "linear_algebra": 1_500,
-    "conformal": 5_700,
+    "conformal": 5_850,
     "registry": 950,
     "results": 4_200,
     "running": 7_300,
@@ -78,7 +78,7 @@ BUDGETS = {
     "report": 7_900,
     "validation": 2_250,
     "morphing": 1_750,
-    "api": 6_100,
+    "api": 6_050,
     "commands": 2_950,
 }
 
